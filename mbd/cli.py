@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import argparse
 import ast
-import difflib
-import inspect
 import os
-import runpy
 import shlex
 import sys
 import time
 import traceback
 import webbrowser
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.values import printable
-from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
-from mbd.progress import Progress, progress_bar
+from mbd.errors import MbdError, ModelError, SimulationError
+from mbd.progress import progress_bar
+from mbd.scripts import (
+    OPTIONS,
+    Script,
+    examples,
+    find,
+    folder,
+    import_plotting,
+    is_run_file,
+    name_of_run,
+    name_of_script,
+)
 from mbd.view import lab_arguments
 from mbd.view.parser import Parser, writable
 
@@ -36,144 +43,62 @@ TOLD = (
 )  # fmt: skip
 """Errors of users' scripts that are reported in a sentence; ``--debug`` shows where they came from."""
 
-OPTIONS = ("dt", "tol", "contact", "impact", "locate", "parameters", "store", "observers", "rest_speed", "backend")
-"""Names that a script may define to pass them on to `simulate`."""
-
-SETTINGS = ("model", "start", "integrator", "until", *OPTIONS)
-"""All names of a script that mean something to ``mbd run``."""
-
-
-# scripts and examples ---------------------------------------------------------------------------------------------
-
-
-def folder() -> Path:
-    """Where the examples are: inside an installed package, or beside it in a source checkout."""
-    package = Path(__file__).resolve().parent
-    inside = package / "examples"
-    return inside if inside.is_dir() else package.parent / "examples"
-
-
-def examples() -> dict[str, Path]:
-    """The packaged examples by name: 'kneed-walker' for kneed_walker.py."""
-    files = sorted(folder().glob("*.py")) if folder().is_dir() else []
-    return {file.stem.replace("_", "-"): file for file in files if not file.stem.startswith("_")}
-
-
-def find(name: str) -> Path:
-    """The file of a script, given as a path, or of an example, given by name."""
-    path = Path(name)
-    if path.is_file():
-        return path
-    if path.suffix == ".py" or len(path.parts) > 1:
-        raise FileNotFoundError(f"no script at '{name}'")
-    known = examples()
-    wanted = name.replace("_", "-")
-    if wanted not in known:
-        raise UnknownNameError(nearest(name, known, "example", "There are") + "; or give a file")
-    return known[wanted]
-
-
-@dataclass(frozen=True)
-class Script:
-    """A script that has been executed: either its `main`, or the names of a run."""
-
-    path: Path
-    names: dict[str, Any] = field(repr=False)
-
-    @classmethod
-    def load(cls, name: str) -> Script:
-        """Execute a script or example, but not what it keeps under ``if __name__ == "__main__"``."""
-        path = find(name)
-        sys.path.insert(0, str(path.resolve().parent))
-        try:
-            return cls(path, runpy.run_path(str(path), run_name="mbd_script"))
-        finally:
-            sys.path.pop(0)
-
-    def require(self, *wanted: str) -> None:
-        """All of these names, or an error that lists the missing ones."""
-        missing = [name for name in wanted if name not in self.names]
-        if missing:
-            has = "model, start, integrator, dt or tol, and until, or a function main() that returns a run"
-            meant = "".join(f"; did you mean {name!r} by {wrong!r}?" for wrong, name in self.misspelt().items())
-            raise ModelError(f"{self.path.name} does not define {', '.join(missing)}{meant}; a script defines {has}")
-
-    def misspelt(self) -> dict[str, str]:
-        """Names that look like settings the script does not define: 'untill' for 'until'."""
-        free = [name for name in SETTINGS if name not in self.names]
-        close = {name: difflib.get_close_matches(name, free, n=1, cutoff=0.8) for name in self.names}
-        return {name: found[0] for name, found in close.items() if found and not callable(self.names[name])}
-
-    def run(self, progress: Progress | None, changes: dict[str, Any]) -> Trajectory:
-        """Simulate what the script describes.
-
-        Parameters
-        ----------
-        progress : called with the simulated time and the end time [s]
-        changes : values that replace the script's own: dt or tol, until
-        """
-        if "main" in self.names:
-            if changes:
-                raise ModelError(f"{self.path.name} has a main(), which chooses {', '.join(changes)} itself")
-            return self._run_of_main(progress)
-        steps = ("tol",) if "tol" in self.names and "dt" not in self.names else ("dt",)
-        given = {"dt", "tol"} | set(changes) if {"dt", "tol"} & set(changes) else set(changes)
-        self.require("model", "start", "integrator", *(name for name in (*steps, "until") if name not in given))
-        options = {name: self.names[name] for name in (*OPTIONS, "until") if name in self.names} | changes
-        for one, other in (("dt", "tol"), ("tol", "dt")):
-            if one in changes and other not in changes:
-                options.pop(other, None)
-        from mbd import simulate
-
-        names = self.names
-        found: Trajectory = simulate(names["model"], names["start"], names["integrator"], progress=progress, **options)
-        return found
-
-    def _run_of_main(self, progress: Progress | None) -> Trajectory:
-        from mbd.trajectory import Trajectory
-
-        function = self.names["main"]
-        takes = "progress" in inspect.signature(function).parameters
-        run = function(progress=progress) if takes else function()
-        if not isinstance(run, Trajectory):
-            raise ModelError(
-                f"main() of {self.path.name} must return the run of mbd.simulate, got {type(run).__name__}"
-            )
-        return run
-
-
-# commands ---------------------------------------------------------------------------------------------------------
-
 
 def _out(arguments: argparse.Namespace) -> Path:
     """The folder for results of a script, into which can be written."""
-    usual = Path("mbd-runs") / find(arguments.script).stem.replace("_", "-")
+    usual = Path("mbd-runs") / name_of_script(arguments.script)
     arguments.out = writable(usual if arguments.out is None else arguments.out)
     return Path(arguments.out)
 
 
+def _changes(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Settings of the command line that replace those of the script."""
+    changes = {name: value for name in ("dt", "tol", "until") if (value := getattr(arguments, name)) is not None}
+    return changes | ({"parameters": dict(arguments.set)} if arguments.set else {})
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    """The parameter and the value of 'knee loss.coefficient=1'."""
+    name, sign, value = text.rpartition("=")
+    try:
+        if sign and name.strip():
+            return name.strip(), float(value)
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"expected NAME=VALUE, such as 'knee loss.coefficient=1', got {text!r}")
+
+
 def run_command(arguments: argparse.Namespace) -> int:
     """``mbd run``: simulate, print a summary, write plots, page, run and record."""
+    if is_run_file(arguments.script):
+        raise ModelError(
+            f"{arguments.script!r} is a stored run; show it with: mbd show {shlex.quote(arguments.script)}"
+        )
     began = time.perf_counter()
     out = _out(arguments)
+    plots = _can_plot(arguments.plots)
+    if plots:
+        import_plotting()
     script = Script.load(arguments.script)
     for wrong, name in script.misspelt().items():
         print(
             f"note: {script.path.name} defines {wrong!r}, which is no setting; did you mean {name!r}?", file=sys.stderr
         )
     loaded = time.perf_counter()
-    changes = {name: value for name in ("dt", "tol", "until") if (value := getattr(arguments, name)) is not None}
     failure: SimulationError | None = None
     with progress_bar() as progress:
         try:
-            run = script.run(progress, changes)
+            run = script.run(progress, _changes(arguments))
         except SimulationError as error:
             if error.run is None:
                 raise
             run, failure = error.run, error
     ended = time.perf_counter()
     wall = {"load": loaded - began, "simulate": ended - loaded}
-    _tell(run, script, out, wall, arguments.open)
+    _print(run)
+    from mbd.view.report import write
+
+    _print_paths(write(run, out, wall, plots, script.path), out, arguments.open)
     wall = {stage: round(seconds, 3) for stage, seconds in (wall | {"write": time.perf_counter() - ended}).items()}
     stages = ", ".join(f"{stage} {seconds:.3f} s" for stage, seconds in wall.items())
     print(f"wall time    {stages}; total {sum(wall.values()):.3f} s")
@@ -182,20 +107,39 @@ def run_command(arguments: argparse.Namespace) -> int:
     return 0 if run.success else 1
 
 
-def _tell(run: Trajectory, script: Script, out: Path, wall: dict[str, float], show: bool) -> None:
+def show_command(arguments: argparse.Namespace) -> int:
+    """``mbd show``: print and draw a stored run, without simulating again."""
+    from mbd.trajectory import load
+    from mbd.view.report import draw
+
+    path = Path(arguments.run)
+    out = writable(Path("mbd-runs") / name_of_run(path) if arguments.out is None else arguments.out)
+    run = load(path)
+    _print(run)
+    _print_paths(draw(run, out, _can_plot(arguments.plots)), out, arguments.open)
+    return 0
+
+
+def _print(run: Trajectory) -> None:
+    """Summary, steps of a walk and energy by cause."""
     from mbd.analysis.gait import gait
-    from mbd.view.report import write
 
     print(run)
     steps = gait(run)
     if len(steps):
         print(f"\n{steps}")
-    print(f"\n{run.energy}")
-    print()
-    plots = find_spec("matplotlib") is not None
-    if not plots:
-        print("no plots: matplotlib is not installed; try pip install 'mbd[plot]'")
-    paths = write(run, out, wall, plots, script.path)
+    print(f"\n{run.energy}\n")
+
+
+def _can_plot(wanted: bool) -> bool:
+    """Whether plots are wanted and matplotlib is there; says so where only the latter fails."""
+    there = find_spec("matplotlib") is not None
+    if wanted and not there:
+        print("no plots: matplotlib is not installed; try pip install 'mbd[plot]'", file=sys.stderr)
+    return wanted and there
+
+
+def _print_paths(paths: Sequence[Path], out: Path, show: bool) -> None:
     print("wrote        " + "\n             ".join(str(path) for path in paths))
     if show:
         webbrowser.open((out / "page.html").resolve().as_uri())
@@ -302,17 +246,17 @@ def effects_command(arguments: argparse.Namespace) -> int:
 
 
 def gait_command(arguments: argparse.Namespace) -> int:
-    """``mbd gait``: simulate scripts and report how their walkers walk, one beside the other."""
-    usual = Path("mbd-runs") / find(arguments.scripts[0]).stem.replace("_", "-")
-    out = Path(writable(usual if arguments.out is None else arguments.out))
+    """``mbd gait``: report how the walkers of scripts or stored runs walk, one beside the other."""
     from mbd.analysis.gait_report.command import run
+    from mbd.trajectory import load
 
-    runs = []
+    names = [name_of_run(Path(name)) if is_run_file(name) else name_of_script(name) for name in arguments.scripts]
+    out = Path(writable(Path("mbd-runs") / names[0] if arguments.out is None else arguments.out))
     changes = {} if arguments.until is None else {"until": arguments.until}
     with progress_bar() as progress:
-        for name in arguments.scripts:
-            runs.append(Script.load(name).run(progress, changes))
-    names = [find(name).stem.replace("_", "-") for name in arguments.scripts]
+        runs = [
+            load(name) if is_run_file(name) else Script.load(name).run(progress, changes) for name in arguments.scripts
+        ]
     return run(runs, names, out, arguments)
 
 
@@ -340,7 +284,7 @@ def _parser() -> argparse.ArgumentParser:
 
     parser = Parser(prog="mbd", description="Simulate multibody mechanisms described in Python.")
     parser.add_argument("--version", action="version", version=f"mbd {mbd.__version__}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
 
     def command(name: str, function: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
         made = commands.add_parser(name, help=text, description=text)
@@ -355,6 +299,16 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--dt", type=float, metavar="SECONDS", help="another step size than the script's")
     run.add_argument("--tol", type=float, metavar="ERROR", help="steps that follow this error, in place of dt")
     run.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the script's")
+    run.add_argument(
+        "--set", type=_assignment, action="append", metavar="NAME=VALUE",
+        help="another value of a parameter, such as 'knee loss.coefficient=1'; may be given again",
+    )  # fmt: skip
+    run.add_argument("--no-plots", dest="plots", action="store_false", help="leave the plots (PNG) out")
+    show = command("show", show_command, "print a stored run, write its plots and page; nothing is simulated")
+    show.add_argument("run", metavar="RUN.mbd.npz", help="a file that 'mbd run' or run.save() has written")
+    show.add_argument("--out", metavar="DIR", help="folder for plots and page (default: mbd-runs/NAME)")
+    show.add_argument("--open", action="store_true", help="open the page in a browser")
+    show.add_argument("--no-plots", dest="plots", action="store_false", help="leave the plots (PNG) out")
     new = command("new", new_command, "write a commented script to begin with")
     new.add_argument("name", metavar="NAME", help="of the script, such as my-leg")
     check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
@@ -383,7 +337,11 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code: 0, or 1 after an error that was reported."""
-    arguments = _parser().parse_args(argv)
+    parser = _parser()
+    arguments = parser.parse_args(argv)
+    if not hasattr(arguments, "function"):
+        parser.print_help()
+        return 0
     try:
         code: int = arguments.function(arguments)
         sys.stdout.flush()

@@ -129,9 +129,11 @@ def trial_bar(wanted: bool, title: str) -> Iterator[Callable[[int, float], None]
 
 
 def counted(items: Sequence[Item], name: Callable[[Item], str]) -> Iterator[Item]:
-    """The items one by one, with a bar that names the present one, as above; nothing elsewhere."""
+    """The items one by one, with a bar that names the present one; elsewhere, such as in a log, a line for each."""
     if not _is_wanted():
-        yield from items
+        for number, item in enumerate(items, 1):
+            print(f"{number}/{len(items)} {name(item)}", file=sys.stderr, flush=True)
+            yield item
         return
     with _bar("{n}/{total} |{bar:30}| {desc}", len(items)) as bar:
         for item in items:

@@ -279,7 +279,7 @@ class Trajectory:
         """
         from mbd.results.storage import Archive, save
 
-        return save(self.record, Archive(self.columns, self.energy, self.violation, self.facts), path, names)
+        return save(self.record, Archive.of(self), path, names)
 
     def animate(self, height: int = 640) -> Any:
         """The page's animation in the cell of a notebook, `height` pixels high; the notebook holds it when it is saved.

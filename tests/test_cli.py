@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd import cli
+from mbd import cli, scripts
 from mbd.errors import SimulationError
 from mbd.view.parser import writable
 from tests.view.handmade_runs import walker
@@ -106,7 +106,7 @@ def test_debug_shows_where_an_error_came_from(script):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("model = 1\n", "my_walk.py does not define start, integrator, dt, until; a script defines"),
+        ("model = 1\n", "my_walk.py does not define start, dt, until; a script defines"),
         ("def main():\n    return 3\n", "main() of my_walk.py must return the run of mbd.simulate, got int"),
         ("x = 1\ny = x / 0\n", "line 2 of my_walk.py: ZeroDivisionError: division by zero"),
         ("def main(:\n", "SyntaxError: "),
@@ -130,12 +130,12 @@ def test_effects_of_a_script_with_a_tolerance_ask_for_a_step(script, capsys):
 
 def test_another_step_is_refused_where_main_chooses_it(script, capsys):
     assert cli.main(["run", script(WALK), "--dt", "0.1"]) == 1
-    assert "has a main(), which chooses dt itself" in capsys.readouterr().err
+    assert "runs its own main(), so dt must be changed in the script" in capsys.readouterr().err
 
 
 def test_an_unknown_example_gets_the_nearest_name(monkeypatch, tmp_path, capsys):
     (tmp_path / "kneed_walker.py").write_text('"""A walker with knees.\n\nMore."""\n')
-    monkeypatch.setattr(cli, "folder", lambda: tmp_path)
+    monkeypatch.setattr(scripts, "folder", lambda: tmp_path)
     assert cli.main(["run", "kneed-waker"]) == 1
     assert "no example named 'kneed-waker'; did you mean 'kneed-walker'?" in capsys.readouterr().err
     assert cli.main(["examples"]) == 0
@@ -409,3 +409,62 @@ def test_the_script_that_new_writes_runs_and_has_nothing_to_note(script, tmp_pat
     run = made.run(None, {})
     assert run.success and run.stats["notes"] == []
     assert abs(run.energy.numerical[-1]) < 0.05  # of some 20 J that the motor puts in
+
+
+def test_mbd_alone_lists_its_commands(capsys):
+    assert cli.main([]) == 0
+    told = capsys.readouterr().out
+    assert all(f"\n    {name}" in told for name in ("run", "show", "new", "check", "gait", "hardcases", "info"))
+
+
+def test_a_script_needs_no_integrator(script, tmp_path, capsys):
+    text = PENDULUM.replace("integrator = mbd.HHT(alpha=0.05)\n", "")
+    assert cli.main(["run", script(text), "--out", "out", "--no-plots"]) == 0
+    assert mbd.load(tmp_path / "out" / "run.mbd.npz").settings["integrator"].startswith("HHT")
+    assert not list((tmp_path / "out").glob("*.png"))
+    capsys.readouterr()
+
+
+def test_a_script_that_has_simulated_is_shown_and_not_simulated_again(script, tmp_path, capsys):
+    text = PENDULUM.replace("dt, until = 0.01, 0.5", "run = mbd.simulate(model, start, tol=1e-4, until=0.3)")
+    assert cli.main(["run", script(text), "--out", "out", "--no-plots"]) == 0
+    assert mbd.load(tmp_path / "out" / "run.mbd.npz").time[-1] == pytest.approx(0.3)
+    assert cli.main(["run", script(text), "--until", "0.1"]) == 1
+    assert "simulates by itself, so until must be changed in the script" in capsys.readouterr().err
+
+
+def test_a_parameter_is_set_from_the_command_line(script, tmp_path, capsys):
+    name = script(PENDULUM, "pendulum.py")
+    assert cli.main(["run", name, "--set", "gravity.y=-1.62", "--set", "rod.mass=2", "--out", "out", "--no-plots"]) == 0
+    run = mbd.load(tmp_path / "out" / "run.mbd.npz")
+    assert run.parameters["gravity.y"] == -1.62 and run.parameters["rod.mass"] == 2.0
+    assert cli.main(["run", name, "--set", "rod.mas=2"]) == 1
+    assert "did you mean 'rod.mass'?" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        cli.main(["run", name, "--set", "rod.mass"])
+    assert "expected NAME=VALUE" in capsys.readouterr().err
+
+
+def test_a_stored_run_is_shown_and_reported_without_its_script(script, tmp_path, capsys):
+    """Net moments of the joints too, which the file has as expressions."""
+    assert cli.main(["run", "prosthetic-leg", "--until", "6", "--out", "leg", "--no-plots"]) == 0
+    stored = str(tmp_path / "leg" / "run.mbd.npz")
+    assert cli.main(["show", stored, "--out", "again", "--no-plots"]) == 0
+    assert (tmp_path / "again" / "page.html").is_file()
+    assert "Trajectory of 'prosthetic leg'" in capsys.readouterr().out
+    assert cli.main(["gait", stored, "--out", "stored"]) == 0
+    assert cli.main(["gait", "prosthetic-leg", "--until", "6", "--out", "made"]) == 0
+    made, kept = (
+        pages.read_text().split("<footer")[0].replace("prosthetic-leg", "leg")
+        for pages in (tmp_path / "made" / "gait.html", tmp_path / "stored" / "gait.html")
+    )
+    assert "moment" in made and made == kept
+    assert cli.main(["run", stored]) == 1
+    assert "is a stored run; show it with: mbd show" in capsys.readouterr().err
+
+
+def test_what_is_printed_is_at_most_a_hundred_columns_wide(script, capsys):
+    assert cli.main(["run", "kneed-walker", "--out", "walk", "--no-plots"]) == 0
+    assert cli.main(["info"]) == 0
+    told = capsys.readouterr().out.partition("wrote")[0]
+    assert max(map(len, told.splitlines())) <= 100

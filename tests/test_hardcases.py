@@ -347,9 +347,9 @@ def test_the_table_goes_between_the_marks_of_a_page_and_nowhere_else(tmp_path):
         write_markdown([judged(stand_in(0.5))], page)
 
 
-def test_counting_shows_a_bar_on_a_terminal_only(monkeypatch, capsys):
-    assert list(counted([1, 2], str)) == [1, 2]
-    assert capsys.readouterr().err == ""
+def test_counting_shows_a_bar_on_a_terminal_and_lines_elsewhere(monkeypatch, capsys):
+    assert list(counted([1, 2], lambda item: f"item {item}")) == [1, 2]
+    assert capsys.readouterr().err == "1/2 item 1\n2/2 item 2\n"
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     assert list(counted([1, 2], lambda item: f"item {item}")) == [1, 2]
     assert "item 2" in capsys.readouterr().err

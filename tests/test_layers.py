@@ -40,6 +40,7 @@ RANKS = [
     ("view",),
     ("hardcases",),
     ("testing",),
+    ("scripts",),
     ("cli", "__main__"),
 ]
 """From the lowest layer to the highest; parts of one layer may know each other."""

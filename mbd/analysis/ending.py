@@ -11,7 +11,7 @@ import numpy as np
 from mbd.analysis.gait import gait
 from mbd.arrays import Vector
 from mbd.notebook import Text
-from mbd.results.summary import of_the_swing, strategy
+from mbd.results.summary import cost, entries, of_the_swing, strategy
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -44,22 +44,22 @@ class Summary(Text):
 def summary(run: Trajectory) -> Summary:
     """The lines of `Trajectory.summary`."""
     lines = [f"{run.name}: {'' if run.success else 'failed: '}{run.message or 'no message'}"]
-    entries = [("run", _made(run)), ("ending", "; ".join(ending(run)))]
+    told = [("run", _made(run)), ("ending", "; ".join(ending(run)))]
     counts = Counter(f"{event.name} {event.kind}" for event in run.events)
     listed = ", ".join(f"{count} × {what}" for what, count in counts.most_common(6))
     more = f", … ({len(counts)} sorts)" if len(counts) > 6 else ""
-    entries.append(("events", f"{len(run.record.events)}: {listed}{more}" if counts else "none"))
+    told.append(("events", f"{len(run.record.events)}: {listed}{more}" if counts else "none"))
     if len(run):
         energy = run.energy
         swing = of_the_swing(energy)
         text = f"changed by {energy.change:.4g} J, of which numerical {energy.numerical[-1]:.2g} J"
-        entries.append(("energy", f"{text}, {swing}" if swing else text))
-        entries.append(("constraints", str(run.violation)))
-    entries.append(("cost", _cost(run)))
+        told.append(("energy", f"{text}, {swing}" if swing else text))
+        told.append(("constraints", str(run.violation)))
+    told.append(("cost", cost(run) or "not stored"))
     notes = run.stats.get("notes", ())
     if notes:
-        entries.append(("notes", f"{len(notes)}, in run.stats['notes']; the first: {notes[0]}"))
-    return Summary("\n".join([*lines, *(f"  {title:<12} {text}" for title, text in entries)]))
+        told.append(("notes", f"{len(notes)}, in run.stats['notes']; the first: {notes[0]}"))
+    return Summary("\n".join([*lines, *entries(told)]))
 
 
 def ending(run: Trajectory) -> list[str]:
@@ -84,13 +84,6 @@ def _made(run: Trajectory) -> str:
         words.append(f"{run.time[0]:g} s to {run.time[-1]:g} s in {len(run)} rows")
     usual = settings.get("contact") == "events"
     return ", ".join([*words, *([] if usual or not strategy(run) else [strategy(run)])])
-
-
-def _cost(run: Trajectory) -> str:
-    stats = run.stats
-    words = [f"{stats[key]} {key}" for key in ("steps", "iterations", "rejected", "impacts") if stats.get(key)]
-    words += [f"{stats['wall_seconds']:.3g} s"] if "wall_seconds" in stats else []
-    return ", ".join(words) or "not stored"
 
 
 def _rest(run: Trajectory) -> str:

@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 
 from mbd.hardcases.case import Curve, Figure, definition
-from mbd.hardcases.judging import Judged, Verdict, ratio, short
+from mbd.hardcases.judging import Judged, Verdict, short
 from mbd.hardcases.table import number, summary, worst_by_scheme
 from mbd.results.archive import write_whole
+from mbd.view.curves import extremes
 from mbd.view.report import made_with
 from mbd.view.style import CYCLE, rules
 
 __all__ = ["write_page"]
 
-POINTS = 4000
-"""Curves are thinned to about this many points."""
+DPI, COLORS = 100, 16
+"""Of plots: all of them together are less than a megabyte."""
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
@@ -106,44 +107,48 @@ def _section(verdict: Verdict) -> str:
 <p class="about">Tests: {escape(str(data.get("tests", "")))}. References: {escape(str(data.get("provenance", "")))}.</p>
 {f"<dl>{notes}</dl>" if notes else ""}
 <div class="plots">{plots}</div>
-{parts}
+<div class="schemes">{parts}</div>
+{_figures(verdict)}
 </section>"""
 
 
 def _part(part: Judged) -> str:
-    """The figures with one scheme, folded unless one fails."""
+    """How a case came out with one scheme, in a line; why, where it fails."""
     if part.error:
-        return (
-            f"<details open><summary>{escape(part.scheme)} {_badge(False, 'stopped')}</summary>"
-            f"<p class='error'>{escape(part.error)}</p></details>"
-        )
-    figures = "\n".join(_figure(figure) for figure in part.outcome.figures)
-    worst = part.worst
-    headline = (
-        f"{len(part.outcome.figures)} figures, nearest to its limit: {worst.what}"
-        if worst is not None
-        else "no figures"
-    )
-    word = "holds" if part.passed else "does not hold"
+        return f"<p>{escape(part.scheme)} {_badge(False, 'stopped')}</p><p class='error'>{escape(part.error)}</p>"
+    worst = f"nearest to its limit: {part.worst.what}" if part.worst is not None else "no figures"
     why = f"<p class='error'>{escape(part.reason)}</p>" if part.reason and not part.passed else ""
-    return f"""<details{"" if part.passed else " open"}>
-<summary>{escape(part.scheme)} {_badge(part.passed, word)} <span>{escape(headline)}</span></summary>
-{why}
-<table class="figures"><thead><tr><th>figure</th><th>value</th><th>limit</th><th></th></tr></thead>
+    word = "holds" if part.passed else "does not hold"
+    return f"<p>{escape(part.scheme)} {_badge(part.passed, word)} <span>{escape(worst)}</span></p>{why}"
+
+
+def _figures(verdict: Verdict) -> str:
+    """Every figure of a case, a row each, with a column for each scheme; folded unless one fails."""
+    parts = [part for part in verdict.parts if not part.error]
+    by_scheme = [{figure.what: figure for figure in part.outcome.figures} for part in parts]
+    names = list(dict.fromkeys(name for figures in by_scheme for name in figures))
+    if not names:
+        return ""
+    head = "".join(f"<th>{escape(part.scheme)}" for part in parts)
+    rows = "\n".join(_line(name, [figures.get(name) for figures in by_scheme]) for name in names)
+    return f"""<details{"" if verdict.passed else " open"}>
+<summary>{len(names)} figures, values and limits</summary>
+<table class="figures"><thead><tr><th>figure{head}<th>limit</thead>
 <tbody>
-{figures}
-</tbody></table>
+{rows}
+</table>
 </details>"""
 
 
-def _figure(figure: Figure) -> str:
-    share = max(ratio(figure), 0.0)
-    bar = f'<span class="bar"><i style="width:{min(share, 1.0) * 100.0:.1f}%"></i></span>'
-    cells = "".join(f'<td class="number">{number(value)}</td>' for value in (figure.value, figure.limit))
-    if not figure.is_judged:
-        cells = f'<td class="number">{number(figure.value)}</td><td class="number">not judged</td>'
-    word = "holds" if figure.passed else "fails"
-    return f'<tr class="{word}"><td>{escape(figure.what)}</td>{cells}<td>{bar}</td></tr>'
+def _line(name: str, figures: Sequence[Figure | None]) -> str:
+    """One figure with every scheme; limits that differ as their range. End tags that HTML leaves out are left out."""
+    cells = "".join(
+        "<td>" if each is None else f"<td{'' if each.passed else ' class=fails'}>{number(each.value)}"
+        for each in figures
+    )
+    limits = sorted({each.limit for each in figures if each is not None and each.is_judged})
+    limit = " … ".join(number(each) for each in dict.fromkeys((limits[0], limits[-1]))) if limits else "not judged"
+    return f"<tr><td>{escape(name)}{cells}<td>{limit}"
 
 
 # plots -------------------------------------------------------------------------------------------------------------
@@ -180,9 +185,19 @@ def drawn(group: Sequence[tuple[str, Curve]]) -> str:
         axes.set_xlabel(first.x_label)
         axes.set_ylabel(first.y_label)
         axes.set_title(first.name)
-        written = io.BytesIO()
-        figure.savefig(written, format="png", dpi=150)
-    return base64.b64encode(written.getvalue()).decode("ascii")
+        drawing = io.BytesIO()
+        figure.savefig(drawing, format="png", dpi=DPI)
+    return base64.b64encode(_with_few_colors(drawing)).decode("ascii")
+
+
+def _with_few_colors(drawing: io.BytesIO) -> bytes:
+    """A PNG with a palette, of a third of the size."""
+    from PIL import Image  # matplotlib's own
+
+    written = io.BytesIO()
+    with Image.open(drawing) as picture:
+        picture.convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(written, format="png", optimize=True)
+    return written.getvalue()
 
 
 def _logarithmic(axes: Any, group: Sequence[tuple[str, Curve]]) -> None:
@@ -202,7 +217,7 @@ def _logarithmic(axes: Any, group: Sequence[tuple[str, Curve]]) -> None:
 
 
 def _thinned(curve: Curve) -> tuple[Any, Any]:
-    """The points of a curve, every n-th of very many."""
+    """The points of a curve that a plot can tell apart; absolute values where the axis is logarithmic."""
     x, y = np.asarray(curve.x, dtype=float), np.asarray(curve.y, dtype=float)
-    every = max(len(x) // POINTS, 1)
-    return x[::every], np.abs(y[::every]) if curve.logarithmic else y[::every]
+    shown = extremes(x, y) if np.all(np.diff(x) >= 0.0) else slice(None)
+    return x[shown], np.abs(y[shown]) if curve.logarithmic else y[shown]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mbd.equations.net_moments import stored_moments
 from mbd.results.archive import Arrays, Members, named_file, read, write
 from mbd.results.columns import Alias, Columns, SavedColumns, StoredColumns
 from mbd.results.content import arrays_of_run, expect
@@ -39,12 +40,23 @@ class Archive:
     violation: Violation
     facts: Facts
 
+    @classmethod
+    def of(cls, run: Any) -> Archive:
+        """That of a trajectory."""
+        return cls(run.columns, run.energy, run.violation, run.facts)
+
 
 def save(record: Record, run: Archive, path: str | Path, names: Sequence[str] | None = None) -> Path:
     """Write a run; see `Trajectory.save`."""
+    target = named_file(path, SUFFIX)
+    write(target, *contents(record, run, names))
+    return target
+
+
+def contents(record: Record, run: Archive, names: Sequence[str] | None = None) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and words of the file of a run; no array is a view of what a later call may change."""
     from mbd.results.capsule import packed
 
-    target = named_file(path, SUFFIX)
     arrays: Arrays = {name: getattr(record, name) for name in ROWS}
     arrays["anchors"], q_rate = run.columns.anchors, run.columns.q_rate
     if q_rate is not record.v:
@@ -61,11 +73,10 @@ def save(record: Record, run: Archive, path: str | Path, names: Sequence[str] | 
         arrays[f"change {number}"] = values
     shown = [name for name in run.facts.drawn if run.columns.knows(name)]
     meta["aliases"], meta["values"], meta["names"] = _columns(run.columns, names, shown, arrays)
-    meta["expressions"] = _expressions(run.columns, [*meta["names"], *shown], run.facts.heights, arrays)
+    meta["expressions"] = _expressions(run.columns, [*meta["names"], *shown], run.facts, arrays)
     meta["parts"], meta["stored"] = _ledger(run.ledger, arrays)
     meta["withheld"] = [[part.name, part.withheld] for part in run.ledger.parts if part.withheld]
-    write(target, arrays, meta)
-    return target
+    return arrays, meta
 
 
 def _event(event: EventRecord) -> dict[str, Any]:
@@ -108,15 +119,15 @@ def _columns(
     return aliases, values, list(dict.fromkeys(wanted))
 
 
-def _expressions(
-    columns: Columns, names: Sequence[str], heights: Sequence[str], arrays: Arrays
-) -> dict[str, Any] | None:
-    """What the columns need between their rows; None for those of an older file."""
+def _expressions(columns: Columns, names: Sequence[str], facts: Facts, arrays: Arrays) -> dict[str, Any] | None:
+    """What the columns need between their rows, and net moments for reports; None for those of an older file."""
     model = columns.between_rows
     if model is None:
         return None
-    found = [*names, *(name for name in heights if model.knows(name))]
-    return write_expressions(model.equations, {name: model.node(name) for name in found}, arrays)
+    found = [*names, *(name for name in facts.heights if model.knows(name))]
+    ground = {contact.name for contact in facts.contacts if contact.place}
+    moments = stored_moments(model.equations, ground) if ground else {}  # of what may walk
+    return write_expressions(model.equations, {name: model.node(name) for name in found} | moments, arrays)
 
 
 def _ledger(ledger: Ledger, arrays: Arrays) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +14,16 @@ from mbd.results.ledger import Ledger
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["facts", "of_the_swing", "text"]
+__all__ = ["cost", "entries", "facts", "of_the_swing", "text"]
 
-LABELS = {"derive_and_compile_seconds": "derive and compile seconds (of the model, all its runs so far)"}
-"""Words for statistics whose names say too little."""
+COLUMNS = 100
+"""Width of what is printed; longer lines go on below [-]."""
+
+COUNTS = {
+    "steps": "step", "rejected": "rejected step", "iterations": "Newton iteration", "events": "event",
+    "impacts": "impact", "singular_steps": "step near a singular configuration", "shortened": "shortened step",
+}  # fmt: skip
+"""Counters of a run that a reader asks for, and the word for one of each; the others are in `Trajectory.stats`."""
 
 
 def facts(run: Trajectory) -> list[tuple[str, str]]:
@@ -41,12 +48,20 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
     tolerance = run.stats.get("tolerance")
     if tolerance:
         found.append(("accuracy", accuracy(tolerance)))
-    numbers = {key: value for key, value in run.stats.items() if isinstance(value, int | float)}
-    costs = {LABELS.get(key, key.replace("_", " ")): value for key, value in numbers.items()}
-    if costs:
-        found.append(("cost", ", ".join(f"{key} {_number(value)}" for key, value in costs.items())))
+    if cost(run):
+        found.append(("cost", cost(run)))
     found += [("note", str(note)) for note in run.stats.get("notes", ())]
     return found
+
+
+def cost(run: Trajectory) -> str:
+    """'21095 steps, 23638 Newton iterations, 203 events; 0.638 s', with the seconds before the first step, if told."""
+    stats = run.stats
+    words = [f"{stats[key]} {word}{'s' * (stats[key] != 1)}" for key, word in COUNTS.items() if stats.get(key)]
+    seconds = [f"{stats['wall_seconds']:.3g} s"] if "wall_seconds" in stats else []
+    before = stats.get("derive_and_compile_seconds")
+    seconds += [f"{before:.3g} s before to derive and compile the model"] if before and before >= 5e-4 else []
+    return "; ".join(part for part in (", ".join(words), ", ".join(seconds)) if part)
 
 
 def accuracy(tolerance: Mapping[str, Any]) -> str:
@@ -72,15 +87,21 @@ def counts(run: Trajectory) -> str:
     return ", ".join(f"{n} × {what}" for what, n in Counter(f"{e.name} {e.kind}" for e in run.events).items())
 
 
-def _number(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
 def text(run: Trajectory) -> str:
     """The printed form of a run."""
-    lines = [f"Trajectory of {run.name!r}"]
-    lines += [f"  {title:<12} {value}" for title, value in facts(run)]
-    return "\n".join(lines)
+    return "\n".join([f"Trajectory of {run.name!r}", *entries(facts(run))])
+
+
+def entries(pairs: Sequence[tuple[str, str]]) -> list[str]:
+    """Lines of titles and values, folded at `COLUMNS`."""
+    return [
+        line
+        for title, value in pairs
+        for line in wrap(
+            f"  {title:<12} {value}", COLUMNS, subsequent_indent=" " * 15, break_long_words=False,
+            break_on_hyphens=False, drop_whitespace=True, replace_whitespace=False,
+        ) or [f"  {title}"]
+    ]  # fmt: skip
 
 
 def of_the_swing(energy: Ledger) -> str:

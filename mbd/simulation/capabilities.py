@@ -158,10 +158,10 @@ def as_markdown() -> str:
 
 
 def as_text() -> str:
-    """The table for a terminal, with columns numbered."""
+    """The table in words for a terminal: what is supported, and each exception on a line."""
     head, *body = _cells()
-    width = max(len(row[0]) for row in body) + 2
-    lines = ["what goes with what: " + ", ".join(f"{k}: {name}" for k, name in enumerate(head[1:], 1))]
-    lines.append(" " * width + "".join(f"{k:<5}" for k in range(1, len(head))))
-    lines += [f"{row[0]:<{width}}" + "".join(f"{cell:<5}" for cell in row[1:]) for row in body]
-    return "\n".join([*lines, "refused besides:", *(f"  {line}" for line in _others())])
+    lines = ["Every integrator and option supports every kind of constraint, contact and controller, except:"]
+    for number, column in enumerate(head[1:], 1):
+        refused = [row[0] for row in body if row[number] == "no"]
+        lines += [f"  {column}: no {', '.join(refused)}"] if refused else []
+    return "\n".join([*lines, *(f"  {line}" for line in _others())])

@@ -9,14 +9,18 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.results.interpolation import Grid
+from mbd.results.polynomials import Index
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["curves"]
+__all__ = ["curves", "extremes"]
 
 SMOOTH = 600
 """Points of a curve that look smooth over the width of a plot [-]."""
+
+INTERVALS = 1000
+"""Intervals of time of which a plot shows the first, last, least and largest value: finer than its pixels [-]."""
 
 
 def curves(run: Trajectory, names: Sequence[str]) -> tuple[Vector, dict[str, Vector]]:
@@ -45,3 +49,24 @@ def _between(time: Vector) -> Vector:
     steps = [a + h * np.arange(1, n) / n for a, h, n in zip(lower, length, counts, strict=True) if n > 1]
     found = np.concatenate(steps) if steps else np.zeros(0)
     return np.setdiff1d(found, time)
+
+
+def extremes(time: Vector, *values: Vector) -> Index:
+    """Indices (k,), ascending, of the rows that a plot can tell apart: all of them where rows are few.
+
+    The span of time is divided into `INTERVALS` equal parts; of each part the first and last row are kept and, for
+    each curve, the row of its least and of its largest value, so that no peak is lost.
+
+    time : (n,) ascending [s]
+    values : (n,) each, of one or more curves
+    """
+    if len(time) <= 4 * INTERVALS:
+        return np.arange(len(time))
+    part = np.floor((time - time[0]) * (INTERVALS / (time[-1] - time[0])))
+    last = np.append(np.flatnonzero(np.diff(part)), len(time) - 1)
+    first = np.append(0, last[:-1] + 1)
+    kept = [first, last]
+    for curve in values:
+        order = np.lexsort((curve, part))
+        kept += [order[first], order[last]]
+    return np.unique(np.concatenate(kept))

@@ -29,7 +29,9 @@ def effects(parser: ArgumentParser) -> None:
 
 def gait(parser: ArgumentParser) -> None:
     """Add those of ``mbd gait`` to a parser."""
-    parser.add_argument("scripts", nargs="+", metavar="SCRIPT-or-EXAMPLE", help="walkers to report, side by side")
+    parser.add_argument(
+        "scripts", nargs="+", metavar="SCRIPT", help="scripts, examples or stored runs (.mbd.npz) to report"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder for tables, picture and page (default: mbd-runs/NAME)")
     parser.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the scripts'")
     parser.add_argument("--strides", type=int, metavar="COUNT", help="strides of each side, the last ones")

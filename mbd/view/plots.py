@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.tables import library
 from mbd.results.units import unit
 from mbd.view import vector
-from mbd.view.curves import curves
+from mbd.view.curves import curves, extremes
 from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, color, rules, tone
 
 if TYPE_CHECKING:
@@ -104,9 +103,9 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None, degr
             text, factor = scale(kind, degrees)
             for number, name in enumerate(group):
                 style = ("-", "--")[number // len(CYCLE) % 2]
-                axes.plot(
-                    time, factor * values[name], style, color=tone(CYCLE[number % len(CYCLE)]), label=as_label(name)
-                )
+                shown = extremes(time, values[name])
+                shade = tone(CYCLE[number % len(CYCLE)])
+                axes.plot(time[shown], factor * values[name][shown], style, color=shade, label=as_label(name))
             axes.set_ylabel(f"{QUANTITIES.get(kind, 'value')} [{as_label(text)}]" if kind else "value")
             _shade(axes, run, wanted)
             _mark(axes, run)
@@ -135,9 +134,19 @@ def _mark(axes: Any, run: Trajectory) -> None:
 
 def _lines(axes: Any, marks: Sequence[tuple[float, str]], above: bool = False) -> None:
     """A thin line at each (time, name), in the color of its side; black without a name; above areas or below curves."""
-    for time, name in marks if len(marks) <= MANY else ():
-        shade = color(name) if name else tone(INK)
-        axes.axvline(time, color=shade, linewidth=0.7, alpha=0.35, linestyle=":", zorder=2.5 if above else 0.5)
+    if 0 < len(marks) <= MANY:
+        shades = [color(name) if name else tone(INK) for _, name in marks]
+        look: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.35, "linestyle": ":", "zorder": 2.5 if above else 0.5}
+        _upright(axes, [time for time, _ in marks], 0.0, 1.0, colors=shades, **look)
+
+
+def _upright(axes: Any, times: Sequence[float], low: float, high: float, **look: Any) -> None:
+    """Lines at these times between two parts of the height of a panel, whose limits do not follow them."""
+    from matplotlib.collections import LineCollection
+
+    lines = LineCollection([[(time, low), (time, high)] for time in times], **look)
+    lines.set_transform(axes.get_xaxis_transform())
+    axes.add_collection(lines, autolim=False)
 
 
 def _shade(axes: Any, run: Trajectory, wanted: Sequence[str]) -> None:
@@ -146,14 +155,19 @@ def _shade(axes: Any, run: Trajectory, wanted: Sequence[str]) -> None:
         contact for contact in run.facts.contacts if any(name.startswith(f"{contact.name}.") for name in wanted)
     ]
     contacts = contacts or [contact for contact in run.facts.contacts if contact.place] or list(run.facts.contacts)
+    from matplotlib.collections import PolyCollection
+
     closed: dict[str, Any] = {}
     for contact in contacts:
         column = run.record.closed[:, run.facts.contacts.index(contact)].astype(bool)
         closed[color(contact.name)] = closed.get(color(contact.name), False) | column
     for side, rows in closed.items():
         spans = stretches(run.time, rows)
-        for begin, end in spans if len(spans) <= MANY else ():
-            axes.axvspan(begin, end, color=side, alpha=0.09, linewidth=0, zorder=0.2)
+        if len(spans) <= MANY:
+            corners = [[(begin, 0.0), (begin, 1.0), (end, 1.0), (end, 0.0)] for begin, end in spans]
+            bands = PolyCollection(corners, color=side, alpha=0.09, linewidth=0, zorder=0.2)
+            bands.set_transform(axes.get_xaxis_transform())
+            axes.add_collection(bands, autolim=False)
 
 
 def _bars(axes: Any, run: Trajectory) -> None:
@@ -197,6 +211,8 @@ def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
     layers = [ledger.kinetic, ledger.potential - floor, *(-part.energy for part in spent)]
     labels = ["kinetic", "potential (above its least)", *(f"lost: {as_label(part.name)}" for part in spent)]
     ceiling = ledger.total[:1] - floor + sum((part.energy for part in given), np.zeros(len(time)))
+    shown = extremes(time, *layers, ledger.numerical)
+    time, layers, ceiling = time[shown], [layer[shown] for layer in layers], ceiling[shown]
     with drawing(path, 7.4, 4.4 + 0.17 * (len(layers) // 3)) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
         shades = [tone(CYCLE[k]) for k in (0, 5, 1, 4, 3, 2, 6, 7)]
@@ -208,7 +224,7 @@ def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
         upper.plot(time, ceiling, color=tone(INK), linewidth=1.0, label="start + put in" if given else "start")
         upper.set_ylabel("energy [J]")
         _legend(upper, 3)
-        lower.plot(time, ledger.numerical, color=tone(NEUTRAL))
+        lower.plot(time, ledger.numerical[shown], color=tone(NEUTRAL))
         lower.set_ylabel("numerical [J]")
         lower.set_xlabel("time [s]")
         _mark_events(ledger, upper, lower)
@@ -221,8 +237,8 @@ def _mark_events(ledger: Ledger, upper: Any, lower: Any) -> None:
     """Lines at events, ticks where there are many."""
     for panel in (upper, lower):
         _lines(panel, ledger.marks, above=True)
-    for instant, _ in ledger.marks if len(ledger.marks) > MANY else ():
-        lower.axvline(instant, ymin=0.93, color=tone(INK), linewidth=0.7, alpha=0.6)
+    if len(ledger.marks) > MANY:
+        _upright(lower, [time for time, _ in ledger.marks], 0.93, 1.0, colors=tone(INK), linewidth=0.7, alpha=0.6)
 
 
 def _spent(ledger: Ledger) -> list[Part]:
@@ -248,7 +264,8 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
     """
     wanted: Sequence[str] = coordinates or portrayed(run)
     time, values = curves(run, [part for name in wanted for part in (name, f"{name}.rate")])
-    cuts = Grid(time).cuts
+    inner = np.asarray(Grid(time).cuts[1:-1], dtype=int)
+    lifted = np.full(len(inner), np.nan)  # the pen is lifted at each switch
     with drawing(path, 5.6, 4.6) as figure:
         axes = figure.subplots()
         for number, name in enumerate(wanted):
@@ -258,9 +275,9 @@ def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None =
             width = 3.0 if "left" in name.split() else 1.1  # the two sides of a repeating walk lie on each other
             axes.plot([], [], color=shade, linewidth=width, label=as_label(name))
             axes.plot(place[:1], rate[:1], "o", color=shade, markersize=5)
-            for start, stop in pairwise(cuts):
-                axes.plot(place[start:stop], rate[start:stop], color=shade, linewidth=width)
-                axes.plot(place[stop - 1 : stop + 1], rate[stop - 1 : stop + 1], ":", color=shade, linewidth=width)
+            axes.plot(np.insert(place, inner, np.nan), np.insert(rate, inner, np.nan), color=shade, linewidth=width)
+            jumps = [np.stack([curve[inner - 1], curve[inner], lifted], axis=1).ravel() for curve in (place, rate)]
+            axes.plot(*jumps, ":", color=shade, linewidth=width)
         kinds = {unit(name, run.facts) for name in wanted}
         kind = kinds.pop() if len(kinds) == 1 else ""
         text = as_label(scale(kind, degrees)[0])

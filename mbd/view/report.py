@@ -7,6 +7,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from hashlib import sha256
 from importlib import metadata
@@ -14,14 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.analysis.gait import gait
-from mbd.results.archive import plain, write_whole
-from mbd.results.storage import SUFFIX
+from mbd.results.archive import plain, write as write_arrays, write_whole
+from mbd.results.storage import SUFFIX, Archive, contents
 from mbd.results.summary import facts
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["machine", "made_with", "record", "versions", "write"]
+__all__ = ["draw", "machine", "made_with", "record", "versions", "write"]
 
 FORMAT, VERSION = "mbd record", 1
 """Of the record, see docs/files.md."""
@@ -119,21 +120,35 @@ def write(
     """Write plots (PNG), page (HTML), the run (npz) and its record (JSON) into a folder; returns the paths."""
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
-    paths = [run.page(place / "page.html"), run.save(place / f"run{SUFFIX}")]
-    if plots:
-        from mbd.view.plots import phase_portrait, portrayed
-
-        run.plot(path=place / "coordinates.png")
-        run.energy.plot(path=place / "energy.png")
-        paths += [place / "coordinates.png", place / "energy.png"]
-        if portrayed(run):
-            phase_portrait(run, path=place / "phase.png")
-            paths.append(place / "phase.png")
-        kinds = [f"{contact.name}.{what}" for contact in run.facts.contacts for what in ("force", "friction")]
-        forces = [name for name in kinds if name in run]
-        if forces:
-            run.plot(*forces, path=place / "forces.png")
-            paths.append(place / "forces.png")
+    stored = place / f"run{SUFFIX}"
+    with ThreadPoolExecutor(1) as pool:  # compression does not hold the interpreter, which draws in the meantime
+        saved = pool.submit(write_arrays, stored, *contents(run.record, Archive.of(run)))
+        drawn = draw(run, place, plots)
+        saved.result()
     text = json.dumps(record(run, wall, script), indent=2, default=plain)
     write_whole(place / "record.json", lambda partial: partial.write_text(text + "\n", encoding="utf-8"))
-    return [*paths, place / "record.json"]
+    return [drawn[0], stored, *drawn[1:], place / "record.json"]
+
+
+def draw(run: Trajectory, place: Path, plots: bool = True) -> list[Path]:
+    """Write the page of a run and its plots, as far as there is something to plot; returns the paths."""
+    place.mkdir(parents=True, exist_ok=True)
+    return [run.page(place / "page.html"), *(_plots(run, place) if plots else [])]
+
+
+def _plots(run: Trajectory, place: Path) -> list[Path]:
+    """Coordinates, energy, phase portrait and forces of contacts, as far as the run has them; returns the paths."""
+    from mbd.view.plots import phase_portrait, portrayed
+
+    run.plot(path=place / "coordinates.png")
+    run.energy.plot(path=place / "energy.png")
+    paths = [place / "coordinates.png", place / "energy.png"]
+    if portrayed(run):
+        phase_portrait(run, path=place / "phase.png")
+        paths.append(place / "phase.png")
+    kinds = [f"{contact.name}.{what}" for contact in run.facts.contacts for what in ("force", "friction")]
+    forces = [name for name in kinds if name in run]
+    if forces:
+        run.plot(*forces, path=place / "forces.png")
+        paths.append(place / "forces.png")
+    return paths

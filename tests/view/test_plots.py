@@ -8,12 +8,13 @@ import struct
 import numpy as np
 import pytest
 from matplotlib import pyplot
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.text import Text
 
 import mbd
 from mbd.errors import TrajectoryError, UnknownNameError
-from mbd.view.curves import curves
+from mbd.view.curves import curves, extremes
 from mbd.view.plots import contacts, phase_portrait, stretches
 from mbd.view.report import write
 from mbd.view.style import DARK, INK, PALE, PAPER, color
@@ -53,8 +54,8 @@ def test_long_steps_are_drawn_smooth_and_rows_are_met():
 def test_histories_mark_the_events():
     run = ball()
     figure = run.plot("flight.y")
-    marks = [line for line in figure.axes[0].lines if line.get_linestyle() == ":"]
-    assert [line.get_xdata()[0] for line in marks] == [event.time for event in run.events if event.kind == "closed"]
+    (marks,) = (each for each in figure.axes[0].collections if isinstance(each, LineCollection))
+    assert [line[0][0] for line in marks.get_segments()] == [e.time for e in run.events if e.kind == "closed"]
 
 
 def test_histories_without_names_show_the_coordinates_and_a_vector_its_components():
@@ -71,7 +72,8 @@ def test_the_energy_plot_stacks_what_is_left_and_what_is_lost():
     upper, lower = figure.axes
     labels = [text.get_text() for text in upper.get_legend().get_texts()]
     assert labels == ["kinetic", "potential (above its least)", "lost: floor impact", "start"]
-    assert len(upper.collections) == 3 and lower.get_ylabel() == "numerical [J]"
+    assert sum(not isinstance(each, LineCollection) for each in upper.collections) == 3
+    assert lower.get_ylabel() == "numerical [J]"
     assert upper.get_ylabel() == "energy [J]"
 
 
@@ -87,9 +89,10 @@ def test_the_energy_plot_raises_its_ceiling_with_what_is_put_in():
 
 def test_the_phase_portrait_jumps_in_dots():
     axes = phase_portrait(ball(bounces=3), "flight.y").axes[0]
-    dotted = [line for line in axes.lines if line.get_linestyle() == ":" and len(line.get_xdata()) == 2]
-    assert len(dotted) == 4
-    assert all(abs(np.ptp(line.get_xdata())) < 1e-9 < np.ptp(line.get_ydata()) for line in dotted)
+    (dotted,) = (line for line in axes.lines if line.get_linestyle() == ":")
+    place, rate = (np.reshape(values, (-1, 3)) for values in (dotted.get_xdata(), dotted.get_ydata()))
+    assert len(place) == 4 and np.isnan(place[:, 2]).all() and np.isnan(rate[:, 2]).all()
+    assert np.all(np.abs(np.ptp(place[:, :2], axis=1)) < 1e-9) and np.all(np.ptp(rate[:, :2], axis=1) > 1e-9)
     assert axes.get_xlabel() == "length [m]" and axes.get_ylabel() == "rate [m/s]"
 
 
@@ -131,11 +134,25 @@ def test_times_of_contact_are_shaded_in_the_color_of_their_side():
     run = walker()
     axes = run.plot("left hip.angle", "left foot.force").axes[0]
     closed = run.record.closed[:, [contact.name for contact in run.facts.contacts].index("left foot")]
-    shades = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
+    (bands,) = (each for each in axes.collections if isinstance(each, PolyCollection))
+    shades = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in bands.get_paths()]
     assert np.allclose(shades, stretches(run.time, closed)) and len(shades)
-    assert {to_hex(patch.get_facecolor()).upper() for patch in axes.patches} == {color("left foot")}
-    both = run.plot("left hip.angle").axes[0].patches
-    assert {to_hex(patch.get_facecolor()).upper() for patch in both} == {color("left foot"), color("right foot")}
+    assert to_hex(bands.get_facecolor()[0]).upper() == color("left foot")
+    both = [each for each in run.plot("left hip.angle").axes[0].collections if isinstance(each, PolyCollection)]
+    assert {to_hex(each.get_facecolor()[0]).upper() for each in both} == {color("left foot"), color("right foot")}
+
+
+def test_thinned_curves_keep_every_peak():
+    rng = np.random.default_rng(7)
+    time, values = np.linspace(0.0, 20.0, 30001), rng.normal(size=30001)
+    time[9000:9010] = time[9000]  # rows of one instant
+    shown = extremes(time, values)
+    assert len(shown) < 5000 and shown[0] == 0 and shown[-1] == 30000 and np.all(np.diff(shown) > 0)
+    parts = np.floor(time / 20.0 * 1000)
+    for part in rng.integers(0, 1000, 20):
+        whole, kept = values[parts == part], values[shown][parts[shown] == part]
+        assert whole.min() == kept.min() and whole.max() == kept.max()
+    np.testing.assert_array_equal(extremes(time[:50], values[:50]), np.arange(50))
 
 
 def contrast(one, other) -> float:

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from mbd.arrays import Vector
-from mbd.tape.derivatives import gradient
+from mbd.equations.net_moments import net_moments
 
 if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
     from mbd.results.columns import ModelColumns
     from mbd.tape.node import Node
     from mbd.trajectory import Trajectory
@@ -34,12 +33,9 @@ class Moments:
         self._nodes: dict[str, Node] = {}
         if self._columns is None:
             return
-        equations = self._columns.equations
-        names = [name for name, _ in equations.configuration.freedoms]
-        wanted = {name: names.index(name) for name in coordinates if name in names}
         ground = {contact.name for contact in run.facts.contacts if contact.place}
-        with equations.tape.lock:
-            self._nodes = _moments(equations, wanted, ground)
+        found = net_moments(self._columns.equations, ground)
+        self._nodes = {name: found[name] for name in coordinates if name in found}
 
     @property
     def known(self) -> tuple[str, ...]:
@@ -53,27 +49,3 @@ class Moments:
         columns = self._columns
         rows = columns.between(columns.grid.places(times, "right"))
         return dict(zip(self._nodes, columns.evaluate(list(self._nodes.values()), rows), strict=True))
-
-
-def _moments(equations: Equations, wanted: Mapping[str, int], ground: set[str]) -> dict[str, Node]:
-    """The moments as nodes of the tape."""
-    tape = equations.tape
-    total = dict.fromkeys(wanted, tape.zero)
-    dry = {f"{friction.name} friction" for friction in equations.frictions}
-    for effect in equations.effects:
-        of_ground = effect.contact >= 0 and equations.contacts[effect.contact].name in ground
-        if effect.kind == "gravity" or of_ground or effect.name in dry:
-            continue
-        switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)
-        forces = effect.generalized()
-        for name, place in wanted.items():
-            total[name] = total[name] - switch * forces[place]
-    x, v = ([tape.input(kind, k) for k in wanted.values()] for kind in ("x", "v"))
-    for number, row in enumerate(equations.rows):
-        if row.contact >= 0 and equations.contacts[row.contact].name in ground:
-            continue
-        slopes = gradient(row.rate, v) if row.is_velocity else gradient(row.value, x)
-        for name, slope in zip(wanted, slopes, strict=True):
-            if not slope.is_zero:
-                total[name] = total[name] - tape.input("lam", number) * slope
-    return total
