@@ -104,9 +104,9 @@ class _Line:
 
 
 @contextmanager
-def share_bar() -> Iterator[Progress | None]:
+def share_bar(wanted: bool = True) -> Iterator[Progress | None]:
     """Runs done of all runs on a terminal or in a notebook, as a percentage and the time left; nothing elsewhere."""
-    if not _is_wanted():
+    if not wanted or not _is_wanted():
         yield None
         return
     with _bar("{percentage:3.0f}% |{bar:30}|  [{elapsed} < {remaining}]", 1.0) as bar:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.assembly.assemble import assemble
-from mbd.bodies.values import among, is_finite_number, shown
+from mbd.bodies.values import among, flag, is_finite_number, shown
 from mbd.errors import AssemblyError, GaitError, MbdError, ModelError, UnknownNameError
 from mbd.gait.arguments import Functions, check_arguments
 from mbd.gait.cycle import LimitCycle
@@ -21,6 +21,7 @@ from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, fallen_first, first_return, on_section, search, with_step
 from mbd.integrators import Integrator, RungeKutta853
 from mbd.notebook import table
+from mbd.progress import share_bar
 from mbd.state import State
 
 __all__ = ["GaitSearch", "Try", "find_gait"]
@@ -31,6 +32,21 @@ FAR = 1.0
 """Distance [m, rad] over which a start is moved onto the section."""
 MOST_TRIES = 1_000_000
 """Tries of one search at most."""
+
+CURES = {
+    "scuffs": (
+        "a swing foot touches the ground as it passes; let it pass with only_while= of its contact (the legs and feet "
+        "of mbd.parts take it), bend the knee, or shorten the leg in swing"
+    ),
+    "falls": "start nearer to a walk: take narrower ranges, a smaller slope, or legs that swing faster",
+    "misses": "the section is not reached; name the contact or event that ends each step, or give a larger longest=",
+    "cannot be assembled": "no posture has these values with these contacts closed; leave one value out, or widen it",
+    "wrong contacts": "a step ends on other contacts than it began with; give mirror= for walkers with two like legs",
+    "rests": "the walker comes to rest; give a steeper slope or faster rates",
+    "does not converge": "the starts are far from a gait; take narrower ranges around one that nearly repeats itself",
+    "numerical error": "look at the first such try in .tries; a smaller dt= resolves stiff or light parts",
+}
+"""What to try against outcomes of `Outcome.kind` where no gait was found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +79,8 @@ class GaitSearch:
             if there is none, with what the tries came to.
         """
         if not self.gaits:
-            raise GaitError(f"{self.name}: no gait in {len(self.tries)} tries: {self._counts()}", self)
+            cure = f"; {self.advice()}" if self.advice() else ""
+            raise GaitError(f"{self.name}: no gait in {self._tries_made()}: {self._counts()}{cure}", self)
         return self.gaits[0]
 
     def outcomes(self) -> dict[str, int]:
@@ -74,14 +91,25 @@ class GaitSearch:
     def _counts(self) -> str:
         return ", ".join(f"{count} × {text}" for text, count in self.outcomes().items())
 
+    def _tries_made(self) -> str:
+        return "1 try" if len(self.tries) == 1 else f"{len(self.tries)} tries"
+
+    def advice(self) -> str:
+        """What to try against the most frequent outcome; '' where gaits were found, or nothing is known to help."""
+        most = Counter(each.outcome.kind for each in self.tries).most_common(1)
+        return "" if self.gaits or not most else CURES.get(most[0][0], "")
+
     def __repr__(self) -> str:
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        yield f"{self.name}: {len(self.gaits)} gaits in {len(self.tries)} tries: {self._counts()}"
+        found = "1 gait" if len(self.gaits) == 1 else f"{len(self.gaits)} gaits"
+        yield f"{self.name}: {found} in {self._tries_made()}: {self._counts()}"
         for number, gait in enumerate(self.gaits):
             reached = sum(each.gait == number for each in self.tries)
-            yield f"  {gait!r}, from {reached} tries"
+            yield f"  {gait!r}, from {reached} {'try' if reached == 1 else 'tries'}"
+        if self.advice():
+            yield f"  {self.advice()}"
 
     def _repr_html_(self) -> str:
         names = list(self.tries[0].values) if self.tries else []
@@ -153,9 +181,11 @@ def find_gait(
     functions: Functions | None = None,
     modulo: Iterable[str] | None = None,
     longest: float = 30.0,
+    all_gaits: bool = False,
+    progress: bool = True,
     backend: str = "auto",
 ) -> GaitSearch:
-    """Gaits from a design of starts; how each try went is kept by name.
+    """The first stable gait, or all gaits, from a design of starts; how each try went is kept by name.
 
     Parameters
     ----------
@@ -164,7 +194,9 @@ def find_gait(
         orientations and vectors stay as they are, components of angular velocities may vary
     integrator, section, mirror, strides, dt, tol, functions, modulo, longest, backend : as for `mbd.limit_cycle`
     closed, open : contacts that start closed, and open, as for `mbd.assemble`
-    tries : how many starts
+    tries : how many starts at most
+    all_gaits : True for every try to be made; otherwise the search ends with the first stable gait
+    progress : whether a bar counts the tries, on a terminal or in a notebook
     design : 'sobol' or 'latin hypercube' (`scipy.stats.qmc`), with `seed`
     parameters : values by name, pairs of which are varied too; then gaits differ in them
 
@@ -182,20 +214,28 @@ def find_gait(
     groups = {"position": position, "velocity": velocity, "parameters": {} if parameters is None else parameters}
     fixed, ranges = _varied(groups, tries, design, seed)
     points = _points(len(ranges), tries, design, seed)
-    draws = [_drawn(fixed, ranges, point) for point in points]
-    starts = [_assembled(model, draw, closed, open, backend) for draw in draws]
-    first = next((start for start in starts if isinstance(start, State)), None)
+    every, shown_bar = flag(all_gaits, "all_gaits of find_gait"), flag(progress, "progress of find_gait")
     names = [_title(group, name) for group, name, _ in ranges]
-    if first is None:
-        lost = tuple(Try(_values(draw, names), start) for draw, start in zip(draws, starts, strict=True)
-                     if isinstance(start, Outcome))  # fmt: skip
-        return GaitSearch(getattr(model, "name", ""), (), lost)
-    given = {**draws[0]["parameters"]}
-    check_arguments(first, scheme, strides, {"dt": dt, "tol": tol, "longest": longest}, given, functions, (), "return")
-    map_ = map_of(model, first, scheme, dt or FIRST, (section, mirror, strides), given, functions, modulo, longest,
-                  backend)  # fmt: skip
-    hunt = _Hunt(map_, tol, dt)
-    tried = [_tried(hunt, draw, start, names) for draw, start in zip(draws, starts, strict=True)]
+    hunt: _Hunt | None = None
+    tried: list[Try] = []
+    with share_bar(shown_bar) as bar:
+        for point in points:
+            draw = _drawn(fixed, ranges, point)
+            start = _assembled(model, draw, closed, open, backend)
+            if hunt is None and isinstance(start, State):
+                given, settings = {**draw["parameters"]}, {"dt": dt, "tol": tol, "longest": longest}
+                check_arguments(start, scheme, strides, settings, given, functions, (), "return")
+                kind = (section, mirror, strides)
+                hunt = _Hunt(
+                    map_of(model, start, scheme, dt or FIRST, kind, given, functions, modulo, longest, backend), tol, dt
+                )
+            tried.append(_tried(hunt, draw, start, names))
+            if bar is not None:
+                bar(len(tried), len(points))
+            if not every and hunt is not None and any(gait.stability == "stable" for gait in hunt.found):
+                break
+    if hunt is None:
+        return GaitSearch(getattr(model, "name", ""), (), tuple(tried))
     order = sorted(range(len(hunt.found)), key=lambda k: _rank(hunt.found[k]))
     place = {old: new for new, old in enumerate(order)} | {-1: -1}
     return GaitSearch(
@@ -204,10 +244,13 @@ def find_gait(
     )  # fmt: skip
 
 
-def _tried(hunt: _Hunt, draw: Mapping[str, Mapping[str, float]], start: State | Outcome, names: Sequence[str]) -> Try:
+def _tried(
+    hunt: _Hunt | None, draw: Mapping[str, Mapping[str, float]], start: State | Outcome, names: Sequence[str]
+) -> Try:
     """One try; what goes wrong in it is its outcome."""
     values = _values(draw, names)
-    if isinstance(start, Outcome):
+    if hunt is None or isinstance(start, Outcome):
+        assert isinstance(start, Outcome)
         return Try(values, start)
     try:
         outcome, number = hunt.one(start, draw["parameters"])

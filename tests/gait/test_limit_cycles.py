@@ -226,7 +226,7 @@ def test_a_search_finds_both_gaits_and_says_how_each_try_went():
     model, _ = simplest()
     found = mbd.find_gait(
         model, {"theta": (0.15, 0.25), "phi": (0.3, 0.5)}, {"theta": (-0.25, -0.15), "phi": 0.0}, closed=(),
-        section="heel strike", tries=8, longest=8.0,
+        section="heel strike", tries=8, longest=8.0, all_gaits=True,
     )  # fmt: skip
     assert len(found.gaits) == 2 and found.gait.stability == "stable"
     assert abs(found.gait.period - case("f1-simplest-walker-long")["step period"].value) < 1e-7
@@ -234,8 +234,17 @@ def test_a_search_finds_both_gaits_and_says_how_each_try_went():
     assert len(found.tries) == 8 == sum(found.outcomes().values())
     assert {each.gait for each in found.tries} == {-1, 0, 1}
     assert "2 gaits in 8 tries" in repr(found) and "theta.rate" in found._repr_html_()
+    first = mbd.find_gait(
+        model, {"theta": (0.15, 0.25), "phi": (0.3, 0.5)}, {"theta": (-0.25, -0.15), "phi": 0.0}, closed=(),
+        section="heel strike", tries=8, longest=8.0,
+    )  # fmt: skip
+    assert first.gait.stability == "stable" and abs(first.gait.period - found.gait.period) < 1e-9
+    ended = [each.gait for each in first.tries]
+    assert ended[-1] == 0 and 0 not in ended[:-1], "the search ends with the first stable gait"
     none = mbd.find_gait(model, {"theta": 0.3, "phi": 0.1}, {}, closed=(), section="heel strike", tries=1, longest=2.0)
-    with pytest.raises(mbd.GaitError, match="no gait in 1 tries: 1 × 'heel strike' does not happen within 2 s"):
+    with pytest.raises(
+        mbd.GaitError, match="no gait in 1 try: 1 × 'heel strike' does not happen within 2 s; the section"
+    ):
         _ = none.gait
 
 
