@@ -52,6 +52,7 @@ class Equation:
         none
     may_fold : whether it may turn out to be 0 whatever the motion, and is left out then
     wraps : whether it compares angles modulo a turn, so that it needs no count of turns
+    sliding : limit while it slides, of p and the speed; it tends to `limit` at rest. None: `limit` at every speed
     """
 
     value: Scalar
@@ -62,6 +63,7 @@ class Equation:
     reaction: str = "force"
     may_fold: bool = False
     wraps: bool = False
+    sliding: Callable[[Scalar, Scalar], Scalar] | None = None
 
 
 @dataclass(frozen=True)

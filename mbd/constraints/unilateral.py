@@ -106,9 +106,10 @@ class Unilateral(Constraint):
         if self.sticks or self.slides:
             limit = partial(self._limit, scope) if self.slides else None
             tangents = self.measure.tangents(scope, hold(self.measure.captured(scope)))
-            slips = [Equation(slip, part, limit=limit, may_fold=True) for part, slip in tangents]
+            sliding = partial(self._sliding, scope) if isinstance(self.friction, Loss) else None
+            slips = [Equation(slip, part, limit=limit, may_fold=True, sliding=sliding) for part, slip in tangents]
             slips += [
-                Equation(slip, part, level="velocity", limit=limit)
+                Equation(slip, part, level="velocity", limit=limit, sliding=sliding)
                 for part, slip in self.measure.slip_velocities(scope)
             ]
             loss = self.friction
@@ -132,6 +133,11 @@ class Unilateral(Constraint):
         else:
             coefficient = scope.parameter(self.name, "mu", self.friction or 0.0)
         return coefficient * self._pushing(push)
+
+    def _sliding(self, scope: Scope, push: Scalar, speed: Scalar) -> Scalar:
+        """The same at the speed of its slip."""
+        assert isinstance(self.friction, Loss)
+        return self.friction.sliding(0.0, speed, scope, f"{self.name} friction") * self._pushing(push)
 
     def _resistance(self, scope: Scope, loss: Loss, push: Scalar, speeds: Sequence[Scalar]) -> Sequence[Scalar]:
         """Smooth friction along its slips, none while a rule lets it pull."""

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 from mbd.equations.equations import Equations
 from mbd.tape.functions import sqrt
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 
-__all__ = ["cosine", "sliding_force"]
+__all__ = ["LEAST_SQUARE", "cosine", "sliding_force"]
 
 LEAST_SQUARE = 1e-60
 """‖w‖² that is none [m²/s²]."""
@@ -26,15 +26,18 @@ NO_SLIP = 1e-100
 """‖s‖² that is none [-]."""
 
 
-def sliding_force(equations: Equations, k: int) -> Node:
-    """λ_T of friction k while it slides, in terms of its slip, its velocity and its limit."""
+def sliding_force(equations: Equations, k: int, smooth: Scalar = 1.0) -> Node:
+    """λ_T of friction k while it slides, in terms of its slip, its velocity and its limit.
+
+    smooth : 0 in impacts, where the limit is that at rest
+    """
     tape, friction = equations.tape, equations.frictions[k]
-    own = tape.input("slip", k)
+    own, limit = tape.input("slip", k), friction.limit_at_speed(smooth)
     if friction.partner < 0:
-        return own * friction.limit
+        return own * limit
     other = tape.input("slip", friction.partner)
     square = own * own + other * other
-    return friction.limit * (square / (square + NO_SLIP)) * cosine(equations, k)
+    return limit * (square / (square + NO_SLIP)) * cosine(equations, k)
 
 
 def cosine(equations: Equations, k: int) -> Node:

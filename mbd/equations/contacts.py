@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from functools import partial
 
 from mbd.bodies.promises import called
 from mbd.constraints.base import Constraint
@@ -83,7 +84,8 @@ def _always(
         if _velocity_row(found, scope, word.name, row, number) and row.limit is not None:
             name = f"{word.name}.{row.part}" if row.part else word.name
             limit = row.limit(scope.tape.zero) if callable(row.limit) else row.limit
-            dry_friction(found, scope, dynamics, name, len(found.rows) - 1, number, scope.tape.lift(limit))
+            sliding = None if row.sliding is None else partial(row.sliding, scope.tape.zero)
+            dry_friction(found, scope, dynamics, name, len(found.rows) - 1, number, scope.tape.lift(limit), sliding)
 
 
 def _row(found: Laws, scope: DerivationScope, owner: str, row: Equation, contact: int = -1) -> int:

@@ -144,7 +144,7 @@ def _wrapped(scope: DerivationContext, equations: Equations, model: Description)
     if not angles:
         return []
     nodes = [*equations.balance, equations.potential, *(row.value for row in equations.rows if not row.wraps)]
-    nodes += [row.rate for row in equations.rows if row.is_velocity] + [f.limit for f in equations.frictions]
+    nodes += [row.rate for row in equations.rows if row.is_velocity] + [f.sliding for f in equations.frictions]
     for contact in equations.contacts:
         nodes += [each for each in (contact.gap, contact.force, contact.only_while) if isinstance(each, Node)]
         nodes += [force for _, _, force in contact.drags]
@@ -267,7 +267,7 @@ class TreeGeometry:
         """M of the bodies, where no force and no state depends on accelerations."""
         forces = [contact.force for contact in self.constraints.contacts if contact.force is not None]
         forces += [force for contact in self.constraints.contacts for _, _, force in contact.drags]
-        forces += [friction.limit for friction in self.constraints.frictions]
+        forces += [friction.sliding for friction in self.constraints.frictions]
         inside = live([*self.dynamics.generalized(self.work), *forces])
         if self.rests or any(node.op == "input" and node.data[0] == "a" for node in inside):
             return None

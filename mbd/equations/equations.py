@@ -149,7 +149,8 @@ class Friction:
     row : the row that holds γ = 0 while it sticks
     contact : the contact whose normal force it follows, −1 if it always acts
     rate : γ on the tape; change : γ̇, with accelerations
-    limit : of multipliers and parameters, homogeneous of degree one in the multipliers but for a constant
+    limit : at rest, of multipliers and parameters, homogeneous of degree one in the multipliers but for a constant
+    sliding : limit at the velocity of its slide, `limit` itself where that changes nothing; see `limit_at_speed`
     partner : number of the other direction of a contact in space, −1 if this one is alone; both together obey
         ``‖λ_T‖ ≤ limit``, and ``λ_T = limit γ/‖γ‖`` while they slide (see `mbd.equations.cones`)
     """
@@ -160,7 +161,17 @@ class Friction:
     rate: Node
     change: Node
     limit: Node
+    sliding: Node
     partner: int = -1
+
+    def limit_at_speed(self, smooth: Node | float = 1.0) -> Node:
+        """``limit + smooth (sliding − limit)``, smooth = 0 in impacts, whose slips pass all speeds.
+
+        Friction in joints stays finite, so that impacts make nothing of it: it is that of its velocity always.
+        """
+        if self.sliding is self.limit or self.contact < 0 or not isinstance(smooth, Node):
+            return self.sliding
+        return self.limit + smooth * (self.sliding - self.limit)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 from mbd.constraints.law import Equation
+from mbd.equations.cones import LEAST_SQUARE
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Effect, Friction, Row
@@ -37,9 +38,9 @@ def sliding_contact(
     Directions are those at the point of now. Spin is friction along one direction, with a switch of its own.
     """
     spinning = [(row, word.limit or 0.0) for row, word in limited if row >= 0 and (word.part, word.unit) == SPIN]
-    along = [(row, word.limit) for row, word in limited if (word.part, word.unit) != SPIN]
+    along = [(row, word) for row, word in limited if (word.part, word.unit) != SPIN]
     if along:
-        acting = [(row, law) for row, law in along if row >= 0]
+        acting = [(row, word) for row, word in along if row >= 0]
         _slide(found, scope, dynamics, name, len(numbers) - 1 - len(spinning), numbers[0], acting, captured)
     for row, law in spinning:
         limit = scope.tape.lift(law(-scope.tape.input("lam", numbers[0])) if callable(law) else law)
@@ -53,7 +54,7 @@ def _slide(
     name: str,
     ways: int,
     normal: int,
-    tangents: Sequence[tuple[int, Any]],
+    tangents: Sequence[tuple[int, Equation]],
     captured: dict[int, Node],
 ) -> None:
     """Friction along one tangent, or along two that slide together, of all the `ways` in which the point can slide."""
@@ -64,20 +65,33 @@ def _slide(
         )
     here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
     first = len(found.frictions)
-    for place, (row, law) in enumerate(tangents):
+    push, views = -scope.tape.input("lam", normal), []
+    for row, _ in tangents:
         anchored = [found.viewed[row]] if found.rows[row].is_velocity else scope.rates([found.viewed[row]])
-        view = substitute(anchored, here)[0]
-        limit = scope.tape.lift(law(-scope.tape.input("lam", normal)) if callable(law) else law)
+        views.append(substitute(anchored, here)[0])
+    speed = _speed(scope, views, first)
+    for place, (row, word) in enumerate(tangents):
+        limit = scope.tape.lift(word.limit(push) if callable(word.limit) else word.limit or 0.0)
+        sliding = limit if word.sliding is None else scope.tape.lift(word.sliding(push, speed))
         partner = -1 if len(tangents) == 1 else first + 1 - place
-        _add(found, scope, name, row, found.rows[row].contact, view, limit, partner)
+        _add(found, scope, name, row, found.rows[row].contact, views[place], limit, sliding, partner)
     _add_loss(found, scope, dynamics, name, range(first, len(found.frictions)))
 
 
 def dry_friction(
-    found: Laws, scope: DerivationScope, dynamics: Generalized, name: str, row: int, contact: int, limit: Node
+    found: Laws,
+    scope: DerivationScope,
+    dynamics: Generalized,
+    name: str,
+    row: int,
+    contact: int,
+    limit: Node,
+    sliding: Callable[[Scalar], Scalar] | None = None,
 ) -> None:
-    """Dry friction along a row on velocities, ``|λ| ≤ limit``."""
-    _add(found, scope, name, row, contact, found.viewed[row], limit)
+    """Dry friction along a row on velocities, ``|λ| ≤ limit``; `sliding` is the limit at a speed."""
+    view = found.viewed[row]
+    moving = limit if sliding is None else scope.tape.lift(sliding(_speed(scope, [view], len(found.frictions))))
+    _add(found, scope, name, row, contact, view, limit, moving)
     _add_loss(found, scope, dynamics, name, [len(found.frictions) - 1])
 
 
@@ -95,8 +109,19 @@ def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint:
         unit = joint.freedoms[place].unit
         found.rows.append(Row(name, "dry", scope.tape.zero, scope.real(view), unit=unit, kind="velocity"))
         found.viewed.append(view)
-        _add(found, scope, name, len(found.rows) - 1, -1, view, scope.tape.lift(limit))
-        _add_loss(found, scope, dynamics, name, [len(found.frictions) - 1])
+        sliding = partial(loss.sliding, load, scope=scope, owner=owner)
+        dry_friction(found, scope, dynamics, name, len(found.rows) - 1, -1, scope.tape.lift(limit), sliding)
+
+
+def _speed(scope: DerivationScope, views: Sequence[Node], first: int) -> Node:
+    """‖γ‖ while friction slides along these velocities, the first of which is that of friction `first`.
+
+    Along one direction it is slip · γ, smooth where the end of a step lies beyond rest, and 0 where nothing slides.
+    """
+    rates = [scope.real(view) for view in views]
+    if len(rates) == 1:
+        return scope.tape.input("slip", first) * rates[0]
+    return scope.tape.lift(sqrt(sum((rate * rate for rate in rates), scope.tape.lift(LEAST_SQUARE))))
 
 
 def _pin_load(found: Laws, scope: DerivationScope, joint: Joint) -> Node:
@@ -116,12 +141,13 @@ def _add(
     contact: int,
     view: Node,
     limit: Node,
+    sliding: Node,
     partner: int = -1,
 ) -> None:
     """A direction of dry friction, and its row marked as held by it."""
     rate = scope.real(view)
     found.rows[row] = replace(found.rows[row], friction=len(found.frictions))
-    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit, partner))
+    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit, sliding, partner))
     found.sliding.append(view)
 
 

@@ -183,12 +183,13 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
 
     ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that closing contacts
     store, in the order of contacts and anchors, and the whole turns as they are; T is the kinetic energy. In `impacts`,
-    where c_C is 1, smooth friction of contacts has no impulse.
+    where c_C is 1, smooth friction of contacts has no impulse, and dry friction of contacts its limit at rest.
     """
     inputs = Inputs.of(equations)
     tape = equations.tape
     rows = range(len(equations.rows))
-    r = switched_balance(equations, 1.0 - inputs.c[0] if impacts else 1.0)
+    smooth = 1.0 - inputs.c[0] if impacts else 1.0
+    r = switched_balance(equations, smooth)
     rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
     f = substitute(r, rest)
     M = None if equations.geometry is None else equations.geometry.mass_matrix()
@@ -203,7 +204,7 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     out += [row.value for row in equations.rows] + hv + _time_rates(equations, hv)
     out += [value for contact in equations.contacts for value in contact.captured]
     out += [tape.input("anchor", turn.anchor) for turn in equations.turns]
-    return [*out, equations.kinetic, *(friction.limit for friction in equations.frictions)]
+    return [*out, equations.kinetic, *(friction.limit_at_speed(smooth) for friction in equations.frictions)]
 
 
 def guards(equations: Equations) -> list[Node]:
@@ -215,7 +216,7 @@ def guards(equations: Equations) -> list[Node]:
     out += [guard.value for guard in equations.guards] + [guard.rate for guard in equations.guards]
     frictions = equations.frictions
     out += [friction.rate for friction in frictions] + [friction.change for friction in frictions]
-    return out + [friction.limit for friction in frictions]
+    return out + [friction.sliding for friction in frictions]
 
 
 def scales(equations: Equations) -> list[Node]:
@@ -319,7 +320,7 @@ def _forces(
     rates, forces = [equations.rows[k].rate for k in fast], [inputs.lam[k] for k in fast]
     for k in sliding:
         rates.append(equations.frictions[k].rate)
-        forces.append(sliding_force(equations, k))
+        forces.append(sliding_force(equations, k, rubbed))
     for contact in _rubbing(equations, rows):
         rates += [velocity for _, velocity, _ in contact.drags]
         forces += [-(rubbed * force) for _, _, force in contact.drags]

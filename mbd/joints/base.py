@@ -181,10 +181,10 @@ class Joint(Parameterized, ABC):
         for label, loss in each.items():
             if loss.smooth is loss or loss.smooth == loss:
                 continue
-            rest = {**each, label: loss.without_sticking}
+            rest = {**each, label: loss.smooth}
             kept = {name: value for name, value in rest.items() if value is not None} or None
             plain = alone and not isinstance(self.loss, Mapping)
-            found[f"{self.name}{'' if alone else f'.{label}'} friction"] = loss.without_sticking if plain else kept
+            found[f"{self.name}{'' if alone else f'.{label}'} friction"] = loss.smooth if plain else kept
         return found
 
     def resistance(self, rates: Sequence[Scalar], scope: Scope) -> list[Scalar]:

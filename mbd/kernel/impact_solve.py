@@ -19,7 +19,8 @@ def prepare(K: Balance) -> None:
     """K.acc at the instant, directions of sliding and of sticking where contacts are now; all frictions begin stuck.
 
     A contact that closes holds the place that it strikes from here on: its tangents are those of the ground there, also
-    where it rebounds. Smooth friction of contacts, where K.rubs says that there is any, takes no part.
+    where it rebounds. Smooth friction of contacts, where K.rubs says that there is any, takes no part; dry friction of
+    contacts is that at rest.
     """
     evaluate(K, K.time, K.q, K.y)
     if K.n_cones > 0:
@@ -27,7 +28,7 @@ def prepare(K: Balance) -> None:
     hold_places(K)
     if K.n_frictions > 0:
         K.given[: K.n_rows] = 0.0
-        K.block[1] = float(K.rubs)
+        K.block[1] = 1.0
         evaluate_loaded(K, K.given)
         for f in range(K.n_frictions):
             K.base_limit[f] = limit_of(K, f)  # no impulse comes from a force that stays finite

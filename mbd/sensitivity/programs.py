@@ -271,7 +271,7 @@ class Programs:
             values = [contact.gap for contact in contacts]
             values += [zero if contact.force is None else contact.force for contact in contacts]
             values += [guard.value for guard in equations.guards]
-            values += [friction.rate for friction in frictions] + [friction.limit for friction in frictions]
+            values += [friction.rate for friction in frictions] + [friction.sliding for friction in frictions]
             return values + [each.only_while if isinstance(each.only_while, Node) else zero for each in contacts]
         if name == "captured":
             return [value for contact in equations.contacts for value in contact.captured]

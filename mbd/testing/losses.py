@@ -61,9 +61,21 @@ def dry_at(loss: Loss, load: float) -> float:
     return scope.value(loss.dry(value, scope, OWNER), given={value: load})[0]
 
 
+def sliding_at(loss: Loss, speed: float) -> float:
+    """The same while it slides at a speed, without a force in the joint."""
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    return scope.value(loss.sliding(0.0, v, scope, OWNER), given={v: speed})[0]
+
+
 def _dry(findings: Findings, loss: Loss, rng: np.random.Generator) -> None:
-    """Set-valued friction has a limit ≥ 0 that grows in proportion to the force in the joint, or not at all."""
+    """Set-valued friction has a limit ≥ 0 that grows in proportion to the force in the joint, or not at all.
+
+    While it slides it is that at rest to begin with.
+    """
     rest = dry_at(loss, 0.0)
+    hint = "sliding() must tend to dry() as the speed falls to zero: friction does not jump as sliding begins"
+    findings.equal("sliding begins with the friction at rest", "sliding at 0", sliding_at(loss, 0.0), rest, hint, 1e-12)
     law = "dry friction has a limit ≥ 0"
     for load in map(float, 10.0 ** rng.uniform(-3.0, 4.0, 8)):
         limit = dry_at(loss, load)
@@ -87,6 +99,7 @@ def _declared(findings: Findings, loss: Loss) -> None:
     scope = FreeScope()
     loss.force(scope.tape.input("v", 0), scope, OWNER)
     loss.dry(scope.tape.input("lam", 0), scope, OWNER)
+    loss.sliding(scope.tape.input("lam", 0), scope.tape.input("v", 1), scope, OWNER)
     law = "parameters are declared before they are used"
     hint = "fields() must name every scope.parameter(owner, field, value) with the same value"
     declared = loss.parameters(OWNER)
@@ -97,7 +110,7 @@ def _declared(findings: Findings, loss: Loss) -> None:
 
 def _power(findings: Findings, loss: Loss, rate: float, fastest: float) -> None:
     force = force_at(loss, rate)
-    whole = force + math.copysign(dry_at(loss, 0.0), rate)
+    whole = force + math.copysign(sliding_at(loss, abs(rate)), rate)
     sentence = f"power taken out F(v) v: expected ≥ 0 W, found {whole * rate:.6g} W (F = {whole:.6g})"
     hint = "F opposes the motion and has the sign of the rate: it stands on the left-hand side of M a + f = 0"
     findings.holds("passivity: it never feeds energy in", whole * rate >= 0.0, sentence, hint)

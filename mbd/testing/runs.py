@@ -76,8 +76,8 @@ def _complementarity(findings: Findings, run: Any, contact: Contact, closed: Any
 def _friction(findings: Findings, run: Any, friction: Friction, where: str) -> None:
     """|λ_T| ≤ limit, against the motion, and none where its contact is open."""
     columns, record = run.columns, run.columns.record
-    rate, limit = (np.broadcast_to(value, run.time.shape) for value in columns.evaluate([friction.rate, friction.limit],
-                                                                                        columns.rows))  # fmt: skip
+    values = columns.evaluate([friction.rate, friction.sliding], columns.rows)
+    rate, limit = (np.broadcast_to(value, run.time.shape) for value in values)
     along = record.lam[:, friction.row]
     on = record.closed[:, friction.contact].astype(bool) if friction.contact >= 0 else np.ones(len(along), dtype=bool)
     size = 1.0 + np.max(np.abs(record.lam), axis=1, initial=0.0)

@@ -54,15 +54,14 @@ class Loss(ABC):
         """
         return 0.0
 
+    def sliding(self, load: Scalar, speed: Scalar, scope: Scope, owner: str) -> Scalar:
+        """What `dry` becomes at a speed ≥ 0 [m/s or rad/s] of sliding; it tends to `dry` as that falls to zero."""
+        return self.dry(load, scope, owner)
+
     @property
     def smooth(self) -> Loss | None:
         """What is left of it without friction that truly sticks; None where that is all of it."""
         return self if type(self).dry is Loss.dry else None
-
-    @property
-    def without_sticking(self) -> Loss | None:
-        """The loss of a scene that leaves friction that truly sticks out: `smooth`, unless that is a part of it."""
-        return self.smooth
 
     def domains(self) -> dict[str, Domain]:
         """Domains of its fields: all of them ≥ 0, unless a loss says otherwise."""
@@ -135,6 +134,10 @@ class LossSum(Loss):
         """The sum of what sticks."""
         return self._sum(owner, lambda name, loss: loss.dry(load, scope, name))
 
+    def sliding(self, load: Scalar, speed: Scalar, scope: Scope, owner: str) -> Scalar:
+        """The same at a speed."""
+        return self._sum(owner, lambda name, loss: loss.sliding(load, speed, scope, name))
+
     def _sum(self, owner: str, part: Callable[[str, Loss], Scalar]) -> Scalar:
         result: Scalar = 0.0
         for name, loss in self.named(owner):
@@ -145,12 +148,6 @@ class LossSum(Loss):
     def smooth(self) -> Loss | None:
         """Those of its parts that are smooth, with the names of their parameters."""
         parts = tuple(part for loss in self.losses if (part := loss.smooth) is not None)
-        return LossSum(parts) if parts else None
-
-    @property
-    def without_sticking(self) -> Loss | None:
-        """Those of its parts that do not stick."""
-        parts = tuple(part for loss in self.losses if (part := loss.without_sticking) is not None)
         return LossSum(parts) if parts else None
 
     def fields(self) -> dict[str, float]:

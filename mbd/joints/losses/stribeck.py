@@ -8,9 +8,8 @@ from mbd.bodies.domains import Domain, positive
 from mbd.bodies.values import number
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
-from mbd.joints.losses.isotropic import LEAST_SQUARE
 from mbd.scope import Scope
-from mbd.tape.functions import exp, sqrt
+from mbd.tape.functions import exp
 from mbd.tape.node import Scalar
 
 __all__ = ["Stribeck"]
@@ -19,44 +18,7 @@ SPEED = positive("is not positive; give the speed over which friction falls, or 
 
 
 @dataclass(frozen=True)
-class _Fall(Loss):
-    """``F = (T_k − T_s) (1 − e^{−(v/v_s)²}) v/|v|``: what sliding takes off the static friction."""
-
-    static: float
-    kinetic: float
-    speed: float
-
-    def __post_init__(self) -> None:
-        for field in ("static", "kinetic", "speed"):
-            object.__setattr__(self, field, number(getattr(self, field), f"{field} of Stribeck"))
-        faults = SPEED.faults("Stribeck", "speed", self.speed)
-        if faults:
-            raise ModelError(faults)
-
-    @property
-    def kind(self) -> str:
-        """The same for the whole of it and its smooth part."""
-        return "stribeck"
-
-    def fields(self) -> dict[str, float]:
-        """`static`, `kinetic`, `speed`."""
-        return {"static": self.static, "kinetic": self.kinetic, "speed": self.speed}
-
-    def domains(self) -> dict[str, Domain]:
-        """T_s ≥ 0, T_k ≥ 0, v_s > 0."""
-        return super().domains() | {"speed": SPEED}
-
-    def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
-        """(T_k − T_s) (1 − e^{−(v/v_s)²}) v/|v|."""
-        static, kinetic, speed = (scope.parameter(owner, field, value) for field, value in self.fields().items())
-        square = rate * rate
-        fall: Scalar = 1.0 - exp(-square / (speed * speed))
-        size: Scalar = sqrt(square + LEAST_SQUARE)
-        return (kinetic - static) * fall * rate / size
-
-
-@dataclass(frozen=True)
-class Stribeck(_Fall):
+class Stribeck(Loss):
     """Dry friction that sticks up to its static size and falls to its kinetic one as sliding sets in.
 
     ``|F| ≤ T_s`` at rest and ``F = (T_k + (T_s − T_k) e^{−(v/v_s)²}) v/|v|`` in motion (Armstrong-Hélouvry, Dupont &
@@ -73,16 +35,35 @@ class Stribeck(_Fall):
     speed : v_s > 0, over which one becomes the other [rad/s or m/s]
     """
 
-    @property
-    def smooth(self) -> Loss:
-        """What sliding takes off."""
-        return _Fall(self.static, self.kinetic, self.speed)
+    static: float
+    kinetic: float
+    speed: float
 
-    @property
-    def without_sticking(self) -> None:
-        """Nothing: what sliding takes off is a part of what sticks."""
-        return None
+    def __post_init__(self) -> None:
+        for field in ("static", "kinetic", "speed"):
+            object.__setattr__(self, field, number(getattr(self, field), f"{field} of Stribeck"))
+        faults = SPEED.faults("Stribeck", "speed", self.speed)
+        if faults:
+            raise ModelError(faults)
+
+    def fields(self) -> dict[str, float]:
+        """`static`, `kinetic`, `speed`."""
+        return {"static": self.static, "kinetic": self.kinetic, "speed": self.speed}
+
+    def domains(self) -> dict[str, Domain]:
+        """T_s ≥ 0, T_k ≥ 0, v_s > 0."""
+        return super().domains() | {"speed": SPEED}
+
+    def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
+        """0: all of it sticks, or slides as what had stuck."""
+        return 0.0
 
     def dry(self, load: Scalar, scope: Scope, owner: str) -> Scalar:
         """T_s."""
         return scope.parameter(owner, "static", self.static)
+
+    def sliding(self, load: Scalar, speed: Scalar, scope: Scope, owner: str) -> Scalar:
+        """T_k + (T_s − T_k) e^{−(v/v_s)²}."""
+        static, kinetic, rapid = (scope.parameter(owner, field, value) for field, value in self.fields().items())
+        part: Scalar = exp(-(speed * speed) / (rapid * rapid))
+        return kinetic + (static - kinetic) * part
