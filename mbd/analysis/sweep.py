@@ -180,7 +180,8 @@ def sweep(
         processes derive a model once at most and take its machine code from the cache; with the extra dask also
         ``Client(…).get_executor()``; None: in turn
     file : to which every run is added as it ends, and from which runs are taken that it has already: a sweep
-        that was ended or killed goes on where it was
+        that was ended or killed continues where it was. A file of another model, law, start, setting or function of
+        the run is refused by what differs; functions count with all that they refer to
     progress : True for a bar on a terminal
     settings : further arguments of `simulate`, the same in all runs
 
@@ -202,7 +203,7 @@ def sweep(
     titles = _checked(model, names, start, results, executor, settings)
     cases = tuple(tuple(chain(*parts)) for parts in product(*(rows for _, rows in dimensions)))
     runs = Runs(model, names, start, results if isinstance(results, Mapping) else titles, settings)
-    known = None if file is None else SweepFile(file, runs, getattr(model, "parameters", {}))
+    known = None if file is None else SweepFile(file, runs, mechanism_of(model, settings.get("backend", "auto")))
     with share_bar() if bar_wanted else nullcontext() as bar:
         rows, complete = _made(runs, cases, executor, known, bar)
     columns = {title: tuple(row.results[k] for row in rows) for k, title in enumerate(titles)}

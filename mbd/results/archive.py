@@ -12,7 +12,8 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,6 +35,7 @@ __all__ = [
     "read",
     "write",
     "write_whole",
+    "writing",
 ]
 
 COMPRESSION = 1
@@ -77,7 +79,23 @@ def named_file(path: Any, suffix: str = "") -> Path:
     if not target.name or target.is_dir():
         known = ", which is a folder" if target.name and target.is_dir() else ""
         raise TrajectoryError(f"a file to write to is expected, such as 'run{suffix}', not {path!r}{known}")
-    return target if target.suffix or not suffix else target.with_name(target.name + suffix)
+    is_device = target.exists() and not target.is_file()  # such as /dev/full, beside which nothing is to be written
+    return target if target.suffix or not suffix or is_device else target.with_name(target.name + suffix)
+
+
+class NotWritten(TrajectoryError, OSError):
+    """A file that cannot be written; for who expects an `OSError` it is one."""
+
+
+@contextmanager
+def writing(target: Path) -> Iterator[None]:
+    """Name the file in the error of one that cannot be written, such as on a full disk (a `TrajectoryError`)."""
+    try:
+        yield
+    except OSError as error:
+        if isinstance(error, NotWritten):
+            raise
+        raise NotWritten(f"'{target}' cannot be written: {error.strerror or error}") from error
 
 
 def file_to_read(path: Any) -> Path:
@@ -105,16 +123,17 @@ def write(target: Path, arrays: Arrays, meta: Mapping[str, Any]) -> None:
 
 def write_whole(target: Path, fill: Callable[[Path], Any]) -> None:
     """Write beside the target, then rename, so that a reader never sees half a file; not beside a device or a pipe."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    if target.exists() and not target.is_file():
-        fill(target)
-        return
-    partial = target.with_name(f".{target.name}.{os.getpid()}.{os.urandom(4).hex()}")
-    try:
-        fill(partial)
-        partial.replace(target)
-    finally:
-        partial.unlink(missing_ok=True)
+    with writing(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists() and not target.is_file():
+            fill(target)
+            return
+        partial = target.with_name(f".{target.name}.{os.getpid()}.{os.urandom(4).hex()}")
+        try:
+            fill(partial)
+            partial.replace(target)
+        finally:
+            partial.unlink(missing_ok=True)
 
 
 def _hash(arrays: Mapping[str, NDArray[Any]]) -> bytes:

@@ -21,6 +21,7 @@ from mbd.gait.basin.store import Store, digest_of
 from mbd.gait.basin.walks import Decided
 from mbd.gait.cycle import LimitCycle
 from mbd.progress import share_bar
+from mbd.results.identity import identity_of_model
 from mbd.simulation.batch.batch import worker_count
 
 __all__ = ["basin"]
@@ -147,7 +148,8 @@ def _head(made: Made, grid: Grid, steps: int) -> dict[str, Any]:
     )
     state, columns = made.study.columns(everything)
     return {
-        "model": getattr(map_.model, "name", ""), "section": map_.section, "integrator": repr(map_.integrator),
+        "name": getattr(map_.model, "name", ""), **identity_of_model(map_.model, map_.mechanism),
+        "section": map_.section, "integrator": repr(map_.integrator),
         "mirror": None if map_.mirror is None else list(map_.mirror.sides), "dt": map_.dt, "longest": map_.longest,
         "steps": steps, "axes": [list(names) for names in grid.dimensions], "shape": list(grid.shape),
         "parameters": {name: float(value) for name, value in made.base.items()}, "attractors": list(made.gaits),

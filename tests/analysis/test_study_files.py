@@ -1,0 +1,185 @@
+"""Files of studies: a file is taken for the study that wrote it alone, and only as that wrote it."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+from functools import partial
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.results.identity import identity
+
+STRENGTH = 1.0
+
+
+def pendulum(torque=lambda t: 0.3 * mbd.sin(9.0 * t), words=(), loss=0.3):
+    """A rod on a pin under a motor."""
+    model, rod = mbd.Model("pendulum"), mbd.Link("rod", 1.0, 1.0, 0.5, 0.1)
+    pin = mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Viscous(loss))
+    model.connect(pin)
+    model.apply(mbd.Motor("drive", pin, torque))
+    for word in words:
+        (model.apply if isinstance(word, mbd.Controller) else model.constrain)(word)
+    return model
+
+
+def swing(amount, power=1.0):
+    """A result of a run."""
+    return lambda run: amount * float(np.max(np.abs(run["pin.angle"]))) ** power
+
+
+def stop(limit=0.9, **more):
+    return mbd.Event("stop", mbd.measure(lambda angle: angle - limit, "pin.angle"), **more)
+
+
+def slowed(factor):
+    """A controller whose update refers to a number."""
+    return mbd.Controller("brake", lambda time, values, state: ({"pin loss.coefficient": factor * 0.3}, state),
+                          period=0.05, reads=(), writes="pin loss.coefficient", state=0)  # fmt: skip
+
+
+def of_module(run):
+    return STRENGTH * float(run["pin.angle"][-1])
+
+
+STUDIES = {
+    "first": {},
+    "start": {"angle": 0.2},
+    "function that starts": {"angle": lambda p: mbd.assemble(pendulum(), {"pin.angle": 0.2})},
+    "law": {"model": lambda: pendulum(lambda t: 0.3 * mbd.sin(8.0 * t))},
+    "table": {"model": lambda: pendulum(mbd.Samples((0.0, 9.0), (0.0, 0.5)))},
+    "other table": {"model": lambda: pendulum(mbd.Samples((0.0, 9.0), (0.0, 0.6)))},
+    "event": {"model": lambda: pendulum(words=[stop()])},
+    "event that ends": {"model": lambda: pendulum(words=[stop(terminal=True)])},
+    "guard": {"model": lambda: pendulum(words=[stop(0.8, terminal=True)])},
+    "reset": {"model": lambda: pendulum(words=[stop(reset={"pin.angle.rate": 0.0})])},
+    "controller": {"model": lambda: pendulum(words=[slowed(1.0)])},
+    "other controller": {"model": lambda: pendulum(words=[slowed(2.0)])},
+    "value": {"model": lambda: pendulum(loss=0.4)},
+    "function": {"results": {"swing": swing(1.0)}},
+    "what a function has captured": {"results": {"swing": swing(2.0)}},
+    "default of a function": {"results": {"swing": swing(1.0, power=2.0)}},
+    "module of a function": {"results": {"swing": of_module}},
+    "partial": {"results": {"swing": partial(lambda scale, run: scale * run["pin.angle"][-1], 3.0)}},
+    "other partial": {"results": {"swing": partial(lambda scale, run: scale * run["pin.angle"][-1], 4.0)}},
+    "setting": {"until": 0.3},
+    "scheme": {"integrator": mbd.RadauIIA()},
+    "parameter": {"parameters": {"rod.center": 0.4}},
+}
+
+
+def study(file, model=pendulum, angle=1.0, results=("pin.angle",), **settings):
+    """A sweep of a study: its table."""
+    made = model()
+    start = angle if callable(angle) else mbd.assemble(made, {"pin.angle": angle}, backend="python")
+    settings = {"dt": 5e-2, "until": 0.1, "backend": "python", **settings}
+    return mbd.sweep(made, {"rod.mass": [1.1, 2.0]}, start, results, file=file, **settings)
+
+
+def test_no_study_takes_the_file_of_another(tmp_path):
+    for name, one in STUDIES.items():
+        study(tmp_path / f"{name}.jsonl", **one)
+    heads = {name: json.loads((tmp_path / f"{name}.jsonl").read_text().splitlines()[0]) for name in STUDIES}
+    assert len({json.dumps(head, sort_keys=True) for head in heads.values()}) == len(STUDIES)
+    for name, one in STUDIES.items():
+        file = tmp_path / f"{name}.jsonl"
+        before = file.read_bytes()
+        np.testing.assert_array_equal(study(file, **one)["success"], [True, True])
+        assert file.read_bytes() == before, f"{name}: the same study has made its runs again"
+    for name in list(STUDIES)[1:]:
+        with pytest.raises(mbd.ModelError, match="belongs to another sweep, with other .*; give another name"):
+            study(tmp_path / f"{name}.jsonl")
+
+
+def test_a_value_that_a_function_finds_by_its_name_counts(tmp_path, monkeypatch):
+    study(tmp_path / "a", results={"swing": of_module})
+    monkeypatch.setattr(sys.modules[__name__], "STRENGTH", 2.0)
+    with pytest.raises(mbd.ModelError, match="with other functions of the run"):
+        study(tmp_path / "a", results={"swing": of_module})
+
+
+def test_another_process_knows_the_study_again(tmp_path):
+    file = tmp_path / "a.jsonl"
+    study(file, model=partial(pendulum, words=[slowed(1.0), stop()]), results={"swing": swing(1.0)})
+    code = (
+        "from functools import partial; from tests.analysis.test_study_files import *\n"
+        f"study({str(file)!r}, model=partial(pendulum, words=[slowed(1.0), stop()]), results={{'swing': swing(1.0)}})"
+    )
+    before = file.read_bytes()
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_line_that_was_changed_is_named(tmp_path, seed):
+    """Any byte of a whole line; the end of the file may be missing."""
+    file, rng = tmp_path / "a.jsonl", random.Random(seed)
+    table = study(file)
+    content = bytearray(file.read_bytes())
+    lines = content.splitlines(keepends=True)
+    for _ in range(30):
+        place = rng.randrange(len(lines[0]), len(content) - 1)
+        damaged = content.copy()
+        damaged[place] = rng.choice(b'0123456789[]{},"x\xff')
+        file.write_bytes(damaged)
+        if damaged != content:
+            with pytest.raises(mbd.ModelError, match="line [23] of .* is not as it was written; take the line out"):
+                study(file)
+            assert file.read_bytes() == damaged
+    file.write_bytes(content[: -rng.randrange(1, len(lines[-1]))])
+    np.testing.assert_array_equal(study(file)["pin.angle"], table["pin.angle"])
+    assert file.read_bytes() == content
+
+
+@pytest.mark.parametrize("line", [b"[" * 100_000 + b"\n", b'{"case": 3}\n', b"\x00" * 40 + b"\n", b"\n"])
+def test_lines_that_no_study_writes_are_named(tmp_path, line):
+    file = tmp_path / "a.jsonl"
+    study(file)
+    with file.open("ab") as end:
+        end.write(line)
+    with pytest.raises(mbd.ModelError, match="line 4 of"):
+        study(file)
+
+
+def test_a_line_of_another_study_is_no_line_of_this_one(tmp_path):
+    one, other = tmp_path / "one.jsonl", tmp_path / "other.jsonl"
+    study(one), study(other, angle=0.2)
+    lines = other.read_bytes().splitlines(keepends=True)
+    one.write_bytes(one.read_bytes() + lines[1])
+    with pytest.raises(mbd.ModelError, match="line 4 of"):
+        study(one)
+
+
+def test_a_disk_that_is_full_at_the_start_is_an_error():
+    with pytest.raises(mbd.TrajectoryError, match="'/dev/full' cannot be written: No space left on device"):
+        study("/dev/full")
+
+
+def test_a_disk_that_is_full_later_costs_no_run(tmp_path, monkeypatch):
+    from mbd.results.study_file import StudyFile
+
+    write = StudyFile._write
+
+    def full(self, line, mode):
+        if mode == "a":
+            raise OSError(28, "No space left on device")
+        write(self, line, mode)
+
+    monkeypatch.setattr(StudyFile, "_write", full)
+    with pytest.warns(mbd.MbdWarning, match="No space left .* in the result of this sweep alone"):
+        assert study(tmp_path / "a")["success"].all()
+
+
+def test_digests_follow_from_what_things_are():
+    assert identity({"a": 1}) == identity({"a": 1.0}) != identity({"a": 2})
+    assert identity(np.arange(3.0)) != identity(np.arange(3)) != identity([0, 1, 2])
+    assert (
+        identity(np.random.default_rng(1)) == identity(np.random.default_rng(1)) != identity(np.random.default_rng(2))
+    )
+    assert identity(np.sin) != identity(np.cos)
+    assert identity({3, 1, 2}) == identity({1, 2, 3})
