@@ -11,7 +11,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.bodies.values import is_finite_number, shown
 from mbd.errors import MbdError, ModelError, UnknownNameError, nearest
-from mbd.gait.continuation import QUICK, BranchPoint, Continuation, Corrected
+from mbd.gait.continuation import QUICK, BranchPoint, Continuation, Corrected, Forbidden
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.derivatives import parameter_value
 from mbd.gait.follow import PointCurve, follow
@@ -204,6 +204,11 @@ def branch(
     while len(curve) < steps:
         last = curve[-1]
         made = _next(given, last, ds)
+        if isinstance(made, Forbidden):
+            value = given.last_allowed(last.value, made.value)
+            curve += _last(given, last, value, made.value)
+            stopped = f"ends at {parameter} = {value:.9g}: beyond it {made}"
+            break
         if isinstance(made, str):
             limit = limit_beyond(given, last)
             special += [] if limit is None else [limit]
@@ -220,7 +225,8 @@ def branch(
         between.sort(key=lambda point: abs(point.value - curve[-1].value))
         special += [point for point in between if not (point.value - to) * toward > 0.0]
         if beyond:
-            curve += _last(given, last, new, taken, to)
+            guess = taken * last.tangent * (to - last.value) / (new.value - last.value or 1.0)
+            curve += _last(given, last, to, new.value, guess) or [new]
             stopped = f"reached {parameter} = {to:g}"
             break
         curve.append(new)
@@ -268,7 +274,7 @@ def _turned(point: BranchPoint) -> BranchPoint:
     return replace(point, tangent=-point.tangent)
 
 
-def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoint, float, bool] | str:
+def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoint, float, bool] | Forbidden | str:
     """The next point, its distance, and whether it came quickly; why there is none."""
     why = ""
     while ds >= SMALLEST:
@@ -284,6 +290,8 @@ def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoin
             if cosine >= np.cos(TURN):
                 return new, ds, corrected.corrections <= QUICK
             why = "it turns too sharply"
+        elif isinstance(corrected, Forbidden) and last.tangent[-1] * (corrected.value - last.value) > 0.0:
+            return corrected
         else:
             why = str(corrected)
         ds *= 0.5
@@ -309,16 +317,19 @@ def _beyond(why: str) -> str:
     return f"the walker {why}" if why.split(" ")[0] in ("falls", "scuffs", "ends", "comes") else why
 
 
-def _last(given: Continuation, last: BranchPoint, new: BranchPoint, ds: float, to: float) -> Sequence[BranchPoint]:
-    """The point at which the parameter has its last value."""
+def _last(
+    given: Continuation, last: BranchPoint, to: float, beyond: float, guess: Vector | None = None
+) -> Sequence[BranchPoint]:  # fmt: skip
+    """The point at which the parameter has its last value, which lies before another one; none where none is found."""
     plane = np.zeros(len(last.tangent))
     plane[-1] = 1.0
     share = (to - last.value) / given.width
-    guess = ds * last.tangent * (to - last.value) / (new.value - last.value or 1.0)
-    corrected = given.corrected(last, plane, share, guess)
-    if not isinstance(corrected, Corrected):
-        return [new]
+    if guess is None:
+        slope = last.tangent[-1] * given.width
+        guess = last.tangent * (to - last.value) / slope if slope * (beyond - last.value) > 0.0 else share * plane
+    guess = np.append(guess[:-1], share)
+    corrected = given.corrected(last, plane, share, guess, goal=to)
     try:
-        return [given.point(corrected, given.whole(last))]
+        return [given.point(corrected, given.whole(last))] if isinstance(corrected, Corrected) else []
     except MbdError:
-        return [new]
+        return []

@@ -23,10 +23,12 @@ from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart, Section
 from mbd.state import State
 
-__all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected", "way_of"]
+__all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected", "Forbidden", "way_of"]
 
 CORRECTIONS, QUICK = 10, 4
 """Newton corrections of a point, and how many count as few."""
+HALVINGS = 1200
+"""Halvings of a range of the parameter, which lead down to the smallest number at most [-]."""
 SLOW = 0.2
 """Factor by which a correction must shrink the residual, else its matrix is made again [-]."""
 
@@ -70,6 +72,13 @@ class Corrected:
     value: float
     found: Measured
     corrections: int
+
+
+@dataclass(frozen=True)
+class Forbidden(Outcome):
+    """Why a solution has no value of the parameter that the model allows. value : that it would have"""
+
+    value: float = float("nan")
 
 
 @dataclass(eq=False)
@@ -131,18 +140,20 @@ class Continuation:
         return np.column_stack([P[:, :size] - np.eye(size), self.width * P[:, size]])
 
     def corrected(
-        self, point: BranchPoint, plane: Vector, ds: float, guess: Vector | None = None
+        self, point: BranchPoint, plane: Vector, ds: float, guess: Vector | None = None, goal: float | None = None
     ) -> Corrected | Outcome:
         """The solution with planeᵀ u = ds near `guess`, by default ds plane; why there is none.
 
-        u = (c, (p − p₀)/σ) in the chart of the point.
+        u = (c, (p − p₀)/σ) in the chart of the point; `goal` is p to the bit where the plane is that of a value of p.
         """
         chart, size = point.chart, point.chart.size
         u = ds * plane if guess is None else guess.copy()
         matrix, before = point.matrix, np.inf
         for number in range(CORRECTIONS):
-            value = point.value + self.width * float(u[-1])
+            value = point.value + self.width * float(u[-1]) if goal is None else goal
             values = self.with_value(value)
+            if faults := self.map.faults(values):
+                return Forbidden("not allowed", "; ".join(faults), value=value)
             try:
                 found = measured(self.map, chart, u[:size], values)
             except SimulationError as error:
@@ -162,6 +173,18 @@ class Continuation:
             before = min(residual, before)
             u = u - np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
         return Outcome("does not converge", "the corrections do not converge")
+
+    def last_allowed(self, allowed: float, forbidden: float) -> float:
+        """The last value of the parameter between two that the model allows."""
+        for _ in range(HALVINGS):
+            middle = 0.5 * (allowed + forbidden)
+            if middle in (allowed, forbidden):
+                break
+            if self.map.faults(self.with_value(middle)):
+                forbidden = middle
+            else:
+                allowed = middle
+        return allowed + 0.0  # no −0
 
     def matrix_at(self, chart: Chart, u: Vector, values: Mapping[str, float]) -> Matrix | None:
         """[P − 1, σ F_p] beside a point; None where derivatives are missing."""

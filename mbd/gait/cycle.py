@@ -16,7 +16,7 @@ from mbd.gait.energies import cost_of_transport, energy_by_cause
 from mbd.gait.floquet import Multipliers
 from mbd.gait.map_derivative import MapDerivative, Measured, measured
 from mbd.gait.outcome import Outcome
-from mbd.gait.return_map import ReturnMap
+from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart
 from mbd.notebook import table
 from mbd.sensitivity.tangent_names import place_names
@@ -67,6 +67,11 @@ class LimitCycle:
     map: ReturnMap = field(repr=False)
     way: Vector = field(repr=False)
     given: Any = field(repr=False)
+
+    @cached_property
+    def arrival(self) -> Arrival:
+        """Where the map leads from its state."""
+        return self.map(self.state, self.parameters)
 
     @property
     def success(self) -> bool:
@@ -126,12 +131,16 @@ class LimitCycle:
 
         Raises
         ------
+        ModelError
+            for values that the model does not allow, or of one side alone where the gait has a mirror.
         GaitError
             where the walk is lost.
         """
         from mbd.gait.search import on_section, search
 
         values = {**self.parameters, **parameters}
+        self.map.require_free(parameters, values)
+        self.map.require(values)
         near = on_section(self.chart.section, self.state, self.map.vector(values))
         if self.given is None or near is None:
             raise GaitError(f"no gait to go on from: {self.outcome}", self)

@@ -1,28 +1,41 @@
 """How a gait follows a parameter, by the implicit function theorem.
 
 A fixed point ``F(c, p) = c`` of the return map moves by ``dc/dp = (1 − P)⁻¹ ∂F/∂p``, P = ∂F/∂c, and with it period,
-way and steps, which the map gives too: ``dT/dp = ∂T/∂c dc/dp + ∂T/∂p``. Multipliers change with P along the branch, by
-differences of derivatives of the map with two Richardson extrapolations.
+way and steps, which the map gives too: ``dT/dp = ∂T/∂c dc/dp + ∂T/∂p``. Multipliers change with P(c, p) along the
+tangent (dc/dp, 1) of the branch, by differences of exact derivatives of the map: P is smooth there up to where other
+events happen, also beside folds, where the branch itself turns. The differences follow the unit of the parameter: the
+gait moves by as much whatever the parameter's unit is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eig
 
 from mbd.arrays import Matrix, Vector
-from mbd.errors import GaitError, ModelError, UnknownNameError, nearest
+from mbd.errors import GaitError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.gait.exact_derivative import exact_derivative
-from mbd.gait.map_derivative import extrapolated, map_derivative
+from mbd.gait.map_derivative import extrapolated, map_derivative, measured
+from mbd.gait.return_map import Arrival
 
 __all__ = ["Derivatives", "parameter_value"]
 
-BESIDE, LEVELS = 8e-3, 3
-"""Least difference of a parameter, over its value or 1, to where the map is differentiated again, and how many, each
-twice the one before."""
+BESIDE, LEVELS = 1e-3, 3
+"""Change of the numbers of the map [m, rad, s, …] to where it is differentiated again, and how many, each twice the one
+before."""
+CLOSER, TRIES = 0.25, 9
+"""Factor of that change where other events happen there or differences disagree, and how often it is tried."""
+SURE, DOUBTFUL = 1e-8, 1e-5
+"""Error estimate, relative to the derivative or to the change of the gait, at which it ends, and above which there is
+none [-]."""
+MEETING = 1e-7
+"""``|wᴴ u|`` of left and right eigenvectors of length 1, or difference of two moduli relative to them, below which two
+multipliers meet and their largest has no derivative [-]."""
+FLAT = 1e-9
+"""Singular value of 1 − P relative to its largest below which a gait is at a fold, or has neighbours [-]."""
 
 
 class Derivatives(Mapping[tuple[str, str], float]):
@@ -56,21 +69,23 @@ class Derivatives(Mapping[tuple[str, str], float]):
 
 
 def parameter_value(gait: Any, name: str) -> float:
-    """The value of a parameter or of a function of parameters.
+    """The value of a parameter or of a function of parameters that a gait may follow.
 
     Raises
     ------
     UnknownNameError
         for a name that is neither.
     ModelError
-        for an exact 0 or ±1 of the model that is part of its equations.
+        for an exact 0 or ±1 of the model that is part of its equations, and for a parameter of one side of a gait
+        that was found with a mirror.
     """
     map_ = gait.map
-    if name in gait.parameters:
-        return float(gait.parameters[name])
-    known = {parameter.name: parameter.value for parameter in map_.mechanism.equations.parameters}
+    known = {parameter.name: parameter.value for parameter in map_.mechanism.equations.parameters} | gait.parameters
     if name in known:
-        return float(known[name])
+        value = float(known[name])
+        map_.require_free([name], gait.parameters)
+        map_.require_both_sides(name, value, gait.parameters)
+        return value
     if name in getattr(map_.model, "parameters", {}):
         raise ModelError(
             f"{name!r} is an exact 0 or ±1 of the model, which is part of its equations; name it in tunable=[…] of "
@@ -80,7 +95,13 @@ def parameter_value(gait: Any, name: str) -> float:
 
 
 def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:
-    """(dc/dp, d(numbers)/dp) of the map's numbers along the branch of gaits."""
+    """(dc/dp, d(numbers)/dp) of the map's numbers along the branch of gaits.
+
+    Raises
+    ------
+    GaitError
+        where the gait has none: at a fold, and where the map has no derivative.
+    """
     assert gait.map_derivative is not None
     values = {**gait.parameters, name: parameter_value(gait, name)}
     size = gait.chart.size
@@ -88,7 +109,18 @@ def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:
     if by.missing:
         raise GaitError(f"no derivative by {name!r}: {by.missing[0]}", gait)
     along, P = by.matrix[:, 0], gait.map_derivative.matrix
-    c = np.asarray(np.linalg.lstsq(np.eye(size) - P[:size], along[:size], rcond=1e-9)[0], dtype=float)
+    most = float(np.nanmax(np.abs(along), initial=0.0))
+    if not float(np.nanmax(by.error, initial=0.0)) <= DOUBTFUL * most and most > 0.0:
+        raise GaitError(
+            f"no derivative by {name!r}: what the map changes by does not become proportional to the parameter, "
+            f"{np.nanmax(by.error):.2g} of {most:.2g} are left; two events may be at one instant there",
+            gait,
+        )
+    fixed = np.eye(size) - P[:size]
+    c = np.asarray(np.linalg.lstsq(fixed, along[:size], rcond=FLAT)[0], dtype=float)
+    left = float(np.max(np.abs(fixed @ c - along[:size]), initial=0.0))
+    if left > DOUBTFUL * float(np.max(np.abs(along[:size]), initial=0.0)):
+        raise GaitError(f"no derivative by {name!r}: the branch of gaits has a fold here, where it turns back", gait)
     return c, np.asarray(along + P @ c)
 
 
@@ -115,30 +147,76 @@ def _of_largest_multiplier(gait: Any, name: str) -> float:
 
     dP/dp along the branch follows from central differences at ``c ± h dc/dp, p ± h``, which are off the branch by h²
     on both sides alike.
+
+    Raises
+    ------
+    GaitError
+        where two multipliers meet, and where the events of the walk change too near for a difference.
     """
     if not len(gait.stability_of.values):
         return 0.0
-    value, size = parameter_value(gait, name), gait.chart.size
-    move, _ = motion_of(gait, name)
-    P, slopes = gait.map_derivative.matrix[:size], []
-    for level in range(LEVELS):
-        h = 2.0**level * BESIDE * (abs(value) or 1.0)
-        ends = [_slope_beside(gait, sign * h * move, {**gait.parameters, name: value + sign * h}) for sign in (1, -1)]
-        slopes.append((ends[0] - ends[1]) / (2.0 * h))
-    change = extrapolated([slope.ravel() for slope in slopes])[0].reshape(size, size)
+    change_of, natural = _multiplier_change(gait)
+    value, (move, numbers) = parameter_value(gait, name), motion_of(gait, name)
+    swing = float(max(np.nanmax(np.abs(numbers), initial=0.0), np.max(np.abs(move), initial=0.0)))
+    h = BESIDE / swing if swing > 0.0 else gait.map.parameter_steps.get(name, BESIDE * (abs(value) or 1.0))
+    best, error, why = 0.0, np.inf, ""
+    for _ in range(TRIES):
+        slopes: list[float] = []
+        for level in range(LEVELS):
+            step = 2.0**level * h
+            ends = [_slope_beside(gait, sign * step * move, {**gait.parameters, name: value + sign * step})
+                    for sign in (1, -1)]  # fmt: skip
+            why = next((end for end in ends if isinstance(end, str)), "")
+            if why:
+                break
+            slopes.append(change_of((ends[0] - ends[1]) / (2.0 * step)))  # type: ignore[operator]
+        if not why:
+            found, doubt = (float(part[0]) for part in extrapolated([np.array([slope]) for slope in slopes]))
+            best, error = (found, doubt) if doubt < error else (best, error)
+            if error <= SURE * max(abs(best), natural * swing):
+                return best
+        h *= CLOSER
+    if not error <= DOUBTFUL * max(abs(best), natural * swing):
+        reason = f"beside the gait {why}" if not np.isfinite(error) else (
+            f"differences of the derivative of the map leave {error:.2g} of {best:.6g} open; the events of the walk "
+            "change too near beside it"
+        )  # fmt: skip
+        raise GaitError(f"no derivative of the largest multiplier by {name!r}: {reason}", gait)
+    return best
+
+
+def _multiplier_change(gait: Any) -> tuple[Callable[[Matrix], float], float]:
+    """What a change of P makes of the largest modulus, and that modulus."""
+    P = gait.map_derivative.matrix[: gait.chart.size]
     values, left, right = eig(P, left=True, right=True)
     k = int(np.argmin(np.abs(values - gait.stability_of.values[0])))
-    w, u = left[:, k], right[:, k]
-    by = (w.conj() @ change @ u) / (w.conj() @ u)
-    return float((values[k].conj() * by).real / abs(values[k]))
+    w, u, size = left[:, k], right[:, k], float(abs(values[k]))
+    rivals = [z for j, z in enumerate(values) if j != k and abs(z - values[k].conj()) > MEETING * size]
+    if abs(w.conj() @ u) < MEETING or any(abs(abs(z) - size) <= MEETING * size for z in rivals):
+        raise GaitError(
+            f"the largest multiplier has a derivative on one side only: two of modulus {size:.6g} meet here", gait
+        )
+
+    def change(of: Matrix) -> float:
+        by = (w.conj() @ of @ u) / (w.conj() @ u)
+        return float((values[k].conj() * by).real / size) if size else float(abs(by))
+
+    return change, size
 
 
-def _slope_beside(gait: Any, c: Vector, values: Mapping[str, float]) -> Matrix:
-    """P beside the gait: exact, or by differences where no pass knows a run's derivative."""
-    exact, size = exact_derivative(gait.map, gait.chart, c, values), gait.chart.size
-    if exact is not None:
-        return exact
-    found = map_derivative(gait.map, gait.chart, c, values)
-    if found.missing:
-        raise GaitError(f"no derivative of the multipliers: beside the gait {next(iter(found.missing.values()))}", gait)
-    return found.matrix[:size]
+def _slope_beside(gait: Any, c: Vector, values: Mapping[str, float]) -> Matrix | str:
+    """P beside the gait: exact, or by differences where no pass knows a run's derivative; or why there is none."""
+    map_, chart, size = gait.map, gait.chart, gait.chart.size
+    try:
+        there = measured(map_, chart, c, values)
+        if isinstance(there, Arrival):
+            return f"it {map_.against(chart.section, there)}"
+        if other := map_.other_events(gait.arrival, there.arrival):
+            return f"it {other}"
+        exact = exact_derivative(map_, chart, c, values)
+        if exact is not None:
+            return exact
+        found = map_derivative(map_, chart, c, values, base=there)
+    except SimulationError as error:
+        return str(error)
+    return f"it has no derivative: {next(iter(found.missing.values()))}" if found.missing else found.matrix[:size]

@@ -229,6 +229,8 @@ def find_gait(
                 hunt = _Hunt(
                     map_of(model, start, scheme, dt or FIRST, kind, given, functions, modulo, longest, backend), tol, dt
                 )
+                for other in points if ranges else ():
+                    hunt.map.require({**hunt.map.values, **_drawn(fixed, ranges, other)["parameters"]})
             tried.append(_tried(hunt, draw, start, names))
             if bar is not None:
                 bar(len(tried), len(points))

@@ -10,11 +10,12 @@ import numpy as np
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import GaitError, ModelError
+from mbd.gait.alike import require_alike
 from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.floquet import Multipliers
 from mbd.gait.heading import heading_of
-from mbd.gait.mirror import mirror_of, require_alike
+from mbd.gait.mirror import mirror_of
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, fallen_first, first_return, search, with_step
 from mbd.gait.section import Chart, section_of
@@ -123,7 +124,7 @@ def map_of(
     vector = plain.vector(values)
     if mirror is not None:
         own = {**getattr(model, "parameters", {}), **plain.plain(values)}
-        plain.mirror = require_alike(mechanism, mirror_of(mechanism.equations, mirror), vector, own, model)
+        plain.mirror = require_alike(mechanism, mirror_of(mechanism.equations, mirror, section), vector, own, model)
     plain.fixed = moving_on(mechanism, vector) if modulo is None else increments_named(mechanism, modulo)
     if modulo is None:
         own = {**getattr(model, "parameters", {}), **plain.plain(values)}

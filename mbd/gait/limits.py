@@ -97,6 +97,8 @@ def _lost_at(given: Continuation, last: BranchPoint, place: float) -> Arrival | 
     """What the walk comes to at a place along the tangent."""
     u = place * last.tangent
     values = given.with_value(last.value + given.width * float(u[-1]))
+    if given.map.faults(values):
+        return None
     try:
         return given.map(last.chart.at(u[:-1], given.map.vector(values)), values)
     except MbdError:

@@ -1,7 +1,9 @@
 """Derivatives of a return map by the start and by parameters.
 
 Central differences of runs with equal steps, of steps h, 2h, 4h, with two Richardson extrapolations (order 6); the
-entries of least estimated error are taken. Where a run beside the base does not arrive, h shrinks.
+entries of least estimated error are taken. Where a run beside the base does not arrive, or has other events, h shrinks.
+Of a parameter, whose unit may be any, h is such that the numbers of the map change by as much as they do for the
+differences of coordinates.
 """
 
 from __future__ import annotations
@@ -21,7 +23,12 @@ from mbd.gait.section import Chart
 __all__ = ["MapDerivative", "Measured", "extrapolated", "map_derivative", "measured", "numbers_of"]
 
 STATE_STEP, PARAMETER_STEP = 2e-4, 2e-3
-"""Least of the three differences of coordinates of the section [m, rad, 1/s of them], and of parameters over them."""
+"""Least of the three differences of coordinates of the section [m, rad, 1/s of them], and the first of parameters that
+is tried, over them or 1."""
+NEAR_ENOUGH, UNSEEN = 30.0, 1e-9
+"""Factor by which what a parameter changes may differ from `STATE_STEP`, and the share of it that is no change [-]."""
+LEAP, LEAPS, WIDEST = 1e5, 12, 1e15
+"""Factor by which its difference changes at most at once, how often, and how wide it gets, over it or 1 [-]."""
 COARSE_STEP = 1e-5
 """Difference where two runs a direction must do."""
 LEVELS = 3
@@ -102,14 +109,18 @@ def map_derivative(
     none = np.zeros(chart.size)
     columns += [_Column(none, name, scale * PARAMETER_STEP * (abs(values[name]) or 1.0)) for name in names]
     size = len(found.numbers)
-    for _ in range(TRIES):
+    for column in columns:
+        if column.name:
+            column.leaps, column.step = LEAPS, scale * map_.parameter_steps.get(column.name, column.step / scale)
+    for _ in range(TRIES + LEAPS):
         pending = [column for column in columns if not column.done]
         if not pending:
             break
         points = [point for column in pending for point in column.points((c, values), levels)]
-        beside = iter(_beside(map_, chart, points))
+        beside = iter(_beside(map_, chart, points, found))
         for column in pending:
-            column.take([next(beside) for _ in range(2 * levels)], size)
+            column.take([next(beside) for _ in range(2 * levels)], size, scale * STATE_STEP)
+    map_.parameter_steps |= {column.name: column.first / scale for column in columns if column.name and column.first}
     missing = {number: column.reason for number, column in enumerate(columns) if column.best is None}
     nothing = np.full(size, np.nan), np.full(size, np.nan)
     pairs = [nothing if column.best is None else column.best for column in columns]
@@ -119,7 +130,10 @@ def map_derivative(
 
 @dataclass(eq=False)
 class _Column:
-    """The search for the derivative along one direction: its differences h, 2h, 4h and what they came to."""
+    """The search for the derivative along one direction: its differences h, 2h, 4h and what they came to.
+
+    tries, leaps : that are left; first : h whose effect was as wanted; bound : h from which on runs have other events
+    """
 
     move: Vector
     name: str
@@ -127,6 +141,10 @@ class _Column:
     best: tuple[Vector, Vector] | None = None
     done: bool = False
     reason: str = ""
+    tries: int = TRIES
+    leaps: int = 0
+    first: float = 0.0
+    bound: float = np.inf
 
     def points(self, base: tuple[Vector, Values], levels: int) -> list[tuple[Vector, Values]]:
         """Where the map is asked for: ahead and behind at each distance."""
@@ -136,14 +154,20 @@ class _Column:
             return [(c, {**values, self.name: values[self.name] + h}) for h in ends]
         return [(c + h * self.move, values) for h in ends]
 
-    def take(self, beside: Sequence[Vector | str], size: int) -> None:
-        """What the map gave there, of which derivatives follow unless a run did not arrive: then h shrinks."""
+    def take(self, beside: Sequence[Vector | str], size: int, wanted: float) -> None:
+        """What the map gave there, of which derivatives follow unless a run did not arrive: then h shrinks.
+
+        wanted : change of the numbers of the map by h, where it may be chosen
+        """
         bad = next((each for each in beside if isinstance(each, str) or len(each) != size), None)
         if bad is not None:
             self.reason = f"beside the base it {bad if isinstance(bad, str) else 'has other steps'}"
-            self.done = self.best is not None
-            self.step *= SHRINK
+            self.bound, self.step = self.step, self.step * SHRINK
+            self._tried(self.best is not None)
             return
+        if self.leaps and self._leaps(0.5 * float(np.max(np.abs(np.subtract(*beside[:2])), initial=0.0)), wanted):
+            return
+        self.leaps, self.first = 0, self.first or self.step
         pairs = zip(beside[::2], beside[1::2], strict=True)
         slopes = [(ahead - behind) / (2.0**level * 2.0 * self.step)  # type: ignore[operator]
                   for level, (ahead, behind) in enumerate(pairs)]  # fmt: skip
@@ -156,12 +180,32 @@ class _Column:
             good = bool(np.all(found[1] <= ENOUGH * limits))
         else:
             good = not bool(np.any(found[1] > POOR * limits))
-        self.best, self.done = found, len(slopes) == 1 or good
+        self.best = found
         self.step *= CLOSER
+        self._tried(len(slopes) == 1 or good)
+
+    def _tried(self, good: bool) -> None:
+        """One try less, but for those by which the size of a parameter's difference is found."""
+        if self.leaps and not good:
+            self.leaps -= 1
+            return
+        self.tries -= 1
+        self.done = good or self.tries <= 0
+
+    def _leaps(self, change: float, wanted: float) -> bool:
+        """Whether h is to change first, since its effect is much larger or smaller than wanted."""
+        factor = LEAP if change <= UNSEEN * wanted else min(max(wanted / change, 1.0 / LEAP), LEAP)
+        step = min(self.step * factor, SHRINK * self.bound)
+        if 1.0 / NEAR_ENOUGH <= step / self.step <= NEAR_ENOUGH or step > WIDEST:
+            return False
+        self.step, self.leaps = step, self.leaps - 1
+        return True
 
 
-def _beside(map_: ReturnMap, chart: Chart, points: Sequence[tuple[Vector, Values]]) -> list[Vector | str]:
-    """The numbers of the map at points beside its base; why it does not arrive."""
+def _beside(
+    map_: ReturnMap, chart: Chart, points: Sequence[tuple[Vector, Values]], base: Measured
+) -> list[Vector | str]:  # fmt: skip
+    """The numbers of the map at points beside its base; why it does not arrive, or that other events happen."""
     starts: list[Any] = []
     for c, values in points:
         try:
@@ -175,7 +219,7 @@ def _beside(map_: ReturnMap, chart: Chart, points: Sequence[tuple[Vector, Values
         if isinstance(each, str)
         else str(map_.against(chart.section, each))
         if isinstance(each, Arrival)
-        else each.numbers
+        else map_.other_events(base.arrival, each.arrival) or each.numbers
         for each in results
     ]
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -14,7 +15,8 @@ from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import ScalarFunction, scalar_function
-from mbd.errors import MbdError
+from mbd.errors import MbdError, ModelError
+from mbd.gait.alike import moves_sides_alike, sides_faults
 from mbd.gait.heading import Heading
 from mbd.gait.mirror import Mirror
 from mbd.gait.outcome import Outcome, fall_of
@@ -106,14 +108,20 @@ class ReturnMap:
 
     def __post_init__(self) -> None:
         self._last: tuple[Values, Vector] | None = None
+        self._allowed: dict[str, float] | None = None
+        self._of_both_sides: set[tuple[str, float]] = set()
         plain = self.plain(self.values)
         self.mechanism: Mechanism = mechanism_of(self.model, self.backend, plain)
         self.folded = getattr(self.model, "parameters", {})
+        self._check = self.model.parameter_check()
         self.manager = manager_of(self.mechanism, self.vector(self.values))
         places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
         self.penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
         places = {name: place or self._center(name) for name, place in places.items()}
         self.feet = {name: place for name, place in places.items() if place}
+        self.inert = {g.name for g in self.mechanism.equations.guards if g.reset is None and not g.terminal}
+        self.parameter_steps: dict[str, float] = {}
+        """Differences of parameters whose effect was seen, by name, with which later derivatives begin."""
         self._repeated: dict[tuple[float, float] | None, RepeatedRun] = {}
 
     def _center(self, contact: str) -> str:
@@ -155,6 +163,49 @@ class ReturnMap:
         if last is None or last[0] != values:
             last = self._last = dict(values), self.mechanism.parameters(self.plain(values), self.folded)
         return last[1]
+
+    def faults(self, values: Values) -> list[str]:
+        """Why no walk of the map has these values of parameters, one sentence each.
+
+        Words of the model do not allow them, or they are not those of a walker with equal sides that a mirror needs.
+        """
+        if self._allowed is not None and self._allowed == values:
+            return []
+        plain = self.plain(values)
+        found: list[str] = self._check.faults(plain)
+        if not found and self.mirror is not None:
+            own = {**self.folded, **plain}
+            found = sides_faults(self.mechanism, self.mirror, self.vector(values), own)
+        self._allowed = None if found else dict(values)
+        return found
+
+    def require(self, values: Values) -> None:
+        """Raise a `ModelError` with the `faults` of values of parameters, if there are any."""
+        if faults := self.faults(values):
+            raise ModelError(faults)
+
+    def require_free(self, names: Iterable[str], values: Values) -> None:
+        """Raise a `ModelError` for parameters that a function among the values gives, so that their own say nothing."""
+        given = {each: name for name, f in self.functions.items() if name in values for each in f(float(values[name]))}
+        if faults := [f"{name!r} is given by the function {given[name]!r}; change that" for name in names
+                      if name in given]:  # fmt: skip
+            raise ModelError(faults)
+
+    def require_both_sides(self, name: str, value: float, values: Values) -> None:
+        """Raise a `ModelError` where a parameter of one side is to change and a mirror takes both sides as equal."""
+        if self.mirror is None or (name, value) in self._of_both_sides:
+            return
+
+        def vector(at: float) -> Vector:
+            return self.vector({**values, name: at})
+
+        if not moves_sides_alike(self.mechanism, self.mirror, vector, value):
+            raise ModelError(
+                f"mirror={self.mirror.sides}: {name!r} changes the two sides differently, so that beside its value a "
+                "step of one side does not repeat on the other; find the gait over a stride, with mirror=None, or "
+                "change both sides together by functions={…} of one value"
+            )
+        self._of_both_sides.add((name, value))
 
     # runs ---------------------------------------------------------------------------------------------------------
     def with_step(self, dt: float, longest: float | None = None) -> ReturnMap:
@@ -302,6 +353,15 @@ class ReturnMap:
             return fall_of(run, next((name for name in self.feet if name in state.mode.closed), ""))
         except MbdError:
             return None
+
+    def other_events(self, one: Arrival, other: Arrival) -> str:
+        """What the events of another walk have more or less that changes its motion, in words; '' where nothing."""
+        before, after = (Counter(e for e in each.events if e[0] not in self.inert) for each in (one, other))
+        more, less = sorted((after - before).elements()), sorted((before - after).elements())
+        if not more and not less:
+            return ""
+        (name, kind), word = (more[0], "has the event") if more else (less[0], "lacks the event")
+        return f"{word} {name!r} {kind}"
 
     def against(self, section: Section, arrival: Arrival) -> Outcome:
         """The outcome, where other contacts are closed than on the section a name for that."""

@@ -15,9 +15,10 @@ from mbd.joints.quaternions import quaternion_product
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import refused
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Tape
+from mbd.tape.sympy import lower
 
-__all__ = ["after_reset"]
+__all__ = ["after_reset", "reset_expressions"]
 
 
 class Named(Mapping[str, Node]):
@@ -28,6 +29,8 @@ class Named(Mapping[str, Node]):
         self._places = {parameter.name: k for k, parameter in enumerate(equations.parameters)}
 
     def __getitem__(self, name: str) -> Node:
+        if name.endswith("_rate") and name not in self._places and name not in self._equations.output_names():
+            name = f"{name.removesuffix('_rate')}.rate"  # as symbols of energies are called
         if name in self._places and name not in self._equations.output_names():
             return self._equations.tape.input("p", self._places[name])
         return self._equations.output(name)
@@ -50,7 +53,7 @@ def after_reset(
         for a reset that is not a function of traced values.
     """
     equations, guard = programs.equations, programs.equations.guards[e]
-    values = _expressions(equations, guard.reset, guard.name)
+    values = reset_expressions(equations, guard.reset, guard.name)
     names, nodes = list(values), list(values.values())
     lines = programs.derivatives_of(f"reset {e}", nodes, motion.at(mode, rates.rate, rates.lam))
     found = lines @ motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
@@ -87,17 +90,28 @@ def _turn(equations: Equations, turned: Mapping[int, Vector], at: Vector, q: Mat
         ]
 
 
-def _expressions(equations: Equations, reset: Any, name: str) -> dict[str, Node]:
-    """What a reset sets, as expressions of the state before it."""
+def reset_expressions(equations: Equations, reset: Any, name: str) -> dict[str, Node]:
+    """What a reset sets, as expressions of the state before it, from a function or from sympy expressions.
+
+    Raises
+    ------
+    CapabilityError
+        for a reset that is not a function of traced values.
+    """
     named, tape = Named(equations), equations.tape
     try:
         with tape.lock:
             wanted = reset(named) if callable(reset) else reset
             values: Sequence[tuple[str, Any]] = list(wanted.items())
-            if any(is_expression(value) for _, value in values):
-                raise refused(f"the reset of {name!r} is given by sympy expressions", "give a function of named values")
-            return {each: tape.lift(value(named) if callable(value) else value) for each, value in values}
+            return {each: _node(named, tape, value) for each, value in values}
     except (TypeError, ValueError, AttributeError, MbdError) as error:
         raise refused(
             f"the reset of {name!r} cannot be differentiated: {error}", "write it with mbd.sin, mbd.where and operators"
         ) from error
+
+
+def _node(named: Named, tape: Tape, value: Any) -> Node:
+    """One value that a reset sets: a number, a function of named quantities, or a sympy expression of them."""
+    if is_expression(value):
+        return lower(value, {symbol: named[str(symbol)] for symbol in value.free_symbols}, tape)
+    return tape.lift(value(named) if callable(value) else value)

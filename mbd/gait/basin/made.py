@@ -104,6 +104,8 @@ class Made:
         Sets are taken by their distance from the parameters of the gaits, so that the order of starts changes nothing.
         """
         first, kinds = next(iter(self.gaits.values())), self._all_kinds()
+        for values in kinds:
+            self.map.require(values)
         table = np.array([[values[name] for name in values] for values in kinds])
         sizes = np.maximum(np.ptp(table, axis=0), 1e-300)
         own = {**getattr(self.map.model, "parameters", {}), **first.parameters}

@@ -1,0 +1,258 @@
+"""Whether the two sides of a walker are alike, and whether a parameter keeps them so.
+
+A mirrored step repeats on the other side where the mechanism is its own mirror image: inertia, forces, rows, what
+contacts store as they close, gaps, conditions, limits of friction, restitutions, events and resets at some states are
+those of the mirrored states on the other side. A parameter keeps both sides alike where they are alike beside its value
+too. One comparison decides both, wherever parameters enter a mirrored gait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.equations.equations import Equations, Guard
+from mbd.errors import MbdError, ModelError
+from mbd.gait.mirror import Mirror
+from mbd.gait.reflection import reflections
+from mbd.joints.reflected import exchanged
+from mbd.sensitivity.resets import reset_expressions
+
+__all__ = ["moves_sides_alike", "require_alike", "sides_faults"]
+
+POSES = 2
+"""States at which a mechanism is compared with its mirror image [-]."""
+ALIKE = 1e-9
+"""Difference, relative to the largest of its kind, below which two sides are alike [-]."""
+EFFECT = 1e-6
+"""Change relative to the largest of its kind from which on a parameter is seen to change something [-]."""
+SHARE = 1e-2
+"""Share of that change that two sides may differ by after it [-]."""
+WIDEST, GROWTH = 1e12, 30.0
+"""Change of a parameter, over its value or 1, up to which an effect is looked for, and the factor of the next [-]."""
+
+Pairs = list[tuple[Vector, Vector]]
+"""Numbers of mirrored states, exchanged, and those of their images."""
+
+
+def require_alike(
+    mechanism: Mechanism, mirror: Mirror, parameters: Vector, values: dict[str, float], model: Any = None
+) -> Mirror:
+    """The mirror with its reflection, if the walker moves in space.
+
+    Raises
+    ------
+    ModelError
+        where the mirror image of the mechanism is another mechanism; it tells parameters that differ by name.
+    """
+    choices = [replace(mirror, reflection=each) for each in reflections(model, mechanism, mirror, parameters)]
+    different = np.inf
+    for choice in choices or [mirror]:
+        found = _difference(mechanism, choice, parameters)
+        if found <= ALIKE:
+            return choice
+        different = min(different, found)
+    raise ModelError(_sentence(mechanism, mirror, values, different))
+
+
+def sides_faults(mechanism: Mechanism, mirror: Mirror, parameters: Vector, values: Mapping[str, float]) -> list[str]:
+    """One sentence where the sides are not alike with these values of parameters; none where they are."""
+    found = _difference(mechanism, mirror, parameters)
+    return [] if found <= ALIKE else [_sentence(mechanism, mirror, values, found)]
+
+
+def moves_sides_alike(
+    mechanism: Mechanism, mirror: Mirror, vector: Callable[[float], Vector], value: float
+) -> bool:  # fmt: skip
+    """Whether the sides change alike as a parameter does, so that they stay each other's image.
+
+    The change of the parameter grows until it changes something of the mechanism; a parameter that changes nothing
+    keeps both sides alike.
+
+    Parameters
+    ----------
+    vector : parameter vector at a value of it; value : its own
+    """
+    base, h = _pairs(mechanism, mirror, vector(value)), EFFECT * (abs(value) or 1.0)
+    while h <= WIDEST * max(abs(value), 1.0):
+        beside = _pairs(mechanism, mirror, vector(value + h))
+        effect = apart = 0.0
+        for (mine, its), (mine_there, its_there) in zip(base, beside, strict=True):
+            size = _size(mine)
+            effect = max(effect, _largest(mine_there - mine) / size, _largest(its_there - its) / size)
+            apart = max(apart, _largest((mine_there - its_there) - (mine - its)) / size)
+        if effect > EFFECT:
+            return apart <= SHARE * effect
+        h *= GROWTH
+    return True
+
+
+def _sentence(mechanism: Mechanism, mirror: Mirror, values: Mapping[str, float], different: float) -> str:
+    """That the mirror image is another mechanism, and which parameters or contacts make it so."""
+    pairs = [(name, exchanged(name, mirror.sides)) for name in values]
+    unlike = [
+        f"{name!r} is {values[name]:g}, {other!r} {values[other]:g}"
+        for name, other in pairs
+        if other in values and name < other and values[name] != values[other]
+    ]
+    contacts = {contact.name: contact for contact in mechanism.equations.contacts}
+    for name, contact in contacts.items():
+        partner = contacts[mirror.name(name)]
+        if name < partner.name and contact.restitution != partner.restitution:
+            unlike.append(
+                f"the restitution of {name!r} is {contact.restitution:g}, of {partner.name!r} {partner.restitution:g}"
+            )
+    why = f": {'; '.join(unlike[:4])}" if unlike else f"; they differ by {different:.2g} of the largest"
+    return (
+        f"mirror={mirror.sides}: the mechanism with its sides exchanged is another one{why}; "
+        "a step of one side does not repeat on the other: take mirror=None, whose strides have a step of each side"
+    )
+
+
+def _difference(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> float:
+    """The largest difference of mirrored motions, relative to the largest of its kind."""
+    contacts = {contact.name: contact for contact in mechanism.equations.contacts}
+    if any(contact.restitution != contacts[mirror.name(name)].restitution for name, contact in contacts.items()):
+        return np.inf
+    pairs = _pairs(mechanism, mirror, parameters)
+    return max((_largest(mine - its) / _size(mine) for mine, its in pairs), default=0.0)
+
+
+def _size(numbers: Vector) -> float:
+    return _largest(numbers) or 1.0
+
+
+def _largest(numbers: Vector) -> float:
+    """The largest modulus; what is no number on both sides counts as none."""
+    return float(np.nanmax(np.abs(numbers))) if np.any(np.isfinite(numbers)) else 0.0
+
+
+def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
+    """What is compared, at some states with their mirror images."""
+    layout, random = mechanism.layout, np.random.default_rng(3)
+    configuration, found = mechanism.equations.configuration, list[tuple[Vector, Vector]]()
+    acting = [e for e, guard in enumerate(mechanism.equations.guards)
+              if guard.terminal or guard.reset is not None or guard.name == mirror.section]  # fmt: skip
+    order = np.concatenate([mirror.v, layout.n_v + mirror.z]).astype(np.intp)
+    signs = np.ones(layout.n)
+    if mirror.reflection is not None:
+        signs[: layout.n_v] = mirror.reflection.v
+    for _ in range(POSES):
+        q, y = (
+            np.array(configuration.defaults) + random.uniform(-0.4, 0.4, layout.n_q),
+            random.uniform(-1, 1, layout.n),
+        )
+        q = configuration.normalise(q)
+        image_q = mirror.of_q(q)
+        image_y = np.concatenate([mirror.of_v(y[: layout.n_v]), y[layout.n_v :][mirror.z]])
+        here, there = (_numbers(mechanism, parameters, *at) for at in ((q, y), (image_q, image_y)))
+        for mine, its in zip(here["matrices"], there["matrices"], strict=True):
+            found.append((np.ravel(mine[np.ix_(order, order)] * np.outer(signs, signs)), np.ravel(its)))
+        for mine, its in zip(here["vectors"], there["vectors"], strict=True):
+            found.append((mine[order] * signs, its))
+        places = _watched_places(mechanism.equations, mirror)
+        watched = [
+            (mine[place], its) for place, mine, its in zip(places, here["watched"], there["watched"], strict=True)
+        ]
+        watched[4:6] = [(mine[acting], its[acting]) for mine, its in watched[4:6]]
+        found += watched
+        found += _resets(mechanism, mirror, parameters, (q, y), (image_q, image_y))
+    return found
+
+
+def _numbers(mechanism: Mechanism, parameters: Vector, q: Vector, y: Vector) -> dict[str, list[Any]]:
+    """What a state tells of a mechanism; of rows what depends neither on their order nor on their signs."""
+    layout, equations = mechanism.layout, mechanism.equations
+    anchors, lam = np.zeros(layout.n_anchors), -np.ones(layout.n_rows)
+    terms = mechanism.acceleration_terms(0.0, q, y, parameters, anchors, lam=lam)
+    guards = np.zeros(max(mechanism.sizes["guards"], 1))
+    mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, guards)
+    n_c, n_g = len(equations.contacts), len(equations.guards)
+    parts = np.split(guards[: 4 * n_c + 2 * n_g], np.cumsum([n_c, n_c, n_c, n_c, n_g]))
+    both = [guard.direction == 0 for guard in equations.guards]  # the sign of their values tells nothing
+    parts[4:] = [np.where(both, np.abs(part), part) for part in parts[4:]]
+    return {
+        "matrices": [terms.M, terms.B.T @ terms.B, terms.R @ terms.R.T],
+        "vectors": [terms.f, terms.B.T @ terms.rate, terms.B.T @ terms.bias, terms.B.T @ terms.h],
+        "watched": [*parts, terms.limits],
+    }  # fmt: skip
+
+
+def _watched_places(equations: Equations, mirror: Mirror) -> list[NDArray[np.intp]]:
+    """From which places the image takes what is watched: four of contacts, two of events, limits of frictions."""
+    names = [contact.name for contact in equations.contacts]
+    contacts = np.array([names.index(mirror.name(name)) for name in names], dtype=np.intp)
+    events = [guard.name for guard in equations.guards]
+    partners = np.array([events.index(mirror.name(name)) if mirror.name(name) in events else e
+                         for e, name in enumerate(events)], dtype=np.intp)  # fmt: skip
+    frictions: dict[str, list[int]] = {}
+    for f, friction in enumerate(equations.frictions):
+        frictions.setdefault(friction.name, []).append(f)
+    limits = np.arange(len(equations.frictions))
+    for name, places in frictions.items():
+        others = frictions.get(mirror.name(name), [])
+        if len(others) == len(places):
+            limits[places] = others
+    return [*[contacts] * 4, *[partners] * 2, limits]
+
+
+def _resets(
+    mechanism: Mechanism, mirror: Mirror, parameters: Vector, at: tuple[Vector, Vector], image: tuple[Vector, Vector]
+) -> Pairs:
+    """The states after the resets of all events, of a state and of its image, as far as resets can be recorded."""
+    guards = {guard.name: guard for guard in mechanism.equations.guards if guard.reset is not None}
+    found: Pairs = []
+    for name, guard in guards.items():
+        mine, its = (_after(mechanism, each, parameters, *state)
+                     for each, state in ((guard, at), (guards.get(mirror.name(name), guard), image)))  # fmt: skip
+        if mine is not None and its is not None:
+            n_v, (q, y) = mechanism.layout.n_v, mine
+            found += [(mirror.of_q(q), its[0]), (mirror.of_v(y[:n_v]), its[1][:n_v]), (y[n_v:][mirror.z], its[1][n_v:])]
+    return found
+
+
+def _after(
+    mechanism: Mechanism, guard: Guard, parameters: Vector, q: Vector, y: Vector
+) -> tuple[Vector, Vector] | None:  # fmt: skip
+    """(q, y) after the reset of an event; None where it cannot be recorded."""
+    equations, memory = mechanism.equations, mechanism.equations.memory
+    key = f"mirrored reset of {guard.name}"
+    if key not in memory:
+        memory[key] = _recorded(mechanism, guard)
+    known: tuple[list[int], ScalarFunction] | None = memory[key]
+    if known is None:
+        return None
+    places, function = known
+    out, after = np.zeros(len(places)), np.concatenate([q, y])
+    function(mechanism.block(0.0, q, y, np.zeros(mechanism.layout.n_anchors)), parameters, out)
+    after[places] = out
+    return after[: equations.n_q], after[equations.n_q :]
+
+
+def _recorded(mechanism: Mechanism, guard: Guard) -> tuple[list[int], ScalarFunction] | None:
+    """Where in (q, y) an event sets values, and the program of these."""
+    equations = mechanism.equations
+    try:
+        values = reset_expressions(equations, guard.reset, guard.name)
+        places = [_place(equations, name) for name in values]
+        with equations.tape.lock:
+            return places, scalar_function(list(values.values()), mechanism.layout, "reset")
+    except MbdError:
+        return None
+
+
+def _place(equations: Equations, name: str) -> int:
+    """Where a coordinate, rate or state stands in (q, v, z), by every spelling that a reset may use."""
+    n_q, n_v = equations.n_q, equations.n_v
+    rates = rate_names(equations)
+    known = {each: n_q + k for each, k in rates.items()}
+    known |= {f"{each.removesuffix('.rate')}_rate": n_q + k for each, k in rates.items()}
+    known |= {state.name: n_q + n_v + k for k, state in enumerate(equations.states)}
+    return {**known, **{each.name: k for k, each in enumerate(equations.coordinates)}}[name]
