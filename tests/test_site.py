@@ -48,7 +48,7 @@ def test_figures_of_the_readme_are_those_of_the_page_of_peers():
 
 def test_the_readme_fits_a_screen_and_sets_everything_up_in_two_commands():
     block = re.search(r"```python\n(.*?)```", README, re.DOTALL)
-    assert block is not None and len([line for line in block[1].splitlines()[1:] if line]) == 8
+    assert block is not None and len([line for line in block[1].splitlines() if line]) == 10
     commands = [line for line in README.splitlines() if line.startswith("python -m pip install")]
     assert len(commands) == 2 and commands[1].startswith("python -m pip install -e ")
     name = commands[0].split()[-1]

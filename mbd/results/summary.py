@@ -60,7 +60,7 @@ def cost(run: Trajectory) -> str:
     words = [f"{stats[key]} {word}{'s' * (stats[key] != 1)}" for key, word in COUNTS.items() if stats.get(key)]
     seconds = [f"{stats['wall_seconds']:.3g} s"] if "wall_seconds" in stats else []
     before = stats.get("derive_and_compile_seconds")
-    seconds += [f"{before:.3g} s before to derive and compile the model"] if before and before >= 5e-4 else []
+    seconds += [f"{before:.2g} s to derive and compile before it"] if before and before >= 5e-4 else []
     return "; ".join(part for part in (", ".join(words), ", ".join(seconds)) if part)
 
 
