@@ -44,22 +44,22 @@ class Summary(Text):
 def summary(run: Trajectory) -> Summary:
     """The lines of `Trajectory.summary`."""
     lines = [f"{run.name}: {'' if run.success else 'failed: '}{run.message or 'no message'}"]
-    told = [("run", _made(run)), ("ending", "; ".join(ending(run)))]
+    pairs = [("run", _made(run)), ("ending", "; ".join(ending(run)))]
     counts = Counter(f"{event.name} {event.kind}" for event in run.events)
     listed = ", ".join(f"{count} × {what}" for what, count in counts.most_common(6))
     more = f", … ({len(counts)} sorts)" if len(counts) > 6 else ""
-    told.append(("events", f"{len(run.record.events)}: {listed}{more}" if counts else "none"))
+    pairs.append(("events", f"{len(run.record.events)}: {listed}{more}" if counts else "none"))
     if len(run):
         energy = run.energy
         swing = of_the_swing(energy)
         text = f"changed by {energy.change:.4g} J, of which numerical {energy.numerical[-1]:.2g} J"
-        told.append(("energy", f"{text}, {swing}" if swing else text))
-        told.append(("constraints", str(run.violation)))
-    told.append(("cost", cost(run) or "not stored"))
+        pairs.append(("energy", f"{text}, {swing}" if swing else text))
+        pairs.append(("constraints", str(run.violation)))
+    pairs.append(("cost", cost(run) or "not stored"))
     notes = run.stats.get("notes", ())
     if notes:
-        told.append(("notes", f"{len(notes)}, in run.stats['notes']; the first: {notes[0]}"))
-    return Summary("\n".join([*lines, *entries(told)]))
+        pairs.append(("notes", f"{len(notes)}, in run.stats['notes']; the first: {notes[0]}"))
+    return Summary("\n".join([*lines, *entries(pairs)]))
 
 
 def ending(run: Trajectory) -> list[str]:

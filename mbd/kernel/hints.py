@@ -58,12 +58,12 @@ def instead(node: ast.AST) -> str:
 
 def statement(node: ast.stmt) -> str:
     """The sentence about a statement that the kernel may not use."""
-    return f"expected {STATEMENTS}, came {first_line(node)!r}{instead(node)}"
+    return f"expected {STATEMENTS}, got {first_line(node)!r}{instead(node)}"
 
 
 def expected(what: str, node: ast.AST) -> str:
     """The sentence about an expression that the kernel may not use."""
-    return f"expected {what}, came {ast.unparse(node)!r}{instead(node)}"
+    return f"expected {what}, got {ast.unparse(node)!r}{instead(node)}"
 
 
 def first_line(node: ast.AST) -> str:
@@ -74,7 +74,7 @@ def first_line(node: ast.AST) -> str:
 def called(name: str, arguments: Iterable[str], given: int) -> str:
     """The sentence about a wrong number of arguments."""
     names = list(arguments)
-    return f"expected {name}({', '.join(names)}), came {given} argument{'s' * (given != 1)}"
+    return f"expected {name}({', '.join(names)}), got {given} argument{'s' * (given != 1)}"
 
 
 def no_function(name: str, known: Iterable[str]) -> str:
@@ -86,14 +86,14 @@ def no_function(name: str, known: Iterable[str]) -> str:
 def no_value(name: str, locals_: Iterable[str], module: Iterable[str]) -> str:
     """The sentence about a name without a value."""
     if name in module:
-        return f"expected a number, came {name!r} of the module; try capitals, {name.upper()}, for a constant"
+        return f"expected a number, got {name!r} of the module; try capitals, {name.upper()}, for a constant"
     return nearest(name, locals_, "value", "There are") + "; a constant of the module is written in capitals"
 
 
 def unknown_field(code: str, field: str, kind: str, fields: Iterable[str]) -> str:
     """The sentence about an attribute that is no field of the kernel's record."""
     if kind != "kernel":
-        return f"expected a field of a record, came {code!r} of {kind_of(kind)}; lengths are K.n, K.n_v, K.n_rows, …"
+        return f"expected a field of a record, got {code!r} of {kind_of(kind)}; lengths are K.n, K.n_v, K.n_rows, …"
     return f"{code!r}: {nearest(field, fields, 'field of the kernel', 'There are')}; see mbd/kernel/records"
 
 

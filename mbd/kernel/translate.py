@@ -196,14 +196,14 @@ class _Body:
         call = node.iter
         plain = isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"
         if not plain or node.orelse:
-            raise CapabilityError(f"expected a loop over range(…), came one over {ast.unparse(node.iter)!r}")
+            raise CapabilityError(f"expected a loop over range(…), got one over {ast.unparse(node.iter)!r}")
         assert isinstance(call, ast.Call)
         bounds = [self.value(bound) for bound in call.args]
         first, last = (tree.Number(0, "int"), bounds[0]) if len(bounds) == 1 else (bounds[0], bounds[1])
         try:
             step = int(ast.literal_eval(call.args[2])) if len(bounds) == 3 else 1
         except ValueError:
-            raise CapabilityError(f"expected a number as the step of a range, came {ast.unparse(call)!r}") from None
+            raise CapabilityError(f"expected a number as the step of a range, got {ast.unparse(call)!r}") from None
         target = self.target(node.target, "int")
         if not isinstance(target, tree.Local):
             raise CapabilityError(hints.expected("a name that counts the loop", node.target))
@@ -254,7 +254,7 @@ class _Body:
             if node.attr not in TABLE.places:
                 code, kind = ast.unparse(node), self.value(node.value).kind
                 if node.attr in TABLE.kinds:
-                    raise CapabilityError(f"expected an array or a field in one to write to, came {code!r}, a setting")
+                    raise CapabilityError(f"expected an array or a field in one to write to, got {code!r}, a setting")
                 raise CapabilityError(hints.unknown_field(code, node.attr, kind, FIELDS))
             array, index = TABLE.places[node.attr]
             node = ast.Subscript(ast.Attribute(node.value, array, ast.Load()), ast.Constant(index), ast.Load())
@@ -262,7 +262,7 @@ class _Body:
             raise CapabilityError(hints.expected("an element of an array", node))
         base = self.value(node.value)
         if base.kind not in ("ints", "reals"):
-            raise CapabilityError(f"expected an array, came {ast.unparse(node.value)!r}, {hints.kind_of(base.kind)}")
+            raise CapabilityError(f"expected an array, got {ast.unparse(node.value)!r}, {hints.kind_of(base.kind)}")
         own = base.kind[:-1]
         return tree.Element(base, self.value(node.slice), own, base.name if isinstance(base, tree.Field) else own)
 
@@ -280,7 +280,7 @@ class _Body:
         kind = "real" if sign == "/" else tree.joined(tree.joined(left.kind, right.kind), "int")
         if not sign or (sign == "//" and kind != "int"):
             came = f"{type(operator).__name__} of {hints.kind_of(kind)}"
-            raise CapabilityError(f"expected + − * / ** of numbers, // and % of ints, came {came}")
+            raise CapabilityError(f"expected + − * / ** of numbers, // and % of ints, got {came}")
         return tree.Operation(sign, left, right, kind)
 
     def _UnaryOp(self, node: ast.UnaryOp) -> tree.Expression:
@@ -299,7 +299,7 @@ class _Body:
             kind = tree.joined(last.kind, right.kind)
             if not sign or kind not in ("bool", "int", "real"):
                 raise CapabilityError(
-                    f"expected < <= > >= == != of numbers, came {type(operator).__name__} of {hints.kind_of(kind)}"
+                    f"expected < <= > >= == != of numbers, got {type(operator).__name__} of {hints.kind_of(kind)}"
                 )
             rest.append((sign, right))
             last = right
@@ -322,7 +322,7 @@ class _Body:
                 function, source = ast.Name(function.attr, ast.Load()), source_of(module.__name__)
         if not isinstance(function, ast.Name) or node.keywords:
             raise CapabilityError(
-                f"expected a function of a module with its arguments by position, came {ast.unparse(node)!r}"
+                f"expected a function of a module with its arguments by position, got {ast.unparse(node)!r}"
             )
         name = function.id
         values = tuple(self.value(argument) for argument in node.args)
@@ -351,21 +351,21 @@ def _converts(kind: str, needed: str) -> None:
     """Whether a value of one kind may stand where another is needed."""
     numbers = ("bool", "int", "real")
     if kind != needed and (kind not in numbers or needed not in numbers):
-        raise CapabilityError(f"expected {hints.kind_of(needed)}, came {hints.kind_of(kind)}")
+        raise CapabilityError(f"expected {hints.kind_of(needed)}, got {hints.kind_of(kind)}")
 
 
 def _number(value: object) -> tree.Number:
     for kind, name in ((bool, "bool"), (int, "int"), (float, "real")):
         if isinstance(value, kind):
             return tree.Number(value, name)
-    raise CapabilityError(f"expected a number, came {value!r}")
+    raise CapabilityError(f"expected a number, got {value!r}")
 
 
 def _power(left: tree.Expression, right: tree.Expression) -> tree.Operation:
     if left == tree.Number(2, "int") and right.kind == "int":
         return tree.Operation("<<", tree.Number(1, "int"), right, "int")
     if "real" not in (left.kind, right.kind):
-        raise CapabilityError("expected a power of a float, or of 2, came one of ints; try float(…)")
+        raise CapabilityError("expected a power of a float, or of 2, got one of ints; try float(…)")
     if right == tree.Number(0.5, "real"):
         raise CapabilityError("x ** 0.5 is a root or a power by the level of optimization; try sqrt(x)")
     return tree.Operation("**", left, right, "real")

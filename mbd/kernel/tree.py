@@ -31,7 +31,7 @@ def joined(*kinds: str) -> str:
         return kinds[0]
     if set(kinds) <= set(NUMBERS):
         return max(kinds, key=NUMBERS.index)
-    raise CapabilityError(f"expected one kind of value, came {kind_of(kinds[0])} and {kind_of(kinds[1])}")
+    raise CapabilityError(f"expected one kind of value, got {kind_of(kinds[0])} and {kind_of(kinds[1])}")
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def test_schemes_show_the_orders_they_promise(found):
 
 def test_text_tables_and_page_say_the_same(found, tmp_path):
     text = repr(found)
-    assert "Dormand–Prince" in text and "HHT(alpha=0.05)" in text and "For an error of 0.001 take" in text
+    assert "Dormand–Prince" in text and "HHT(alpha=0.05)" in text and "For an error of 1e-3 use" in text
     frame = found.to_dataframe()
     assert len(frame) == 9 and frame["error"].max() == max(point.error for point in found.points)
     with found.to_csv(tmp_path / "table.csv").open(encoding="utf-8") as file:
@@ -290,9 +290,9 @@ def test_a_run_that_ends_without_its_energy_is_judged_by_known_values_but_not_by
     model, start = chain(1e5)
     known = {"end": mbd.Known(0.03, of=lambda run: run.time[-1])}
     judged = mbd.accuracy(model, start, 0.03, integrators=[mbd.Newmark()], dts=[1e-2], known=known).points[0]
-    assert judged.at_most < 1e-12 and not judged.failure and "the energy is not the mechanism's" in judged.note
+    assert judged.at_most < 1e-12 and not judged.failure and "numerical energy gain" in judged.note
     compared = mbd.accuracy(model, start, 0.03, integrators=[mbd.Newmark()], dts=[1e-2]).points[0]
-    assert "the energy is not the mechanism's" in compared.failure
+    assert "numerical energy gain" in compared.failure
 
 
 def test_errors_above_a_tenth_are_told_where_no_others_are():
@@ -364,7 +364,7 @@ def test_a_tolerance_out_of_reach_fails_with_the_best_that_was_reached_and_why()
 def test_a_tolerance_is_recommended_where_it_is_cheapest():
     given = [*GIVEN, Point("eighth", None, error=1e-7, at_most=1e-7, seconds=0.0015, tol=1e-6)]
     text = advice(given, 1e-3, 1e-12)
-    assert "take eighth with tol = 1e-06 (error 1e-07, 1.5 ms)" in text[0]
+    assert "use eighth with tol = 1e-06 (error 1e-07, 1.5 ms)" in text[0]
     assert "It is ten times more accurate already; ten times more than that" in text[2]
 
 
@@ -430,12 +430,12 @@ def test_the_cheapest_point_is_recommended_and_what_ten_times_more_costs():
     given = with_orders(GIVEN, {"quick": None, "slow": None, "wrong": None})
     assert cheapest(given, 1e-3).scheme == "quick" and cheapest(given, 2e-4).scheme == "slow"
     text = advice(given, 1e-3, 1e-9)
-    assert "take quick with dt = 0.1 s (error 0.001, 2 ms)" in text[0]
+    assert "use quick with dt = 0.1 s (error 0.001, 2 ms)" in text[0]
     assert "costs 3 times the time: slow with dt = 0.1 s (error 0.0001, 6 ms)" in text[2]
     choices, limit, more = advice(given, None, 1e-9)
     assert choices == (
-        "For an error of 0.001 quick with dt = 0.1 s (error 0.001, 2 ms); "
-        "of 0.0001 slow with dt = 0.1 s (error 0.0001, 6 ms)."
+        "For an error of 1e-3 use quick with dt = 0.1 s (error 0.001, 2 ms); "
+        "of 1e-4 use slow with dt = 0.1 s (error 0.0001, 6 ms)."
     )
     assert "a tenth of the least of all would need dt = 0.05 s and 12 ms with slow, by its order" in limit
     assert more == "Take shorter steps where points failed (1 of 6)."
@@ -443,7 +443,10 @@ def test_the_cheapest_point_is_recommended_and_what_ten_times_more_costs():
     many = [point("s", 1.0, 0.9 * 10.0**-k, 1.0 + k) for k in range(1, 13)]
     choices, _, more = advice(many, None, 1e-30)
     assert (
-        choices.count("s with") == 3 and "0.01 s" in choices and "1e-12 s" in choices and "simulate(…, tol=…)" in more
+        choices.count("s with") == 3
+        and "0.01 use s" in choices
+        and "1e-12 use s" in choices
+        and "simulate(…, tol=…)" in more
     )
 
 
@@ -503,7 +506,7 @@ def test_the_command_measures_a_script(tmp_path, capsys):
     script.write_text(SCRIPT, encoding="utf-8")
     assert cli.main(["accuracy", str(script), "--target", "1e-3", "--out", str(tmp_path / "out")]) == 0
     text = capsys.readouterr().out
-    assert "GeneralizedAlpha(rho_inf=0.7)" in text and "For an error of 0.001 take" in text
+    assert "GeneralizedAlpha(rho_inf=0.7)" in text and "For an error of 1e-3 use" in text
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"accuracy.csv", "accuracy.png", "accuracy.html"}
     more = ["--dt", "0.1", "--dt", "0.05", "--quantity", "pin.rate", "--until", "0.5"]

@@ -99,13 +99,13 @@ def listed(monkeypatch):
     [
         (
             without_step,
-            r"'wrong': expected a function step\(K, h, t1\) of a module as its 'step', came without_step\(K",
+            r"'wrong': expected a function step\(K, h, t1\) of a module as its 'step', got without_step\(K",
         ),
-        (with_swapped_arguments, r"came with_swapped_arguments\(K: 'Kernel', t1: 'float', h: 'float'\), tests/kernel"),
+        (with_swapped_arguments, r"got with_swapped_arguments\(K: 'Kernel', t1: 'float', h: 'float'\), tests/kernel"),
         (with_an_int, "one whose 'h' is 'int' in place of 'float', tests/kernel/test_wrong_schemes.py:"),
         (without_status, "one whose 'return' is 'None' in place of 'int'"),
-        (lambda K, h, t1: 0, "came <function <lambda>"),
-        ("step", "came 'step'"),
+        (lambda K, h, t1: 0, "got <function <lambda>"),
+        ("step", "got 'step'"),
     ],
     ids=["no step size", "arguments swapped", "an int for a float", "no status", "a lambda", "a text"],
 )

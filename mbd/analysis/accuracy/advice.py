@@ -46,13 +46,13 @@ def advice(points: Sequence[Point], target: float | None, bound: float) -> list[
         found = _choices(points)
         if not found:
             return [f"No point has an error below a tenth; the best is {_described(_best(points))}."]
-        texts = [f"{error:g} {_described(best)}" for error, best in found]
+        texts = [f"{_power(error)} use {_described(best)}" for error, best in found]
         return [f"For an error of {'; of '.join(texts)}.", _limits(points, bound), _to_try(points)]
     best = cheapest(points, target)
     if best is None:
         return _unreached(points, target, bound)
     return [
-        f"For an error of {target:g} take {_described(best)}.",
+        f"For an error of {_power(target)} use {_described(best)}.",
         _costs(best),
         _more(points, best, target / MORE, bound),
     ]
@@ -67,6 +67,11 @@ def _choices(points: Sequence[Point]) -> list[tuple[float, Point]]:
             least[id(best)] = (error, best)  # the smallest error that it is the cheapest for
     found = list(least.values())
     return [found[k] for k in sorted({0, len(found) // 2, len(found) - 1})] if found else []
+
+
+def _power(error: float) -> str:
+    """'1e-3'."""
+    return f"{error:.3g}" if error >= 0.01 else f"{error:.2e}".replace(".00e", "e").replace("e-0", "e-")
 
 
 def _limits(points: Sequence[Point], bound: float) -> str:

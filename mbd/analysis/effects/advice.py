@@ -39,7 +39,7 @@ def _none(contributions: Sequence[Contribution], tolerance: float) -> str:
         best = min(able, key=lambda each: each.change.largest)
         return f"{text}; least, by {best.change.largest:.2g}, {best.name!r}."
     longest = max(contributions, key=lambda each: each.change.until)
-    return f"{text}. The events stay the same longest, until {longest.change.until:.4g} s, without {longest.name!r}."
+    return f"{text}. Removing {longest.name!r} changes the events last, at {longest.change.until:.4g} s."
 
 
 def _alone(alone: Sequence[Contribution], tolerance: float) -> str:

@@ -155,7 +155,7 @@ def _check_hook(scheme: str, hook: str, function: Any, arguments: str, result: s
     """Refuse a function of an entry that the kernel could not call, by its name and place."""
     wanted = [each.partition(": ")[::2] for each in arguments.split(", ")]
     call = f"{hook}({', '.join(name for name, _ in wanted)})"
-    who = f"the scheme {scheme!r}: expected a function {call} of a module as its {hook!r}, came "
+    who = f"the scheme {scheme!r}: expected a function {call} of a module as its {hook!r}, got "
     if not isinstance(function, FunctionType) or function.__qualname__ != function.__name__ or "<" in function.__name__:
         raise CapabilityError(f"{who}{function!r}")
     place = f"{shown(function.__code__.co_filename)}:{function.__code__.co_firstlineno}"

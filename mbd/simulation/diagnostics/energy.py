@@ -259,17 +259,17 @@ def _sentence(run: RunData, found: Judgement) -> str:
     setting = "the tolerance" if run.kernel.adaptive else f"dt = {run.dt:g} s"
     remedy = "a smaller one" if run.kernel.adaptive else f"dt below {finer:.1g} s"
     return (
-        f"t = {table[-1, 0]:.9g} s: from here on the energy is not the mechanism's: the scheme itself has put up to "
-        f"{found.numerical:.3g} J into a mechanism that had {found.owned:.3g} J of its own to move with by then; "
-        f"{setting} does not resolve the motion, of which {name!r} is the fastest, {way:.3g} in one step; try "
-        f"{remedy}, or a larger mass or a softer stiffness there"
+        f"t = {table[-1, 0]:.9g} s: numerical energy gain {found.numerical:.3g} J (the mechanism's own energy: "
+        f"{found.owned:.3g} J), so the results from here on are wrong; {setting} does not resolve the motion, whose "
+        f"fastest coordinate {name!r} moves by {way:.3g} in one step; try {remedy}, or a larger mass or a softer "
+        "stiffness there"
     )
 
 
 def _note(found: Judgement) -> str:
-    done, what = ("put", "into") if found.numerical > 0.0 else ("taken", "from")
+    done = "gain" if found.numerical > 0.0 else "loss"
     share = f" ({100.0 * abs(found.share):.2g} %)" if np.isfinite(found.share) else ""
     return (
-        f"the scheme itself has {done} up to {abs(found.numerical):.3g} J {what} a mechanism that had "
-        f"{found.owned:.3g} J of its own to move with{share}: see run.energy.numerical, and use a smaller dt"
+        f"numerical energy {done} {abs(found.numerical):.3g} J{share} in a mechanism that has {found.owned:.3g} J; "
+        "see run.energy.numerical, and use a smaller dt"
     )

@@ -80,8 +80,8 @@ COUNTED = (
     ),
     (
         "n_endless",
-        "{count} times contacts struck by turns without end at one instant; they were closed together, which is the "
-        "limit of these impacts",
+        "{count} Zeno sequences of alternating impacts at one instant; their limit was taken, in which the contacts "
+        "close together",
     ),
 )
 """Counts of the kernel, and what to say where they are not zero."""
