@@ -60,6 +60,7 @@ class Solved:
     rate : (v̇, ż) (k, n); lam : all multipliers (k, m), zero where a row is off
     size : log |det| of the matrix (k,); 0 without rows
     sound : where the values are determined and finite (k,)
+    unique : where no row depends on others, so that multipliers are the only ones (k,)
     inertia, load : M (k, n, n) and f (k, n), which weigh differences
     """
 
@@ -67,6 +68,7 @@ class Solved:
     lam: Matrix
     size: Vector
     sound: Flags
+    unique: Flags
     inertia: Any
     load: Matrix
 
@@ -107,7 +109,7 @@ class Balance:
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
         found = Solved(
             np.zeros((count, n)), np.zeros((count, m)), np.zeros(count), np.zeros(count, dtype=bool),
-            np.zeros((count, n, n)), np.zeros((count, n)),
+            np.ones(count, dtype=bool), np.zeros((count, n, n)), np.zeros((count, n)),
         )  # fmt: skip
         modes = np.hstack([rows.closed.astype(np.int8), rows.phase])
         patterns, group = np.unique(modes, axis=0, return_inverse=True)
@@ -124,7 +126,7 @@ class Balance:
         turns = MOST_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):
-            M, f, R, B, _, bias, limits = self._terms_at(replace(rows, lam=lam))
+            M, f, R, B, _, bias, limits = self.terms_at(replace(rows, lam=lam))
             forces, spread = R[:, :, held.kept], None
             if held.depend:
                 dependence, weight = _dependence(M, B, held), self._shares(held, limits)
@@ -138,14 +140,14 @@ class Balance:
             if np.all((change <= SETTLED * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
                 break
         if slides:
-            *_, rates, _, limits = self._terms_at(replace(rows, lam=lam))
+            *_, rates, _, limits = self.terms_at(replace(rows, lam=lam))
             for number, friction in enumerate(self.equations.frictions):
                 sliding = np.abs(rows.phase[:, number]) == 1
                 way = self._way(rows, number, rates)
                 lam[sliding, friction.row] = (way * limits[:, number])[sliding]
         sound &= np.isfinite(rate).all(axis=1) & np.isfinite(lam).all(axis=1)
         found.rate[mine], found.lam[mine], found.size[mine], found.sound[mine] = rate, lam, size, sound
-        found.inertia[mine], found.load[mine] = M, f
+        found.inertia[mine], found.load[mine], found.unique[mine] = M, f, not held.depend
 
     def _way(self, rows: Rows, number: int, rates: Matrix) -> Vector:
         """Sign with which a friction slides, or cosine of its direction to that of both, (k,)."""
@@ -171,7 +173,7 @@ class Balance:
                 weight[:, place] = np.maximum(part, LEAST_SHARE)
         return weight
 
-    def _terms_at(self, rows: Rows) -> tuple[Any, ...]:
+    def terms_at(self, rows: Rows) -> tuple[Any, ...]:
         """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), ḣ (k, m), γ (k, m), limits of frictions (k, n_frictions)."""
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
         flat = np.array(self.terms(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source))).T
@@ -195,7 +197,7 @@ class Balance:
         places = np.flatnonzero(same)
         chosen = places[np.linspace(0, len(places) - 1, min(len(places), SAMPLES)).astype(np.intp)]
         there = self.states.rows.part(chosen)
-        M, _, _, B, *_ = self._terms_at(there)
+        M, _, _, B, *_ = self.terms_at(there)
         every = self._acting(every, there, B)
         independent = _independent(B[:, every] / _weights(M))
         return _Held(every, [every[k] for k in independent])

@@ -27,6 +27,7 @@ from mbd.simulation.run.control import reset_faults
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.strategy import chosen
 from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
+from mbd.simulation.tolerance.driven import driving_rows
 from mbd.simulation.tolerance.judged import judged
 from mbd.simulation.tolerance.search import LARGEST
 from mbd.simulation.tolerance.trials import Trial
@@ -79,9 +80,10 @@ def simulate(
     start : from `mbd.assemble`, or `Trajectory.final` of an earlier run
     integrator : default ``HHT(alpha=0.05)``
     dt : step [s]
-    tol : in place of dt: the largest error of any coordinate [m, rad] over the whole run. It is estimated from two to
-        five runs at different tolerances (nine while each comes nearer), see ``run.stats["tolerance"]``; what
-        controllers and observers do besides answering happens in each of them. A tolerance that cannot be reached is a
+    tol : in place of dt: the largest error of any coordinate [m, rad] over the whole run; where drives prescribe
+        motion, also of their forces and torques, over the largest in the run. It is estimated from two to five runs at
+        different tolerances (nine while each comes nearer), see ``run.stats["tolerance"]``; what controllers and
+        observers do besides answering happens in each of them. A tolerance that cannot be reached is a
         `SimulationError`
     tol_of : names of the results that `tol` holds for, each in its own unit, at rows and between them: forces,
         reactions, multipliers, rates or energies too, or coordinates without one that does not matter, such as the
@@ -210,15 +212,16 @@ class _Motion:
     def to_tolerance(self, tol: float, tol_of: Sequence[str] | None) -> tuple[Run, Trajectory, str]:
         """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
         equations = mechanism_of(self.model, self.options["backend"], self.changed).equations
-        names, scheme = judged(equations, tol_of), self.scheme
+        names, scheme, driven = judged(equations, tol_of), self.scheme, bool(driving_rows(equations))
         length = 1.0 if isinstance(self.until, str | tuple) else (float(self.until) - self.start.time) or 1.0
         finer = scheme.order() / scheme.error_order()  # power of the allowed error with which that of the run falls
         first, power = first_allowed(tol, length, finer), 1.0 / scheme.error_order()
+        longest = LONGEST * length
 
         def trial(allowed: float, most: float = np.inf) -> Trial:
             # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
             share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
-            more = {"tol": tol, "tol_of": names, "longest": LONGEST * length * share, "allowed": allowed}
+            more = {"tol": tol, "tol_of": names, "driven": driven, "allowed": allowed, "longest": longest * share}
             run, trajectory, problem = self.run(INSTANT * min(length, 1.0), more, most)
             return Trial(allowed, trajectory, problem, run, widest=share == LARGEST / LONGEST)
 
@@ -282,7 +285,7 @@ def laid_out(
     strange = reset_faults(mechanism.equations)
     if strange:
         raise UnknownNameError(strange)
-    adaptive = {name: options.get(name) for name in ("tol", "allowed", "longest")}
+    adaptive = {name: options.get(name) for name in ("tol", "allowed", "longest", "driven")}
     settings = {
         "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt if tol is None else None,
         "until": until, **options, **adaptive, "tol_of": list(options.get("tol_of", ())),

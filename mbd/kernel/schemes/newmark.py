@@ -11,7 +11,7 @@ from mbd.kernel.charts import find_chart_end
 from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.mass_ratios import excuses_much, is_uneven
-from mbd.kernel.records import Kernel, Steps
+from mbd.kernel.records import Balance, Kernel, Steps
 from mbd.kernel.restart import compose, consistent, fill_block, lower_to_step, measure_accepted, take_consistent
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.iteration import predict, shift_growth
@@ -84,7 +84,26 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
         if status == UNSOUND:
             tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search
         elif not (status == 0 and K.scales_of_start == 1 and lower_to_step(K)):
+            if status == 0 and K.driven == 1 and K.n_active > 0:
+                balance_end(K, t1)
             return status
+
+
+def balance_end(K: Balance, t1: float) -> None:
+    """Rates and multipliers of the candidate are those of the balance there, ``B v̇ + γ = 0``, where there are any.
+
+    Rows fix v₁ and with it a₁, ``a₁ = −(1 − γ)/γ a₀ + …``: an error of a, as each change of the step leaves, returns in
+    the next step with its sign turned, and so in v̇ and λ. Across the rows v̇ satisfies the balance anyway and stays.
+    """
+    if consistent(K, t1, K.q1, K.y1) == 0:
+        share = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
+        for i in range(K.n):
+            K.aux1[i] += share * (K.jump[i] - K.rate1[i])
+            K.rate1[i] = K.jump[i]
+        K.lam1[: K.n_rows] = K.impulse[: K.n_rows]
+    for i in range(K.n):
+        K.block[K.o_a + i] = K.rate1[i]
+    K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
 
 
 def newmark_accept(K: Steps, h: float) -> None:

@@ -129,7 +129,8 @@ class Stepper:
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt,
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
-            longest=float(options.get("longest", np.inf)), error_order=self.integrator.error_order(), n_substeps=1,
+            driven=int(options.get("driven", False)), longest=float(options.get("longest", np.inf)),
+            error_order=self.integrator.error_order(), n_substeps=1,
             **self.own.numbers(),
         )  # fmt: skip
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbd.errors import MemoryLimitError
+from mbd.results.columns import asks_for_forces
+from mbd.simulation.tolerance.driven import drives_of, forces_told, is_wholly_driven
 from mbd.simulation.tolerance.foresight import LONG, foreseen
 from mbd.simulation.tolerance.search import CHECK, PILOT, REGULAR, WELL, Search
 from mbd.simulation.tolerance.trials import Trial, is_rounding, rounding
@@ -91,10 +93,43 @@ def calibrated(
         wanted = search.next(trials)
     best = search.best(trials)
     missed = not best.error <= BEYOND * tol
+    if missed and _drives_alone_miss(best, tol):
+        outcome = _outcome(trials, best, search, "")
+        return replace(outcome, doubt=_drives_missed(best, tol))
     if missed and _amplifies_round_off(trials, best, tol):
         outcome = _outcome(trials, best, search, "")
         return replace(outcome, doubt=_sensitive(best, tol))
-    return _outcome(trials, best, search, _unreached(trials, best, tol) if missed else "")
+    outcome = _outcome(trials, best, search, _unreached(trials, best, tol) if missed else "")
+    return outcome if missed else replace(outcome, doubt=_uncovered(best, names))
+
+
+def _drives_alone_miss(best: Trial, tol: float) -> bool:
+    """Whether coordinates keep the tolerance and only forces of drives do not."""
+    if best.gap is None or not best.gap.same or not drives_of(best.run) or not best.gap.size > 0.0:
+        return False
+    return bool(np.isfinite(best.error) and best.error * best.gap.moved <= BEYOND * tol * best.gap.size)
+
+
+def _drives_missed(best: Trial, tol: float) -> str:
+    """What such a run says."""
+    name = best.gap.name if best.gap is not None else ""
+    return (
+        f"tol = {tol:g} holds for coordinates, but not for drives: the force or torque of {name!r} has an estimated "
+        f"error of {best.error:.2g} of the largest; RadauIIA and RungeKutta853 find it from each position by itself"
+    )
+
+
+def _uncovered(best: Trial, names: tuple[str, ...]) -> str:
+    """What results that are named by `tol_of` leave open where the motion is prescribed; '' if nothing."""
+    if not names or not drives_of(best.run) or not is_wholly_driven(best.run):
+        return ""
+    columns = best.run._model_columns
+    if asks_for_forces([columns.node(name) for name in names]):
+        return ""
+    return (
+        f"drives prescribe the whole motion, so that {', '.join(map(repr, names))} are right in steps of any size: tol "
+        "does not cover forces; leave tol_of out, or name those that matter"
+    )
 
 
 def _amplifies_round_off(trials: Sequence[Trial], best: Trial, tol: float) -> bool:
@@ -162,6 +197,8 @@ def _outcome(trials: Sequence[Trial], best: Trial, search: Search, problem: str)
         )
     if not problem and best.error > tol:
         stats["notes"].append(f"the estimated error {best.error:.2g} is above tol = {tol:g}")
+    if not problem and not search.names and drives_of(best.run) and is_wholly_driven(best.run):
+        stats["notes"].append("drives prescribe the whole motion: tol holds for " + forces_told(best.run))
     if not problem and best.error < WELL * tol and stats["steps"] > 0:
         better = search.why_better(trials, best) or f"{len(trials)} runs came no nearer"
         stats["notes"].append(f"the estimated error {best.error:.2g} is far below tol = {tol:g}: {better}")

@@ -7,7 +7,7 @@ and by steps taken again where these are in doubt.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from mbd.results.dense import Restepping
 from mbd.results.matching import Matches, apart, matched
 from mbd.results.osculating import DOUBT, osculating
 from mbd.results.polynomials import Places, quintic
+from mbd.simulation.tolerance.driven import drives_of, share
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
@@ -30,6 +31,11 @@ SAMPLES = 64
 """Rows of a run at which it is compared, about [-]."""
 MIDDLES = 32
 """Middles between rows at which it is compared, about, if what it gives there is in doubt [-]."""
+LATE, MOST_PARTS = 0.9, 8
+"""The last part of an interval at which forces of drives are compared, and how many parts there are at most [-].
+
+Steps that are taken again err most near their ends; few long ones may hold a jerk that jumps anywhere.
+"""
 BESIDE = 1e-9
 """Instants this close to an event are not compared, relative to the length of the run [-]."""
 TRUSTED = 0.02
@@ -46,16 +52,20 @@ class Gap:
 
     size : [m, rad], or in its own unit that of a result that was compared in the place of coordinates
     same : whether both runs have the same events
+    moved : what coordinates alone differ by [m, rad], without the forces of drives (`tolerance.driven`)
     """
 
     size: float
     name: str
     shift: float
     same: bool
+    moved: float = 0.0
 
 
 def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[str, ...] = ()) -> Gap:
     """How far apart the coordinates of two runs are, away from their events; also at their ends.
+
+    Where rows with explicit time prescribe a motion, the forces of drives over the forces of the motion count too.
 
     Parameters
     ----------
@@ -79,19 +89,24 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[
     worst = int(np.argmax(difference)) if difference.size else -1
     equations = run.record.equations
     known = [c.name for c in equations.coordinates] if equations is not None else []
-    return Gap(
-        float(difference[worst]) if worst >= 0 else 0.0, known[worst] if 0 <= worst < len(known) else "",
-        max((abs(a - b) for a, b in shifted), default=0.0), pairs.alone == 0,
+    moved = float(difference[worst]) if worst >= 0 else 0.0
+    found = Gap(
+        moved, known[worst] if 0 <= worst < len(known) else "", max((abs(a - b) for a, b in shifted), default=0.0),
+        pairs.alone == 0, moved,
     )  # fmt: skip
+    if not drives_of(run) or not drives_of(other):
+        return found
+    parts = max(2, min(MOST_PARTS, 2 * MIDDLES // len(run.time)))
+    inside = [_some_middles(run, end, LATE * (k + 1) / parts) for k in range(parts)]
+    times = np.unique(np.concatenate([_rows(run, end)[:-1], *inside]))
+    size, name = share(run, other, times[apart(times, shifted, beside)])
+    return replace(found, size=size, name=name) if size > moved else found
 
 
 def _named(run: Trajectory, other: Trajectory, names: tuple[str, ...], pairs: Matches, end: float) -> Gap:
     """The same of named results, each read as a user reads it."""
-    _, between = run._model_columns.grid.middles()
-    middles = between.time[between.time < end]
-    middles = middles[:: len(middles) // MIDDLES + 1]
     shifted, beside = pairs.pairs + pairs.late, BESIDE * (end - float(run.time[0]))
-    times = np.concatenate([_rows(run, end)[:-1], middles])
+    times = np.concatenate([_rows(run, end)[:-1], _some_middles(run, end)])
     times = times[apart(times, shifted, beside)]
     ours, theirs = run.at(times).read(*names), other.at(times).read(*names)
     apart_by = {name: float(np.max(np.abs(ours[name] - theirs[name]), initial=0.0)) for name in names}
@@ -108,6 +123,14 @@ def _rows(run: Trajectory, end: float) -> Vector:
     count = int(np.searchsorted(run.time, end, side="right"))
     chosen = np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).astype(np.intp))
     return np.append(run.time[chosen], end)
+
+
+def _some_middles(run: Trajectory, end: float, theta: float = 0.5) -> Vector:
+    """Times of middles between rows until the end, or of other parts of the intervals, a bounded number of them."""
+    _, between = run._model_columns.grid.middles()
+    times = between.time + (theta - 0.5) * between.step
+    times = times[times < end]
+    return times[:: len(times) // MIDDLES + 1]
 
 
 def _middles(run: Trajectory, end: float, accuracy: float) -> Vector:

@@ -22,6 +22,7 @@ from time import perf_counter
 import numpy as np
 
 from mbd.simulation.tolerance.comparison import Gap, gap
+from mbd.simulation.tolerance.driven import own_share
 from mbd.simulation.tolerance.trials import Trial, is_rounding, least_error, rounding, same_steps
 
 __all__ = ["CHECK", "LARGEST", "PILOT", "REGULAR", "WELL", "Search"]
@@ -64,6 +65,7 @@ class Search:
         self.names = names
         self.comparing = 0.0  # seconds
         self._gaps: dict[tuple[float, float], Gap] = {}
+        self._shown: dict[float, tuple[float, str]] = {}
 
     # which run counts, and which is next -----------------------------------------------------------------------------
     def best(self, trials: Sequence[Trial]) -> Trial:
@@ -132,7 +134,8 @@ class Search:
             near = sorted((seen[id(trial)] for trial in coarser), key=lambda trial: trial.allowed)
             fall = self._fall(near[0], finest, self._observed(near))
             difference = near[0].gap.size if near[0].gap is not None and near[0].gap.same else np.inf
-            error = max(fall / (1.0 - fall) * difference, least_error(finest, near[0], self.names))
+            least = max(least_error(finest, near[0], self.names), self._own(finest))
+            error = max(fall / (1.0 - fall) * difference, least)
             known = replace(known, error=error, gap=near[0].gap)
         elif len(trials) > 1 and not seen and is_rounding(finest):
             known = replace(known, error=rounding(finest, self.names) * float(finest.run.stats["steps"]))
@@ -149,8 +152,18 @@ class Search:
         between = self._gaps[key]
         part = 1.0 / (1.0 - self._fall(trial, finest, self.power))
         least = rounding(trial, self.names) * float(trial.run.stats["steps"])
-        error = max(part * between.size, least) if between.same else np.inf
+        error = max(part * between.size, least, self._own(trial)) if between.same else np.inf
         return replace(trial, error=error, gap=between, finest=False)
+
+    def _own(self, trial: Trial) -> float:
+        """What the drives of a run show of their own error."""
+        if self.names:
+            return 0.0
+        if trial.allowed not in self._shown:
+            began = perf_counter()
+            self._shown[trial.allowed] = own_share(trial.run)
+            self.comparing += perf_counter() - began
+        return self._shown[trial.allowed][0]
 
     def _fall(self, trial: Trial, finer: Trial, power: float) -> float:
         """E of the finer run over that of the other: by what they allow, or, if more, by the number of their steps."""
