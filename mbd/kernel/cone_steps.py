@@ -13,13 +13,12 @@ A motion that only comes close to rest turns around it in shortened steps, and s
 from __future__ import annotations
 
 from mbd.kernel.codes import STICK
-from mbd.kernel.cone_directions import mass_of
+from mbd.kernel.cone_turns import STABLE, fastest_turn
 from mbd.kernel.cones import HELD, ONSET, aim, along, speed_of_both
 from mbd.kernel.contact_modes import STILL
 from mbd.kernel.guards import judge
 from mbd.kernel.locate import locate
 from mbd.kernel.records import Frictions, Guards, Kernel
-from mbd.kernel.restart import evaluate
 from mbd.kernel.roots import sqrt
 from mbd.kernel.trial_step import try_step
 
@@ -37,8 +36,6 @@ LONGER = 3.0
 """Each of the steps that follow over the one before [-]."""
 BRIEFEST = 1e-7
 """Part of dt below which no such step is tried [-]."""
-STABLE = 3.0
-"""Step times the fastest turn of a direction by friction that explicit schemes take [-]."""
 BRIEFEST_TURN = 1e-5
 """Part of dt below which no step is shortened for it [-]."""
 SURELY = 0.8
@@ -112,29 +109,6 @@ def slides_at_first(K: Frictions, h: float) -> bool:
     for f in range(K.n_frictions):
         found = found or (K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD)
     return found
-
-
-def fastest_turn(K: Guards) -> float:
-    """Rate [1/s] at which friction turns γ that it does not point along, Σ limit/(m (‖γ‖ + s)), at most.
-
-    It is large where γ is small, just after sliding has begun: an explicit scheme must follow it.
-    """
-    rate = 0.0
-    for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
-            p = K.partner[f]
-            gain = K.guards0[K.at_slip + f] * K.guards0[K.at_slip_rate + f]
-            gain += K.guards0[K.at_slip + p] * K.guards0[K.at_slip_rate + p]
-            speed = speed_of_both(K, f, K.guards0, K.at_slip)
-            if gain < 0.0 and speed > STILL:  # it comes to rest: `approached_end` sees to that
-                continue
-            if rate == 0.0:
-                evaluate(K, K.time, K.q, K.y)
-            speed += 4.0 * K.hold[f]
-            mass = mass_of(K, f)
-            if speed > 0.0 and mass > 0.0:
-                rate += K.guards0[K.at_limit + f] / (mass * speed)
-    return rate
 
 
 def slides_on(K: Guards) -> bool:

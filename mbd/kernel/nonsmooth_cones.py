@@ -1,30 +1,32 @@
 """Contacts that slide in a plane within non-smooth steps: fixed steps, whatever becomes of the direction of γ.
 
-A step in which γ may turn by much of itself, or reach zero, holds the direction in which it begins. Where it ends in
-another one, or beyond zero, the friction of the whole step is found again, as an impulse in the cone opposite to
-the velocity at its end: that is Moreau's step, of first order, for all contacts together.
+A step in which γ may turn by much of itself, or reach zero, holds the direction in which it begins, and so does a step
+for which directions that follow γ change too fast. Where it ends in another one, or beyond zero, the friction of the
+whole step is found again, as an impulse in the cone opposite to the velocity at its end: that is Moreau's step, of
+first order, for all contacts together.
 """
 
 from __future__ import annotations
 
 from mbd.kernel.codes import PULL
 from mbd.kernel.cone_contacts import all_hold
+from mbd.kernel.cone_turns import STABLE, fastest_turn
 from mbd.kernel.cones import HELD, aim, along, pull_of_both
 from mbd.kernel.contact_modes import STILL
 from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
 from mbd.kernel.restart import evaluate, evaluate_loaded, largest_force, limit_of
 from mbd.kernel.roots import sqrt
 
-__all__ = ["hold_for_step", "hold_together", "keep_within", "release_both", "turned_in_plane"]
+__all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release_both", "turned_in_plane"]
 
 FAR = 2.0
 """Times of a step in which γ must neither reach zero nor turn by a radian if its direction is to follow it [-]."""
-TURNED = 0.05
+TURNED = 1e-6
 """Sine of the angle by which γ may leave the direction that a step holds [-]."""
 
 
 def hold_for_step(K: Guards, h: float) -> None:
-    """Which directions a step of size h holds."""
+    """Which directions a step of size h holds; all of them where an explicit scheme would be unstable."""
     for f in range(K.n_frictions):
         p = K.partner[f]
         if p > f and K.slip[f] != 0.0:
@@ -34,6 +36,21 @@ def hold_for_step(K: Guards, h: float) -> None:
             ay = K.guards0[K.at_slip_rate + p]
             held = FAR * h * sqrt(ax * ax + ay * ay) > sqrt(x * x + y * y)
             K.hold[f] = K.hold[p] = HELD if held else 0.0
+    if K.explicit == 1 and h * fastest_turn(K) > STABLE:
+        hold_all(K)
+
+
+def hold_all(K: Frictions) -> bool:
+    """Hold all directions in the step that is tried again, where a slow γ turned too fast for it; whether any did not.
+
+    The friction of a step that ends in other directions is found again as an impulse, whatever its size.
+    """
+    found = False
+    for f in range(K.n_frictions):
+        if K.partner[f] >= 0 and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            K.hold[f] = HELD
+            found = True
+    return found
 
 
 def turned_in_plane(K: Guards, f: int) -> bool:

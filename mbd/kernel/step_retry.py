@@ -15,6 +15,7 @@ from mbd.kernel.codes import (
     TOO_NEAR,
 )
 from mbd.kernel.control import controlled_step
+from mbd.kernel.nonsmooth_cones import hold_all
 from mbd.kernel.records import Balance, Guards, Kernel, SchemeAbilities, State
 from mbd.kernel.resolution import judge_change
 from mbd.kernel.restart import consistent, lower_scales
@@ -98,6 +99,8 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
             status = judged_step(K, h, K.time + h)
         elif K.until >= K.end:
             return LAST
+    if K.n_cones > 0 and K.strategy == 1 and (is_shortened(K, status) or is_rough(status)) and hold_all(K):
+        status = judged_step(K, h, K.time + h)
     K.too_near = 1 if status == TOO_NEAR else 0
     while h > SHORTEST * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
         h *= SHORTENING

@@ -162,3 +162,30 @@ def test_order_of_feet_and_directions_of_the_plane_do_not_matter_and_friction_ta
         assert [event.time for event in same.events] == pytest.approx(
             [event.time for event in run.events], abs=2e-5
         )  # errors of steps
+
+
+SIX = ((0.33, 0.0), (0.16, 0.27), (-0.15, 0.26), (-0.39, -0.02), (-0.13, -0.32), (0.14, -0.37))
+SCHEMES = (mbd.GeneralizedAlpha(0.9), mbd.HHT(0.05), mbd.Newmark(), mbd.RadauIIA(), mbd.RungeKutta853())
+
+
+@pytest.mark.parametrize("seeds", [(5, 14, 19), pytest.param(range(100), marks=pytest.mark.slow)])
+def test_tables_pushed_a_little_above_their_limit_slide_on_in_non_smooth_steps(seeds):
+    """Whatever the excess: friction within its cones, and where located events lead, to the order of the steps."""
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        feet, (way, mu) = rng.choice([*FEET, 6]), rng.uniform((0.0, 0.15), (6.28, 0.4))
+        feet = FEET.get(feet, SIX)
+        tx, ty, tz = rng.normal(size=3) * (0.05, 0.05, 0.3)
+        load = {"fx": np.cos(way), "fy": np.sin(way), "tx": tx, "ty": ty, "tz": tz}
+        limit, _, weights = largest_load(feet, load, mu)
+        excess, dt = 10.0 ** rng.uniform(-5.0, -1.0), rng.choice([1e-2, 5e-3, 2e-3])
+        if min(weights) < 1.0:  # it would tip
+            continue
+        how = {"held": limit * (1.0 + excess), "mu": mu, "until": 0.1}
+        run = pushed(table(feet), load, SCHEMES[seed % 5], dt=dt, contact="nonsmooth", **how)
+        sizes, forces = pulls(run, feet)
+        assert np.all(sizes <= mu * forces + 1e-7)
+        located = pushed(table(feet), load, mbd.RadauIIA(), dt=2e-3, **how)
+        ends = np.array([[each[f"float.{name}"][-1] for name in ("x.rate", "y.rate", "angular_velocity.z")]
+                         for each in (run, located)])  # fmt: skip
+        assert ends[0] == pytest.approx(ends[1], abs=5.0 * dt / 0.1 * np.max(np.abs(ends[1]))), seed

@@ -1,0 +1,37 @@
+"""How fast friction of contacts in space turns the direction in which they slide."""
+
+from __future__ import annotations
+
+from mbd.kernel.cone_directions import mass_of
+from mbd.kernel.cones import HELD, speed_of_both
+from mbd.kernel.contact_modes import STILL
+from mbd.kernel.records import Guards
+from mbd.kernel.restart import evaluate
+
+__all__ = ["STABLE", "fastest_turn"]
+
+STABLE = 3.0
+"""Step times the fastest turn of a direction by friction that explicit schemes take [-]."""
+
+
+def fastest_turn(K: Guards) -> float:
+    """Rate [1/s] at which friction turns γ that it does not point along, Σ limit/(m (‖γ‖ + s)), at most.
+
+    It is large where γ is small, just after sliding has begun: an explicit scheme must follow it.
+    """
+    rate = 0.0
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            p = K.partner[f]
+            gain = K.guards0[K.at_slip + f] * K.guards0[K.at_slip_rate + f]
+            gain += K.guards0[K.at_slip + p] * K.guards0[K.at_slip_rate + p]
+            speed = speed_of_both(K, f, K.guards0, K.at_slip)
+            if gain < 0.0 and speed > STILL:  # it comes to rest: `approached_end` sees to that
+                continue
+            if rate == 0.0:
+                evaluate(K, K.time, K.q, K.y)
+            speed += 4.0 * K.hold[f]
+            mass = mass_of(K, f)
+            if speed > 0.0 and mass > 0.0:
+                rate += K.guards0[K.at_limit + f] / (mass * speed)
+    return rate
