@@ -6,7 +6,7 @@ from mbd.kernel.codes import ACCELERATIONS
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.cones import hold_directions
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, Frictions, Guards
+from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, Frictions, Guards, Mechanism
 from mbd.kernel.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = [
@@ -42,7 +42,7 @@ def prepare(K: Balance) -> None:
     start_over(K)
 
 
-def hold_places(K: Guards) -> None:
+def hold_places(K: Mechanism) -> None:
     """Anchors of contacts that close, and of those that slide, at the present state; K.acc with them."""
     moved = False
     for c in range(K.n_contacts):
