@@ -69,7 +69,8 @@ function fill() {
     button.addEventListener("click", () => { play(false); seek(group.time); });
     item.append(button); el("events").append(item);
   }
-  if (!run.events.length) { const none = document.createElement("li"); none.textContent = "none"; el("events").append(none); }
+  el("happened").hidden = el("events").hidden = !run.events.length;
+  el("fit").hidden = Boolean(run.spatial); // the camera in space has its own
   run.charts.forEach((chart, k) => el("chart").append(new Option(`${chart.title} [${chart.unit}]`, k)));
   el("over").append(new Option("over time", -1));
   run.contacts.forEach((contact, k) => { if (strides[k].length) el("over").append(new Option(`over strides, ${contact.name}`, k)); });
@@ -128,12 +129,13 @@ function listen() {
   stage.addEventListener("pointerup", (event) => { if (drag && !drag.moved) { const k = nearest(event); if (k >= 0) toggleTrace(k); if (event.pointerType !== "mouse") { state.hover = k; state.dirty = true; } } drag = null; });
   stage.addEventListener("wheel", (event) => { event.preventDefault(); camera.zoom = Math.min(Math.max(camera.zoom * Math.exp(-event.deltaY * 0.0012), 0.05), 50); state.dirty = true; }, { passive: false });
   stage.addEventListener("dblclick", resetCamera);
+  el("fit").addEventListener("click", resetCamera);
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT") return;
     const step = event.shiftKey ? span / 20 : span / Math.max(time.length - 1, 1);
     const actions = {
       " ": () => play(!state.playing), ArrowRight: () => { play(false); seek(state.t + step); }, ArrowLeft: () => { play(false); seek(state.t - step); },
-      ArrowDown: () => { play(false); nextEvent(1); }, ArrowUp: () => { play(false); nextEvent(-1); }, Home: () => seek(first), End: () => seek(last),
+      ArrowDown: () => { play(false); nextEvent(1); }, ArrowUp: () => { play(false); nextEvent(-1); }, Home: () => seek(first), End: () => seek(last), 0: resetCamera,
     };
     if (actions[event.key]) { event.preventDefault(); actions[event.key](); }
   });

@@ -12,6 +12,7 @@ function survey() {
       box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
     }
     for (const wheel of run.wheels) {
+      if (soleOf(wheel)) continue;
       const [x, y] = project(wheel.at.map((axis) => axis[i])), r = wheel.radius[i];
       box[0] = Math.min(box[0], x - r); box[1] = Math.min(box[1], y - r); box[2] = Math.max(box[2], x + r); box[3] = Math.max(box[3], y + r);
     }
@@ -25,7 +26,7 @@ const extent = () => Math.max(path.width, path.height, 0.12 * (path.all[2] - pat
 const travels = () => path.width > 0 && path.all[2] - path.all[0] > 2.2 * path.width; // whether it moves on
 function dragged(dx, dy) { camera.dx += dx; camera.dy += dy; }
 function resetCamera() { Object.assign(camera, { zoom: 1, dx: 0, dy: 0 }); state.dirty = true; }
-const cameraHint = "";
+const cameraHint = " \u00B7 wheel: zoom \u00B7 drag: shift \u00B7 0: fit";
 function view(w, h, p) { // meters to pixels
   const follow = el("follow").checked, [x0, y0, x1, y1] = path.all;
   const floor = 0.12 * Math.max(x1 - x0, y1 - y0); // a single point has no size of its own
@@ -111,7 +112,8 @@ function drawGround(g, w, h, v, ground) {
     const [x, y] = spot(s, 0), [x1, y1] = spot(s, 7 / v.scale), [x2, y2] = spot(s, 12 / v.scale);
     if (x < -60 || x > w + 60) continue;
     g.beginPath(); g.moveTo(x, y); g.lineTo(x1, y1); g.stroke();
-    if (x2 > 22 && x2 < w - 22) g.fillText(label(s, tick) + " m", x2, y2);
+    const legend = usual && y2 > h - 50 && x2 > w - 190; // where the arrow of a force is explained
+    if (x2 > 22 && x2 < w - 22 && !legend) g.fillText(label(s, tick) + " m", x2, y2);
   }
 }
 function solid(ground) { // whether nothing of the mechanism is ever below it; a step that is walked off is drawn as a line
@@ -144,7 +146,8 @@ function drawPushes(g, w, h, v, p) { // forces of the ground on the feet
   }
   const round = roundDown(usual), px = round * unit * v.scale, x = w - 16 - px, y = h - 18;
   drawArrow(g, [x, y], [x + px, y]);
-  g.fillStyle = colors.muted; g.textAlign = "center"; g.textBaseline = "bottom"; g.fillText(label(round, round) + " N", x + px / 2, y - 5);
+  g.textAlign = "center"; g.textBaseline = "bottom"; g.lineWidth = 4; g.strokeStyle = colors.paper; g.fillStyle = colors.muted;
+  g.strokeText(label(round, round) + " N", x + px / 2, y - 5); g.fillText(label(round, round) + " N", x + px / 2, y - 5);
 }
 function drawArrow(g, [x0, y0], [x1, y1]) {
   const size = Math.hypot(x1 - x0, y1 - y0), head = Math.min(9, 0.45 * size), ux = (x1 - x0) / size, uy = (y1 - y0) / size;
@@ -190,14 +193,30 @@ function drawDeck(g, w, h, v, p, deck) { // a plane that moves; its marks move a
   for (let s = Math.ceil((s0 - reach) / tick) * tick; s <= s0 + reach; s += tick) { g.moveTo(...spot(s, 0)); g.lineTo(...spot(s - depth, depth)); }
   g.stroke();
 }
-function drawWheel(g, v, p, wheel) { // its rim and a spoke that turns with it
+// The part of a rim that faces the ground in this run, if the wheel never turns by half a turn: a curved foot.
+function soleOf(wheel) { // [from, to] as angles of the rim; null for a wheel that rolls on
+  if (wheel.sole === undefined) {
+    const [nx, ny] = run.grounds.length ? run.grounds[0].normal : [0, 1], angles = [];
+    for (let i = 0; i < time.length; i++) {
+      const [sx, sy, dx, dy] = [wheel.spoke[0][i], wheel.spoke[1][i], wheel.down[0][i], wheel.down[1][i]];
+      const angle = Math.atan2(-(nx * dx + ny * dy), -(nx * sx + ny * sy)), turn = 2 * Math.PI;
+      angles.push(i ? angle + turn * Math.round((angles[i - 1] - angle) / turn) : angle);
+    }
+    const low = Math.min(...angles), high = Math.max(...angles);
+    wheel.sole = high - low < Math.PI ? [low - 0.1, high + 0.1] : null;
+  }
+  return wheel.sole;
+}
+function drawWheel(g, v, p, wheel) { // its rim and a spoke that turns with it; of a curved foot its sole
   const [at, spoke, down] = [wheel.at, wheel.spoke, wheel.down].map((part) => part.map((axis) => mix(axis, p)));
   const r = mix(wheel.radius, p), rim = (angle) => v.to(project(at.map((x, k) => x + r * (Math.cos(angle) * spoke[k] + Math.sin(angle) * down[k]))));
-  const color = sideColor(wheel.side);
+  const color = sideColor(wheel.side), sole = soleOf(wheel), [from, to] = sole || [0, 2 * Math.PI];
   g.beginPath();
-  for (let k = 0; k <= 64; k++) { const q = rim((k * Math.PI) / 32); if (k) g.lineTo(...q); else g.moveTo(...q); }
-  g.globalAlpha = 0.12; g.fillStyle = color; g.fill(); g.globalAlpha = 1;
-  g.strokeStyle = color; g.lineWidth = 2.6; g.stroke();
+  for (let k = 0; k <= 64; k++) { const q = rim(from + ((to - from) * k) / 64); if (k) g.lineTo(...q); else g.moveTo(...q); }
+  g.strokeStyle = g.fillStyle = color; g.lineWidth = sole ? 3.6 : 2.6; g.stroke();
+  if (sole) { g.lineTo(...v.to(project(at))); g.closePath(); } // a wedge whose tip is the center of the curvature
+  g.globalAlpha = 0.12; g.fill(); g.globalAlpha = 1;
+  if (sole) { g.lineWidth = 1.2; g.stroke(); return; }
   g.lineWidth = 2; g.beginPath(); g.moveTo(...v.to(project(at))); g.lineTo(...rim(0)); g.stroke();
 }
 function drawBlade(g, v, p, blade) { // a dark line along which it moves
