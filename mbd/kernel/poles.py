@@ -17,6 +17,7 @@ from mbd.kernel.linear import solve_from_tips
 from mbd.kernel.mass_ratios import LOSS
 from mbd.kernel.records import Balance, Guards, Switching
 from mbd.kernel.restart import compose, consistent, evaluate, fill_block
+from mbd.kernel.scales import still_energy
 
 __all__ = ["leaps"]
 
@@ -64,7 +65,7 @@ def leaps(K: Switching, h: float, at_y: int) -> bool:
             return False
         most = max(max(a1, a2), max(a3, max(a0, a4)))
         if most > BEYOND * BEYOND * ends:
-            return h * h * most > motion_at(K, at_y)
+            return h * h * most > max(motion_at(K, at_y), 2.0 * still_energy(K))
         if halving >= AT_LEAST_HALVED and not rises and most < RISEN * RISEN * ends:
             return False
         if most == a0 or most == a1:  # the part around the largest: two of the four intervals

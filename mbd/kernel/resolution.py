@@ -22,6 +22,7 @@ from mbd.kernel.records import Equations, Guards, Kernel, SchemeAbilities, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import compose, consistent, evaluate, fill_block, stepping_rows
 from mbd.kernel.saddle import solve_rows
+from mbd.kernel.scales import still_energy
 from mbd.kernel.schemes.iteration import BENT, BYSTANDER, LOOK_TWICE, is_small
 
 __all__ = ["judge_change"]
@@ -34,6 +35,8 @@ COARSE = 0.2
 """Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
 UNEXPLAINED = 0.5
 """Part of the kinetic energy at the end of a step that may be neither old nor work of forces [-]."""
+LEAST_GAIN = 0.085
+"""Energy of the change of velocities over the kinetic one below which less than `UNEXPLAINED` is new, (1 − √½)² [-]."""
 FEWEST = 1.0 / 4096.0
 """Least part of D that is tried where accelerations are not finite at its other end [-]."""
 
@@ -93,16 +96,17 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     status = 0
     if rough_enough and outgrows(K, h, t1, stretch, at_y, at_D):
         status = OUTGROWN
-    elif rough_enough and rough > COARSE and gains(K, h, t1, at_y):
+    elif rough_enough and rough > COARSE and gains(K, h, t1, at_y, at_D):
         status = GAINED
     elif leaps(K, h, at_y):
         status = LEAPT
-    elif rough_enough and K.strategy == 0:
-        rough = max(rough, lag(K, h, at_y))
-        if rough > COARSE or K.estimates == 1:
-            note_coarse(K, t1, rough)
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
+    if status == 0 and rough_enough and K.strategy == 0:
+        if K.estimates == 0:
+            rough = uncertainty(K, h, t1, at_D)
+        if rough > COARSE or K.estimates == 1:
+            note_coarse(K, t1, rough)
     if K.n_dropped > 0:
         evaluate(K, t1, K.q1, K.y1)
     fill_block(K, t1, K.q1, K.y1)
@@ -115,21 +119,38 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     return status
 
 
-def lag(K: Guards, h: float, at_y: int) -> float:
-    """Largest part of a rate by which it misses ``h (a₀ + a₁)/2``, as the auxiliary a of the scheme lags behind v̇ [-].
+def uncertainty(K: Kernel, h: float, t1: float, at_D: int) -> float:
+    """Largest part of a rate that a candidate of the Newmark family may be off, by two estimates that rows leave open.
 
-    A scheme with strong numerical damping carries the a of a steep start on for some steps.
+    The error of the trapezoidal rule, as `largest_share` has it, and what misses ``h (a₀ + a₁)/2`` as the auxiliary a
+    of the scheme lags behind v̇: strong numerical damping carries the a of a steep start on for some steps. Rates that
+    rows hold, as those of a drive, are known however accelerations change.
     """
-    if K.estimates == 1:
-        return 0.0
+    worst = 0.0
+    holds = K.n_active > 0 and K.stabilized == 1
+    if holds:
+        evaluate(K, t1, K.q1, K.y1)
+    for turn in range(2):
+        for i in range(K.n):
+            missed = h / 12.0 * (K.rate1[i] - K.rate[i] - h * K.slope[i])
+            if turn == 1:
+                missed = K.y1[i] - K.y[i] - 0.5 * h * (K.rate[i] + K.rate1[i])
+            K.inside[at_D + i] = missed
+        if holds:
+            leave_rows_alone(K, at_D)
+        worst = max(worst, share_of_rates(K, at_D))
+    return worst
+
+
+def share_of_rates(K: Guards, at_D: int) -> float:
+    """Largest part of a rate that is in K.inside from `at_D` on; of one far below the fastest, over a part of that."""
     fastest = 0.0
     for i in range(K.n_v):
-        fastest = max(fastest, max(abs(K.y[i]), abs(K.inside[at_y + i])))
+        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
     floor = max(K.rest_speed, BYSTANDER * fastest)
     worst = 0.0
     for i in range(K.n):
-        missed = abs(K.inside[at_y + i] - K.y[i] - 0.5 * h * (K.rate[i] + K.rate1[i]))
-        worst = max(worst, missed / max(floor, max(abs(K.y[i]), abs(K.inside[at_y + i]))))
+        worst = max(worst, abs(K.inside[at_D + i]) / max(floor, max(abs(K.y[i]), abs(K.y1[i]))))
     return worst
 
 
@@ -232,15 +253,16 @@ def growth_between(K: Switching, h: float, stretch: float, part: float, at_D: in
             weight = K.inside[at_D + i] * K.acc[i * K.n + j]
             fed += weight * (K.trial_jump[j] - K.jump[j])
             size += weight * K.inside[at_D + j]
-    if size <= 0.0:
+    if size <= (2.0 * still_energy(K) if first < K.n_v else 0.0):  # in a mechanism at rest round-off feeds itself
         return 0.0
     return float(h * stretch * fed / (part * size))
 
 
-def gains(K: Switching, h: float, t1: float, at_y: int) -> bool:
+def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:
     """Whether more than half of the kinetic energy at the end is neither old nor work of forces along the way.
 
     Forces may change with time at any instant of the step: of those of its start and of its end the larger work counts.
+    What rows change of velocities, such as a drive's, is no gain: with it alone less than half would be unexplained.
     """
     old = 0.0
     new = 0.0
@@ -286,4 +308,15 @@ def gains(K: Switching, h: float, t1: float, at_y: int) -> bool:
             if node == 4:
                 new = energy
         most = max(most, work)
-    return new > 1.1 * old and new - old - most > UNEXPLAINED * new
+    if not (new > max(1.1 * old, still_energy(K)) and new - old - most > UNEXPLAINED * new):
+        return False
+    if K.n_active == 0:
+        return True
+    for i in range(K.n):
+        K.inside[at_D + i] = K.inside[at_y + i] - K.y[i]
+    leave_rows_alone(K, at_D)
+    free = 0.0
+    for i in range(K.n_v):
+        for j in range(K.n_v):
+            free += 0.5 * K.inside[at_D + i] * K.acc[i * K.n + j] * K.inside[at_D + j]
+    return free > LEAST_GAIN * new

@@ -21,6 +21,7 @@ from mbd.kernel.records import (
 )
 from mbd.kernel.redundancy import find_dependence, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.saddle import solve_rows
+from mbd.kernel.scales import note_extent
 
 __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
@@ -128,6 +129,7 @@ def measure(K: Equations) -> None:
             K.block[K.o_a + i] = unseen
     refresh_scales(K)
     K.block[K.o_a : K.o_a + K.n_v] = K.work[: K.n_v]
+    note_extent(K)
 
 
 def weigh(K: Model) -> None:

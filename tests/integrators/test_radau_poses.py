@@ -63,7 +63,7 @@ def told_sizes(run):
 
 
 def test_steps_at_which_newtons_method_failed_are_told_apart():
-    run = wild_scene(49).run()
+    run = wild_scene(28).run()
     assert told_sizes(run) == [
         f"{run.stats['shortened']} steps were shortened where Newton's method failed, or forces changed too much, "
         "at the full dt"

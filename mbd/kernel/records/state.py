@@ -89,6 +89,7 @@ class State(SchemeAbilities):
     step_taken: float = place("clock")  # by the candidate
     restart_due: int = place("state")  # 1: and the restart is stored as a row, 2: it is not
     misfit: float = place("clock")  # largest value of rows that depend on others at the last candidate [m, rad]
+    extent: float = place("clock")  # length of the mechanism, as far as it is known: see `mbd.kernel.scales` [m]
     turned: float = place("clock")  # way of joints whose coordinates do not add since the last row [rad]
     halvings: int = place("state")  # how often the step is halved
     halves_left: int = place("state")  # of it

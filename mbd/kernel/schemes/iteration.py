@@ -6,13 +6,13 @@ from mbd.kernel.codes import EPS
 from mbd.kernel.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Model, Motion, Settings, SingularSteps, Steps
-from mbd.kernel.restart import compose
+from mbd.kernel.restart import compose, note_scales, restore_scales
+from mbd.kernel.scales import ROUGH, add_force_floors
 from mbd.kernel.singular.step_pairs import WHOLE
 
 __all__ = [
-    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_small", "overturns", "predict", "residual_size", "roughly",
-    "runs_away",
-    "shift_growth", "soundness_at",
+    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_below_floors", "is_small", "measures_nothing", "overturns",
+    "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at",
 ]  # fmt: skip
 
 LOOK_TWICE = 0.01
@@ -113,6 +113,37 @@ def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance
 def roughly(K: Model) -> float:
     """Residuals over 256 times their round-off that pass for it; over K.blur, where that is more, only what it says."""
     return 16.0 if K.blur <= 256.0 * EPS else 1.0
+
+
+def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
+    """Whether a residual that falls no more is round-off beside what `mbd.kernel.scales` tells of forces that vanish.
+
+    Scales, which were raised to terms at the iterate, are those with their floors then.
+    """
+    if residual_size(K, o_r, m, 0.0, 0.0, 1.0, both) > 16.0:  # rows
+        return False
+    add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
+    return residual_size(K, o_r, 0, 0.0, 0.0, K.tolerance, both) <= 1.0
+
+
+def measures_nothing(K: Motion) -> bool:
+    """Whether scales of forces are round-off by `mbd.kernel.scales`; K.scale has floors in their place then.
+
+    Where nothing acted as they were noted, any residual is large beside them, and any correction seems to make it so.
+    It is for rows: forces are as large as the accelerations ask for that these have led to. `restore_scales` ends it.
+    """
+    note_scales(K)
+    add_force_floors(K, 1.0)
+    nothing = False
+    for i in range(K.n_v):
+        floor = K.scale[i]
+        floor = max(floor, abs(K.acc[i * K.n + i] * K.block[K.o_a + i]))
+        if floor < 1e300:
+            nothing = nothing or K.known[i] < ROUGH * EPS * floor
+            K.weight[i] = 1.0 / floor
+    if not nothing:
+        restore_scales(K)
+    return nothing
 
 
 def runs_away(K: Equations, m: int) -> bool:

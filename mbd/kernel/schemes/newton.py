@@ -21,7 +21,16 @@ from mbd.kernel.restart import (
     retain_scales,
     share_loads,
 )
-from mbd.kernel.schemes.iteration import finish, overturns, residual_size, roughly, runs_away, soundness_at
+from mbd.kernel.schemes.iteration import (
+    finish,
+    is_below_floors,
+    measures_nothing,
+    overturns,
+    residual_size,
+    roughly,
+    runs_away,
+    soundness_at,
+)
 from mbd.kernel.singular.newmark_step import WITHIN, misses, singular_newmark_step, steps_by_pivot, steps_to_singularity
 from mbd.kernel.singular.step_pairs import is_whole
 
@@ -72,6 +81,10 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         grown = error > FAR and error > 0.9 * left and not together  # shares that follow loads change it as well
+        if grown and m > 0 and measures_nothing(K):
+            size = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
+            grown = size > FAR and size > 0.9 * size_before(K, m, c_C, c_K, tolerance)
+            restore_scales(K)
         if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or grown):
             if fixed:
                 K.inverse_pivot = 0.0
@@ -158,6 +171,9 @@ def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, toleranc
         elif iteration >= 6 and K.exact == 0:
             if residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
                 error = -float(STAGNATED)
+        if (error > 1.0 or error == -float(STAGNATED)) and is_below_floors(K, o_r, m, K.stabilized):
+            K.n_stagnations += 1
+            error = 1.0
     if 0.0 <= error <= 1.0:
         retain_scales(K)
     else:
@@ -331,13 +347,31 @@ def correct(K: Equations, m: int, c_C: float, c_K: float, ready: bool, shifting:
 
 def retreat(K: Equations, m: int, c_C: float, c_K: float) -> None:
     """Take back half of the last correction of rates, velocities, positions and multipliers."""
-    n = K.n
-    for i in range(n + m):
+    for i in range(K.n + m):
         K.rhs[i] *= 0.5
+    take_back(K, m, c_C, c_K, 1.0)
+
+
+def take_back(K: Equations, m: int, c_C: float, c_K: float, part: float) -> None:
+    """Take back a part of the correction in K.rhs."""
+    n = K.n
     for i in range(n):
-        K.block[K.o_a + i] -= K.rhs[i]
-        K.block[K.o_v + i] -= c_C * K.rhs[i]
+        change = part * K.rhs[i]
+        K.block[K.o_a + i] -= change
+        K.block[K.o_v + i] -= c_C * change
         if i < K.n_v:
-            K.block[K.o_x + i] -= c_K * K.rhs[i]
+            K.block[K.o_x + i] -= c_K * change
     for k in range(m):
-        K.block[K.o_lam + K.rows[k]] -= K.rhs[n + k]
+        K.block[K.o_lam + K.rows[k]] -= part * K.rhs[n + k]
+
+
+def size_before(K: Equations, m: int, c_C: float, c_K: float, tolerance: float) -> float:
+    """The residual over its tolerance before the last correction, with the scales of now; K.out is left as it is."""
+    count = K.n + 2 * m + 1
+    K.spare[:count] = K.out[:count]
+    take_back(K, m, c_C, c_K, 1.0)
+    call(K, K.residual_program, K.out)
+    size = residual_size(K, 0, m, c_C, c_K, tolerance, K.stabilized)
+    take_back(K, m, c_C, c_K, -1.0)
+    K.out[:count] = K.spare[:count]
+    return size

@@ -19,9 +19,10 @@ from mbd.kernel.restart import (
     restore_scales,
     retain_scales,
 )
+from mbd.kernel.scales import ROUGH, add_force_floors
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
-from mbd.kernel.schemes.iteration import roughly, runs_away
+from mbd.kernel.schemes.iteration import measures_nothing, roughly, runs_away
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import (
@@ -133,6 +134,13 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
     for iteration in range(K.max_iterations):
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
         grown = error > FAR_OFF and error > 0.9 * left and not sharing(K)  # shares that follow loads change it as well
+        if grown and m > 0 and measures_nothing(K):
+            retreat_stages(K, m, 1.0)
+            size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
+            retreat_stages(K, m, -1.0)
+            size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) / (size + 1e-300)
+            grown = size > 0.9
+            restore_scales(K)
         if retreats < MOST_RETREATS and iteration > 0 and (error < 0.0 or grown):
             retreat_stages(K, m, 0.5)  # a full Newton step jumped over a steep place
             retreats += 1
@@ -263,12 +271,18 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
             return TOO_TIGHT
         K.n_stagnations += 1
         return 0
+    status = NOT_CONVERGED
     if stuck and evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:  # else they do for what was asked
         if evaluate_stages(K, h, t1, m, 1e5 * EPS, 0.0, 0.0, False) <= 1e3:
-            return STAGNATED
-    if evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
+            status = STAGNATED
+    if status == NOT_CONVERGED and evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
         return 0
-    return NOT_CONVERGED
+    if evaluate_stages(K, h, t1, m, 1.0, 0.0, 0.0, False) <= 16.0:  # rows are round-off
+        add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
+        if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
+            K.n_stagnations += 1
+            return 0
+    return status
 
 
 def was_enough(K: Kernel, h: float, t1: float, m: int, iteration: int, error: float, left: float) -> bool:

@@ -23,7 +23,16 @@ from mbd.kernel.restart import (
     share_loads,
 )
 from mbd.kernel.roots import sqrt
-from mbd.kernel.schemes.iteration import finish, overturns, predict, residual_size, runs_away, soundness_at
+from mbd.kernel.scales import still_speed
+from mbd.kernel.schemes.iteration import (
+    finish,
+    is_below_floors,
+    overturns,
+    predict,
+    residual_size,
+    runs_away,
+    soundness_at,
+)
 from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
 from mbd.kernel.singular.step_pairs import is_of_pair, is_whole
 
@@ -247,7 +256,8 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
                 restore_scales(K)
                 return NOT_CONVERGED
             error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
-            if error > 1.0 and residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, 0) <= 16.0:
+            rough = residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, 0)
+            if error > 1.0 and (rough <= 16.0 or is_below_floors(K, o_r, m, 0)):
                 K.n_stagnations += 1
                 error = 1.0
             if error <= 1.0:
@@ -326,5 +336,5 @@ def leaves_branch(K: Motion, h: float) -> bool:
     change = 0.0
     for i in range(K.n_v):
         fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])) + h * abs(K.rate[i]))
-        change = max(change, abs(K.block[K.o_v + i] - K.y1[i]))
+        change = max(change, abs(K.block[K.o_v + i] - K.y1[i]) - still_speed(K, i))
     return change > CONTINUOUS * fastest
