@@ -42,6 +42,9 @@ All from `parts_to_take` on are what few steps need: with them inside, the loop 
 in one piece.
 """
 
+LISTED = contract.SCHEMES
+"""The schemes of the package; a kernel with others is built at once, since no other process knows of them."""
+
 ENTRY_FUNCTION = """
 def mbd_kernel(K: Kernel) -> int:
     return march_many(K) if K.many == 1 else advance(K)
@@ -100,6 +103,11 @@ def kernel_object() -> bytes:
     return object_of(kernel_text())
 
 
+def tag() -> str:
+    """What the optimized kernel is called in the cache."""
+    return f"kernel {source_digest()}"
+
+
 def kernel_text() -> str:
     """The kernel in LLVM's words."""
     from mbd.kernel.llvm import llvm_text
@@ -123,8 +131,37 @@ def kernel_functions() -> list[Function]:
 
 @lru_cache(maxsize=1)
 def entry() -> Callable[[int], int]:
-    """The compiled kernel: ``entry(address of table) → status``."""
-    from mbd.compile.llvm import cached_object, load_object
+    """The compiled kernel: ``entry(address of table) → status``; at first perhaps one without optimization."""
+    from mbd.compile.cache import default_cache
+    from mbd.compile.llvm import cached_object, load_object, tag_key
+    from mbd.kernel.first_build import is_allowed
 
-    address = load_object(cached_object(f"kernel {source_digest()}", kernel_object, lasting=True), ENTRY)
+    if contract.SCHEMES == LISTED and is_allowed() and default_cache().load(tag_key(tag()), lasting=True) is None:
+        return _quick_entry()
+    return _called(load_object(cached_object(tag(), kernel_object, lasting=True), ENTRY))
+
+
+def _quick_entry() -> Callable[[int], int]:
+    """A kernel without optimization, until a process beside this one has made the other."""
+    from mbd.compile.llvm import Machine, cached_object
+    from mbd.kernel.first_build import start_build
+
+    def quick() -> bytes:
+        print(
+            "mbd: building the stepping kernel, once for this machine; a faster one follows in the background …",
+            file=sys.stderr, flush=True,
+        )  # fmt: skip
+        return object_of(kernel_text(), 0)
+
+    _machines.append(Machine())
+    code = cached_object(f"level 0 {source_digest()}", quick)
+    start_build(then=entry.cache_clear)
+    return _called(_machines[-1].load(code, [ENTRY])[0])
+
+
+_machines: list[Any] = []
+"""What holds quick kernels, which may still be running."""
+
+
+def _called(address: int) -> Callable[[int], int]:
     return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)

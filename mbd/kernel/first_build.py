@@ -1,0 +1,79 @@
+"""The first run on a machine: a kernel without optimization at once, the optimized one from a process beside it.
+
+All levels of optimization give the same bits, so a run may begin with one kernel and end with the other.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+from mbd.compile.cache import default_cache
+from mbd.compile.llvm import tag_key
+
+__all__ = ["build", "is_allowed", "start_build"]
+
+LONGEST = 600.0
+"""Seconds after which a build that has not ended is taken for dead, and another may begin."""
+
+PAUSE = 0.5
+"""Seconds between two looks at whether another process has built the kernel."""
+
+COMMAND = "from mbd.kernel.first_build import build; build()"
+
+
+def is_allowed() -> bool:
+    """Whether the optimized kernel may come later: it is kept for the next process, and no level was asked for."""
+    from mbd.compile.backend import LEVEL
+
+    directory = default_cache().directory
+    return directory is not None and LEVEL not in os.environ
+
+
+def start_build(then: Callable[[], None]) -> None:
+    """Build the optimized kernel in a process that outlives this one; call `then`, from a thread, when it is there."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+    except OSError:  # no further processes: the next run tries again
+        return
+
+    def wait() -> None:
+        if process.wait() == 0:
+            then()
+
+    threading.Thread(target=wait, name="mbd kernel build", daemon=True).start()
+
+
+def build() -> None:
+    """Build the optimized kernel for the cache, or wait for the process that does."""
+    from mbd.kernel.build import kernel_text, object_of, tag
+
+    store, key = default_cache(), tag_key(tag())
+    assert store.directory is not None
+    store.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+    mark = store.directory / f"{key}.building"
+    while store.load(key, lasting=True) is None:
+        with contextlib.suppress(OSError):
+            if time.time() - mark.stat().st_mtime > LONGEST:
+                mark.unlink()
+        try:
+            mark.touch(mode=0o600, exist_ok=False)
+        except FileExistsError:
+            time.sleep(PAUSE)
+            continue
+        try:
+            if hasattr(os, "nice"):
+                os.nice(10)  # beside the run that waits for nothing
+            store.store(key, object_of(kernel_text()), lasting=True)
+        finally:
+            mark.unlink(missing_ok=True)
+        break

@@ -1,0 +1,70 @@
+"""The first run on a machine begins with a kernel without optimization; the optimized one comes from beside it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from mbd.compile.cache import default_cache
+from mbd.compile.llvm import tag_key
+from mbd.kernel import build, first_build
+
+SCRIPT = """
+import time, mbd
+model = mbd.Model("pendulum")
+model.connect(mbd.Revolute("hinge", model.ground.origin, mbd.Link("rod", mass=1.0, length=1.0, center=0.5).start))
+start = mbd.assemble(model, position={"hinge.angle": 0.5})
+ends = [float(mbd.simulate(model, start, dt=1e-3, until=2.0)["hinge.angle"][-1])]
+from mbd.kernel.build import entry
+quick, limit = entry(), time.monotonic() + 300.0
+while entry() is quick and time.monotonic() < limit:
+    time.sleep(0.1)
+ends.append(float(mbd.simulate(model, start, dt=1e-3, until=2.0)["hinge.angle"][-1]))
+print(ends[0] == ends[1], entry() is not quick)
+"""
+
+
+@pytest.mark.slow
+def test_a_first_run_goes_over_to_the_optimized_kernel_with_the_same_bits(tmp_path):
+    environment = {name: value for name, value in os.environ.items() if name != "MBD_OPTIMIZATION_LEVEL"}
+    environment |= {"MBD_CACHE": str(tmp_path), "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    told = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, timeout=600)
+    assert told.stdout == "True True\n", told.stderr
+    assert "a faster one follows in the background" in told.stderr
+    assert not list(tmp_path.glob("*.building"))
+
+
+def test_a_level_that_was_asked_for_and_a_cache_that_keeps_nothing_have_the_kernel_at_once(monkeypatch, tmp_path):
+    monkeypatch.setenv("MBD_CACHE", str(tmp_path))
+    assert not first_build.is_allowed(), "the tests ask for a level"
+    monkeypatch.delenv("MBD_OPTIMIZATION_LEVEL")
+    assert first_build.is_allowed()
+    monkeypatch.setenv("MBD_CACHE", "off")
+    assert not first_build.is_allowed()
+
+
+def test_two_processes_build_the_kernel_once(monkeypatch, tmp_path):
+    monkeypatch.setenv("MBD_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(first_build, "PAUSE", 0.01)
+    monkeypatch.setattr(os, "nice", lambda steps: 0, raising=False)
+    monkeypatch.setattr(build, "kernel_text", lambda: "text")
+    made: list[str] = []
+
+    def slowly(text: str) -> bytes:
+        made.append(text)
+        time.sleep(0.1)
+        return b"machine code"
+
+    monkeypatch.setattr(build, "object_of", slowly)
+    threads = [threading.Thread(target=first_build.build) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(10.0)
+    assert made == ["text"] and default_cache().load(tag_key(build.tag()), lasting=True) == b"machine code"
+    assert not list((tmp_path / "cache").glob("*.building"))
