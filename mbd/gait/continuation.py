@@ -9,13 +9,14 @@ those of the chart around the last point.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import GaitError, SimulationError
+from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.floquet import Multipliers, multipliers_of
 from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured, numbers_of
 from mbd.gait.outcome import Outcome
@@ -66,12 +67,16 @@ class BranchPoint:
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
-    """A solution near a prediction: the state, the parameter, what the map gave there, corrections that it took."""
+    """A solution near a prediction: the state, the parameter, what the map gave there, corrections that it took.
+
+    left : by how much one more correction would change the parameter
+    """
 
     state: State
     value: float
     found: Measured
     corrections: int
+    left: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,8 @@ class Continuation:
         if derivative.missing:
             why = next(iter(derivative.missing.values()))
             raise GaitError(f"no derivative at {self.name} = {corrected.value:.9g}: {why}")
+        if levels > 2:
+            derivative = self._exact(derivative, chart, values)
         matrix = self._matrix(derivative, chart.size)
         tangent = _null_vector(matrix)
         if before is not None:
@@ -126,6 +133,15 @@ class Continuation:
             multipliers_of(derivative.matrix[:size, :size], derivative.error[:size, :size]), tangent, matrix, chart,
             arrival.events,
         )  # fmt: skip
+
+    def _exact(self, found: MapDerivative, chart: Chart, values: Mapping[str, float]) -> MapDerivative:
+        """The derivative with P from passes over runs, where they know it; its error is what differences leave."""
+        exact, size = exact_derivative(self.map, chart, np.zeros(chart.size), values), chart.size
+        if exact is None:
+            return found
+        matrix, error = found.matrix.copy(), found.error.copy()
+        matrix[:size, :size], error[:size, :size] = exact, np.abs(exact - found.matrix[:size, :size])
+        return MapDerivative(matrix, error, f"exact; by the parameter {found.how}", found.missing)
 
     def whole(self, point: BranchPoint) -> Vector:
         """The tangent in the coordinates of the mechanism, for the chart of another point."""
@@ -164,7 +180,9 @@ class Continuation:
             gap = np.append(found.c - u[:size], float(plane @ u) - ds)
             residual = float(np.max(np.abs(gap)))
             if residual <= self.tol:
-                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number)
+                step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
+                left = self.width * abs(float(step[-1]))
+                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, left)
             if residual > SLOW * before:
                 renewed = self.matrix_at(chart, u, values)
                 if renewed is None or residual > 4.0 * before:
@@ -173,6 +191,10 @@ class Continuation:
             before = min(residual, before)
             u = u - np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
         return Outcome("does not converge", "the corrections do not converge")
+
+    def with_half_steps(self) -> Continuation:
+        """The same with half the step of the map: where what it finds differs, that is the error of the steps."""
+        return replace(self, map=self.map.with_step(0.5 * self.map.dt))
 
     def last_allowed(self, allowed: float, forbidden: float) -> float:
         """The last value of the parameter between two that the model allows."""

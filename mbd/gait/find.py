@@ -18,7 +18,7 @@ from mbd.gait.cycle import LimitCycle
 from mbd.gait.limit_cycle import FIRST, map_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import ReturnMap
-from mbd.gait.search import Failed, Search, fallen_first, first_return, on_section, search, with_step
+from mbd.gait.search import Failed, Search, fallen_first, first_found, first_return, on_section
 from mbd.integrators import Integrator, RungeKutta853
 from mbd.notebook import table
 from mbd.progress import share_bar
@@ -133,21 +133,21 @@ class _Hunt:
     def one(self, start: State, values: Mapping[str, float]) -> tuple[Outcome, int]:
         """What becomes of a start; the number of its gait."""
         all_values = {**self.map.values, **values}
-        given, state = self.given, None
+        given, dt = self.given, self.dt
+        states: tuple[State, ...] = ()
         if given is not None:
-            state = on_section(given.section, start, self.map.vector(all_values), FAR)
-        if state is None:
+            near, dt = on_section(given.section, start, self.map.vector(all_values), FAR), given.map.dt
+            states = () if near is None else (near,)
+        if not states:
             begun = first_return(self.map, start, all_values)
             if isinstance(begun, Failed):
                 return begun.outcome, -1
-            state = begun[1]
-            if given is None:
-                given, _ = with_step(Search(self.map, begun[0], self.tol), state, all_values, self.dt)
+            given, states = given or Search(self.map, begun[0], self.tol), begun[1]
         assert given is not None
-        gait = fallen_first(search(given, state, all_values), start, all_values)
+        gait = fallen_first(first_found(given, states, all_values, dt), start, all_values)
         if not gait.success:
             return gait.outcome, -1
-        self.given = given
+        self.given = gait.given
         return gait.outcome, self._known(gait)
 
     def _known(self, gait: LimitCycle) -> int:

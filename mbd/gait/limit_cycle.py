@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from mbd.gait.floquet import Multipliers
 from mbd.gait.heading import heading_of
 from mbd.gait.mirror import mirror_of
 from mbd.gait.return_map import ReturnMap
-from mbd.gait.search import Failed, Search, fallen_first, first_return, search, with_step
+from mbd.gait.search import Failed, Search, fallen_first, first_found, first_return
 from mbd.gait.section import Chart, section_of
 from mbd.gait.unmoved import depends_on_time, moving_on, reset_names
 from mbd.integrators import Integrator, RungeKutta853
@@ -59,7 +60,7 @@ def limit_cycle(
     Parameters
     ----------
     model : a `Model` or `Lagrangian`
-    start : near the gait. One that is not just after the event is simulated to it first
+    start : near the gait, at whatever time. One that is not just after the event is simulated to it first
     integrator : default ``RungeKutta853()``; its steps are of equal size, so that the map is smooth
     section : name of the contact or event at which a return ends, and just after which the next begins
     mirror : two words in names whose exchange makes the next step the same as the one before, ``("left", "right")``,
@@ -74,7 +75,7 @@ def limit_cycle(
     wrt : parameters, or functions of them, by which derivatives are found at once; others when they are asked for
     modulo : coordinates that need not come back; None: those that nothing but places of touchdown depends on, and on
         level ground the heading of a walker in space
-    longest : latest time of one return [s]
+    longest : duration of one return at most [s]
     on_failure : 'raise' a `GaitError` where there is no gait, or 'return' it with success False
     backend : see `mbd.simulate`
 
@@ -95,6 +96,7 @@ def limit_cycle(
     scheme = RungeKutta853() if integrator is None else integrator
     numbers = {"dt": dt, "tol": tol, "longest": longest}
     check_arguments(start, scheme, strides, numbers, parameters, functions, wrt, on_failure)
+    start = replace(start, time=0.0, memory=None)
     map_ = map_of(model, start, scheme, dt or FIRST, (section, mirror, strides), parameters, functions, modulo, longest,
                   backend)  # fmt: skip
     gait = _found(map_, start, dt, tol)
@@ -156,9 +158,8 @@ def _found(map_: ReturnMap, start: State, dt: float | None, tol: float) -> Limit
     begun = first_return(map_, start, map_.values)
     if isinstance(begun, Failed):
         return _none(map_, begun)
-    section, state = begun
-    given, _ = with_step(Search(map_, section, tol), state, map_.values, dt)
-    return fallen_first(search(given, state, map_.values), start, map_.values)
+    section, states = begun
+    return fallen_first(first_found(Search(map_, section, tol), states, map_.values, dt), start, map_.values)
 
 
 def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:

@@ -39,6 +39,23 @@ def limit_between(
     beyond : what the walk comes to at ds, where that is known
     back : distance from the limit at which its `before` lies, at least that of the gait given
     """
+    low, high, good, beyond = _bracket(given, last, ds, beyond)
+    if beyond is None:
+        beyond = _lost_at(given, last, high)
+    kind, what = _kind(given, last, beyond)
+    if not kind:
+        return None
+    point = _point(given, last, good)
+    finer = _bracket(given.with_half_steps(), last, ds, None)[2]
+    of_steps = 0.0 if finer is None or good is None else abs(finer.value - good.value) + finer.left
+    error = (high - low) * given.width + (0.0 if good is None else good.left) + of_steps
+    return SpecialPoint(kind, point.value, point, error, what, _before(given, last, low - back if back else 0.0))
+
+
+def _bracket(
+    given: Continuation, last: BranchPoint, ds: float, beyond: Arrival | None
+) -> tuple[float, float, Corrected | None, Arrival | None]:  # fmt: skip
+    """Places along the tangent up to and from which events are those of before and others, with what there is."""
     low, high, good = 0.0, ds, None
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -50,14 +67,7 @@ def limit_between(
             beyond = corrected.found.arrival if isinstance(corrected, Corrected) else beyond
         if high - low <= LOCATED:
             break
-    if beyond is None:
-        beyond = _lost_at(given, last, high)
-    kind, what = _kind(given, last, beyond)
-    if not kind:
-        return None
-    point = _point(given, last, good)
-    error = (high - low + given.tol) * given.width
-    return SpecialPoint(kind, point.value, point, error, what, _before(given, last, low - back if back else 0.0))
+    return low, high, good, beyond
 
 
 def _before(given: Continuation, last: BranchPoint, place: float) -> BranchPoint:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart, Section, section_of
 from mbd.state import State
 
-__all__ = ["Failed", "Search", "fallen_first", "first_return", "gait_at", "search"]
+__all__ = ["Failed", "Search", "fallen_first", "first_found", "first_return", "gait_at", "search"]
 
 FIRST_STEPS, HALVINGS = 11.8, 9
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
@@ -52,9 +52,21 @@ class Failed:
     outcome: Outcome
 
 
-def first_return(map_: ReturnMap, start: State, values: Values) -> tuple[Section, State] | Failed:
-    """The section, from where the first return arrives, and a state on it to begin with: the start, if it is one."""
+def first_return(
+    map_: ReturnMap, start: State, values: Values, within: bool = True
+) -> tuple[Section, tuple[State, ...]] | Failed:  # fmt: skip
+    """The section, from where the first return arrives, and states on it to begin with in turn.
+
+    The start is the first, if it is one; it may look like one within a step, as the feet pass each other.
+
+    within : whether the start may lie within a step, whose foot may have passed the other already, so that it comes
+        down on the side of the other on which it is; then the return after that tells whether it walks
+    """
     arrival = map_(start, values, strides=1)
+    if within and arrival.outcome.kind == "scuffs":
+        later = first_return(map_, arrival.state, values, within=False)
+        if not isinstance(later, Failed):
+            return later
     if not arrival.outcome.good:
         return Failed(start, map_.explained(start, arrival.outcome, values))
     parameters = map_.vector(values)
@@ -62,7 +74,8 @@ def first_return(map_: ReturnMap, start: State, values: Values) -> tuple[Section
     before = arrival.before if map_.mirror is None else map_.mirror.names(arrival.before)
     section = section_of(map_.mechanism, map_.manager, name, arrival.state, before, parameters, map_.fixed,
                          map_.heading)  # fmt: skip
-    return section, on_section(section, start, parameters) or arrival.state
+    near = on_section(section, start, parameters)
+    return section, (arrival.state,) if near is None else (near, arrival.state)
 
 
 def on_section(section: Section, start: State, parameters: Vector, near: float = NEAR) -> State | None:
@@ -110,6 +123,19 @@ def search(given: Search, start: State, values: Values, near: tuple[Chart, Matri
     map_, tol = given.map, given.tol
     map_.runs = 0
     return gait_at(given, fixed_point(map_, given.section, start, values, tol, near), values)
+
+
+def first_found(given: Search, states: Sequence[State], values: Values, dt: float | None) -> LimitCycle:
+    """The gait near the first of some states of the section from which one is found; what the first came to if none."""
+    first: LimitCycle | None = None
+    for state in states:
+        stepped, _ = with_step(given, state, values, dt)
+        found = search(stepped, state, values)
+        if found.success:
+            return found
+        first = first or found
+    assert first is not None
+    return first
 
 
 def fallen_first(found: LimitCycle, start: State, values: Values) -> LimitCycle:

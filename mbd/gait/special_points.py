@@ -11,7 +11,7 @@ branch point : ``det [P − 1, σ F_p; τᵀ]``; another branch crosses, such as
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ LOCATED = 1e-12
 """Width of the parameter, over that of its range, at which a point counts as located [-]."""
 CLOSE, SECANTS = 1e-3, 8
 """Change of the parameter, over its range, from which on derivatives are found with least errors [-], and how often."""
+FINER = 1e-3
+"""Residual of gaits at special points over that of others, where it is reached [-]."""
 COMPLEX = 1e-7
 """Imaginary part from which on a pair of multipliers is complex [-]."""
 
@@ -35,7 +37,8 @@ class SpecialPoint:
     """Where a branch turns or its stability changes.
 
     kind : one of `KINDS`; value : of the parameter; point : the gait there
-    error : half the width of the bracket in which the parameter lies, and what the error of P makes of it
+    error : of the parameter: the width of the bracket in which it lies, and what the error of P, that of the steps of
+        the map, found with half of them, and what is left of its equations make of it
     what : the contact or event that it is about; '' of folds, doublings, tori and branch points
     before : where the events of the walk change there, a gait of the branch before it
     """
@@ -83,8 +86,8 @@ def special_points(given: Continuation, one: BranchPoint, other: BranchPoint, ds
     found = []
     for kind, test in TESTS.items():
         ends = test(one), test(other)
-        if kind in ("torus", "doubling") and len(one.multipliers.values) != len(other.multipliers.values):
-            continue  # a direction was forgotten on the way
+        if kind == "torus" and len(one.multipliers.values) != len(other.multipliers.values):
+            continue  # a direction was forgotten on the way, whose multiplier of 0 is a factor −1 of each pair
         if np.isfinite(ends).all() and ends[0] * ends[1] < 0.0:
             located = _located(given, one, other, ds, test)
             if located is not None and _is_one(kind, located[0]):
@@ -112,9 +115,10 @@ def _located(
     side, value, slope = 0, other.value, (fb - fa) / ds
     for _ in range(ITERATIONS):
         middle = b - fb * (b - a) / (fb - fa)
-        point = _at(given, one, middle, 2)
-        if point is None:
+        found = _at(given, one, middle, 2)
+        if found is None:
             return None
+        point = found[0]
         now, change, value = test(point), abs(point.value - value), point.value
         slope = (now - fb) / (middle - b) if middle != b else slope
         if now == 0.0 or change <= CLOSE * given.width:
@@ -131,12 +135,13 @@ def polished(
 ) -> tuple[BranchPoint, float] | None:
     """The zero of a test function near a place along the tangent, and its error."""
     along = np.inf
-    best: tuple[BranchPoint, float] | None = None
+    best: tuple[BranchPoint, float, float, float] | None = None
     last: tuple[float, float] | None = None
     for _ in range(SECANTS):
-        point = _at(given, one, place, 3)
-        if point is None:
+        found = _at(given, one, place, 3)
+        if found is None:
             break
+        point, left = found
         now = test(point)
         if last is not None and place != last[0] and now != last[1]:
             slope = (now - last[1]) / (place - last[0])
@@ -145,17 +150,29 @@ def polished(
         if abs(step) >= along:  # no more is to be had from these derivatives
             break
         along, last = abs(step), (place, now)
-        best = point, float(rate * along + abs(rate * point.multipliers.error / (slope or 1.0)))
+        best = point, float(rate * along + abs(rate * point.multipliers.error / (slope or 1.0)) + left), place, rate
         if rate * along <= LOCATED * given.width:
             break
         place += step
-    return best
-
-
-def _at(given: Continuation, one: BranchPoint, place: float, levels: int) -> BranchPoint | None:
-    """The point at a distance along the tangent of another one; None where there is none."""
-    try:
-        corrected = given.corrected(one, one.tangent, place)
-        return given.point(corrected, given.whole(one), levels) if isinstance(corrected, Corrected) else None
-    except MbdError:
+    if best is None:
         return None
+    point, error, place, rate = best
+    finer = _at(given.with_half_steps(), one, place, 3)
+    if finer is None:
+        return point, error
+    of_steps = abs(finer[0].value - point.value) + rate * abs((test(finer[0]) - test(point)) / (slope or 1.0))
+    return point, float(error + of_steps + finer[1])
+
+
+def _at(given: Continuation, one: BranchPoint, place: float, levels: int) -> tuple[BranchPoint, float] | None:
+    """The point at a distance along the tangent of another one, with what is left of its equations in the parameter;
+    None where there is none.
+    """
+    for tol in (FINER * given.tol, given.tol):
+        try:
+            corrected = replace(given, tol=tol).corrected(one, one.tangent, place)
+            if isinstance(corrected, Corrected):
+                return given.point(corrected, given.whole(one), levels), corrected.left
+        except MbdError:
+            return None
+    return None

@@ -1,4 +1,13 @@
-"""From a period doubling onto the branch of gaits of twice the period."""
+"""From a period doubling onto the branch of gaits of twice the period.
+
+A gait of two periods beside the doubling passes the states ``s ± ε d`` in turn:
+
+    ½ (F(s + ε d, p) + F(s − ε d, p)) = s,   (F(s + ε d, p) − F(s − ε d, p))/(2 ε) = −d,   φᵀ d = 1
+
+with φ the mode of the multiplier −1 at the doubling. At ε = 0 these are the equations of the doubling itself, whose
+Jacobian is regular, so that Newton's method leads from it to every small ε, while that of ``F(F(c, p), p) = c`` is
+singular there.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +16,22 @@ from typing import Any
 
 import numpy as np
 
-from mbd.errors import GaitError
-from mbd.gait.continuation import BranchPoint, Continuation, Corrected
+from mbd.arrays import Matrix, Vector
+from mbd.errors import GaitError, SimulationError
+from mbd.gait.continuation import BranchPoint, Continuation
 from mbd.gait.cycle import LimitCycle
-from mbd.gait.map_derivative import Measured, measured
+from mbd.gait.map_derivative import Measured, map_derivative, measured
 from mbd.gait.search import Search, search
 
 __all__ = ["doubled"]
 
-AMPLITUDES = (0.02, 0.01, 0.04, 0.005)
-"""Distances from the gait along its critical mode at which the other branch is looked for, in turn [-]."""
+AMPLITUDE, FALL, TIMES = 0.02, 0.4, 9
+"""Distance from the doubling along its mode at which the other branch is looked for first [-], its factor where that
+leads too far, and how often. In a cascade of doublings each leads less far than the one before by about this factor."""
+NEAR = (0.0, 2.0)
+"""Bounds of the multiplier that is 1 at the doubling, within which a gait of two periods is taken as near to it [-]."""
+CORRECTIONS, FINE = 12, 1e-10
+"""Newton corrections of a gait of two periods, and the residual at which they end [m, rad]."""
 APART = 0.2
 """Least distance of two steps of the doubled gait from each other, over twice the amplitude [-]."""
 
@@ -24,29 +39,91 @@ APART = 0.2
 def doubled(given: Continuation, special: Any, base: Any) -> LimitCycle:
     """The gait of two periods beside a doubling.
 
-    With φ the mode of the multiplier −1, ``F(F(c, p), p) = c`` is solved for (c, p) on the plane φᵀ c = ε: the doubled
-    branch leaves the point along φ, p changes with ε².
+    The amplitude falls until the gait is near the doubling: so far from it that its multiplier, 1 there, is still above
+    0. Where that is never so the first gait that was found is taken.
+
+    Raises
+    ------
+    GaitError
+        where none is found.
     """
     point: BranchPoint = special.point
     critical = int(np.argmin(np.abs(point.multipliers.values + 1.0)))
     mode = np.real(point.multipliers.modes[:, critical])
-    plane = np.append(mode / np.linalg.norm(mode), 0.0)
+    mode = mode / np.linalg.norm(mode)
     twice = replace(given.map, strides=2 * given.map.strides)
-    branch = Continuation(twice, given.section, given.name, given.values, given.width, given.tol)
-    for amplitude in AMPLITUDES:
-        beside = branch.matrix_at(point.chart, amplitude * plane, given.with_value(point.value))
-        if beside is None:  # at the point itself the matrix is singular
+    first: LimitCycle | None = None
+    level = np.log2(given.map.strides)
+    for amplitude in AMPLITUDE * FALL ** (level + np.arange(TIMES)):
+        pair = _pair(given, point, mode, amplitude)
+        if pair is None:
             continue
-        corrected = branch.corrected(replace(point, matrix=beside), plane, amplitude)
-        if not isinstance(corrected, Corrected):
+        start, value = pair
+        values = given.with_value(value)
+        state = point.chart.at(start, given.map.vector(values))
+        found = search(Search(twice, given.section, given.tol), state, values)
+        if not found.success or not _is_doubled(given, found, amplitude):
             continue
-        values = branch.with_value(corrected.value)
-        once = measured(given.map, point.chart, point.chart.of(corrected.state), values)
-        if not isinstance(once, Measured):
-            continue
-        apart = float(np.linalg.norm(once.c - point.chart.of(corrected.state)))
-        if apart > APART * 2.0 * amplitude:
-            found = search(Search(twice, given.section, given.tol), corrected.state, values)
-            if found.success:
-                return found
-    raise GaitError(f"no gait of two periods was found beside {special!r}", base)
+        along = np.abs(mode @ (point.chart.basis.T @ (found.chart.basis @ found.stability_of.modes)))
+        nearest = found.multipliers[int(np.argmax(along))] if len(along) else np.nan
+        if NEAR[0] < nearest.real < NEAR[1]:
+            return found
+        first = first or found
+    if first is None:
+        raise GaitError(f"no gait of two periods was found beside {special!r}", base)
+    return first
+
+
+def _pair(given: Continuation, point: BranchPoint, mode: Vector, amplitude: float) -> tuple[Vector, float] | None:
+    """(s + ε d, p) of the gait of two periods; None where Newton's method does not lead to one."""
+    size, s, d, value = len(mode), np.zeros(len(mode)), mode.copy(), point.value
+    before = np.inf
+    for _ in range(CORRECTIONS):
+        values = given.with_value(value)
+        try:
+            ends = [measured(given.map, point.chart, s + sign * amplitude * d, values) for sign in (1.0, -1.0)]
+        except SimulationError:
+            return None
+        one, other = ends
+        if given.map.faults(values) or not isinstance(one, Measured) or not isinstance(other, Measured):
+            return None
+        rest = [0.5 * (one.c + other.c) - s, (one.c - other.c) / (2.0 * amplitude) + d, [mode @ d - 1.0]]
+        gap = np.concatenate(rest)
+        left = float(max(np.max(np.abs(rest[0])), amplitude * np.max(np.abs(rest[1]))))
+        if left <= FINE:
+            return s + amplitude * d, value
+        if left > 4.0 * before:
+            return None
+        before = min(before, left)
+        slopes = [_slope(given, point, s + sign * amplitude * d, value, end)
+                  for sign, end in ((1.0, one), (-1.0, other))]  # fmt: skip
+        if slopes[0] is None or slopes[1] is None:
+            return None
+        mean, change = 0.5 * (slopes[0] + slopes[1]), 0.5 * (slopes[0] - slopes[1])
+        P, bend = mean[:, :size], change[:, :size]
+        matrix = np.block([
+            [P - np.eye(size), amplitude * bend, mean[:, size:]],
+            [bend / amplitude, P + np.eye(size), change[:, size:] / amplitude],
+            [np.zeros((1, size)), mode[np.newaxis], np.zeros((1, 1))],
+        ])  # fmt: skip
+        step = np.linalg.lstsq(matrix, gap, rcond=None)[0]
+        s, d, value = s - step[:size], d - step[size : 2 * size], value - given.width * float(step[-1])
+    return None
+
+
+def _slope(given: Continuation, point: BranchPoint, c: Vector, value: float, base: Measured) -> Matrix | None:
+    """[P, σ F_p] at a state beside the doubling; None where derivatives are missing."""
+    try:
+        found = map_derivative(given.map, point.chart, c, given.with_value(value), [given.name], levels=2, base=base)
+    except SimulationError:
+        return None
+    size = point.chart.size
+    matrix = found.matrix[:size].copy()
+    matrix[:, size] *= given.width
+    return None if found.missing else matrix
+
+
+def _is_doubled(given: Continuation, found: LimitCycle, amplitude: float) -> bool:
+    """Whether the two halves of a gait of two periods differ."""
+    once = measured(given.map, found.chart, np.zeros(found.chart.size), found.parameters)
+    return isinstance(once, Measured) and float(np.linalg.norm(once.c)) > APART * 2.0 * amplitude

@@ -119,7 +119,7 @@ class RepeatedRun:
         each = [dict(own)] * len(starts) if isinstance(own, Mapping) else [dict(one) for one in own]
         if len(each) != len(starts):
             raise ModelError(f"there are {len(starts)} starts and {len(each)} sets of parameters; give one for each")
-        if self.alone:
+        if self.alone or not starts:
             return [self(start, values) for start, values in zip(starts, each, strict=True)]
         known: list[tuple[dict[str, float], Vector]] = []
         for values in each:
