@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from mbd.bodies.domains import ParameterCheck
 from mbd.equations.coordinate_scope import identifier
 from mbd.equations.cost import Cost
+from mbd.equations.derivation import derivation_faults
 from mbd.equations.energies import Lowering, assembled
 from mbd.equations.energy_description import EnergyDescription
 from mbd.equations.equations import Equations
@@ -60,12 +61,16 @@ class Lagrangian(EnergyDescription):
     """
 
     def check(self) -> list[str]:
-        """Every fault of the description, one sentence each."""
+        """Every fault of the description, one sentence each; expressions and functions are traced."""
+        return Faults(self._own_faults() or derivation_faults(self))
+
+    def _own_faults(self) -> list[str]:
+        """The faults that show without the equations."""
         faults = _name_faults(self) + self.own_word().faults()
         if faults:
-            return Faults(faults)
+            return faults
         lowering = Lowering(self)
-        return Faults(lowering.faults or word_faults(self, lowering.scope))
+        return lowering.faults or word_faults(self, lowering.scope)
 
     def require_valid(self) -> None:
         """Raise a `ModelError` with every fault, if there is one."""
@@ -79,7 +84,8 @@ class Lagrangian(EnergyDescription):
 
     def equations_of_motion(self) -> Equations:
         """The same equations that a model of bodies gives; faults are raised together as a `ModelError`."""
-        self.require_valid()
+        if faults := self._own_faults():
+            raise ModelError(faults)
         return assembled(self, Lowering(self))
 
     def equations(self, *, latex: bool = False) -> str:

@@ -42,12 +42,15 @@ class Model(Description):
     def check(self) -> list[str]:
         """Every fault of the description, one sentence each; empty where there is none.
 
+        Functions are traced: what `assemble` would refuse is found here too.
+
         Warns (`mbd.MbdWarning`) once of what is no fault but was hardly meant, such as a hinge connected twice.
         """
+        from mbd.equations.derivation import derivation_faults
         from mbd.topology.check import faults
         from mbd.topology.doubts import doubts
 
-        found = faults(self)
+        found = faults(self) or derivation_faults(self)
         if not found:
             doubt(*doubts(self), of=self)
         return Faults(found)

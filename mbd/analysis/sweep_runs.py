@@ -18,10 +18,10 @@ from hashlib import sha256
 from typing import Any, NamedTuple, TypeAlias
 from weakref import WeakValueDictionary
 
-from mbd.analysis.interrupted import stopped
 from mbd.description import Description
 from mbd.equations.derivation import FrontDoor
 from mbd.errors import MbdError, ModelError, SimulationError
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.simulation.user_calls import call_user
 from mbd.state import State

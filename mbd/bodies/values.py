@@ -84,7 +84,7 @@ def is_number(value: Any) -> bool:
 
 def _is_numeric(value: Any) -> bool:
     """Whether a value may be turned into a float."""
-    if isinstance(value, bool | np.bool_ | str | type):
+    if isinstance(value, bool | np.bool_ | str | type) or np.iscomplexobj(value):  # float() drops imaginary parts
         return False
     return hasattr(value, "__float__") and not getattr(value, "ndim", 0) and not getattr(value, "free_symbols", ())
 

@@ -15,6 +15,7 @@ from mbd.equations.dynamics import Work
 from mbd.equations.effects import drag_effect, penalty_effect
 from mbd.equations.equations import Contact, Guard, Row
 from mbd.equations.frictions import dry_friction, dry_joint, sliding_contact
+from mbd.equations.gathered import Gathered
 from mbd.equations.law_of import Holding, law_of
 from mbd.equations.laws import Laws
 from mbd.equations.rubbing import rubbing_contact
@@ -36,12 +37,14 @@ def laws(
     always: Sequence[Constraint],
     contacts: Sequence[Constraint],
     events: Sequence[Event],
+    gathered: Gathered,
     before: Laws | None = None,
     written: Collection[str] = (),
 ) -> Laws:
     """Cut joints, what always acts (positions first), dry joints, contacts and events, in the order of the model.
 
-    They are added to those `before`. Parameters that controllers have `written` may make an event happen.
+    They are added to those `before`; errors are `gathered`. Parameters that controllers have `written` may make an
+    event happen.
     """
     found = Laws() if before is None else before
     for joint in scope.cuts:
@@ -49,14 +52,19 @@ def laws(
             if _row(found, scope, joint.name, Equation(value, part, row_unit(part), may_fold=True)) < 0:
                 found.idle.append((joint.name, part))
     for word in always:
-        _always(found, scope, dynamics, word, contacts)
+        with gathered.catch(word.name):
+            _always(found, scope, dynamics, word, contacts)
     for joint in joints:
-        dry_joint(found, scope, dynamics, joint)
+        with gathered.catch(joint.name):
+            dry_joint(found, scope, dynamics, joint)
     for number, word in enumerate(contacts):
-        _contact(found, scope, dynamics, word, number, contacts)
+        with gathered.catch(word.name):
+            _contact(found, scope, dynamics, word, number, contacts)
     for event in events:
-        found.guards.append(_guard(scope, event))
-        found.faults += _never(scope, found.guards[-1], written)
+        with gathered.catch(event.name):
+            found.guards.append(_guard(scope, event))
+            found.faults += _never(scope, found.guards[-1], written)
+    gathered.add(found.faults)
     return found
 
 

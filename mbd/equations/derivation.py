@@ -17,6 +17,7 @@ from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import Cause, causes, effect_of, weight_of
 from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
+from mbd.equations.gathered import Gathered
 from mbd.equations.laws import Laws
 from mbd.equations.magnitudes import of_directions
 from mbd.equations.observations import offer_observations
@@ -37,7 +38,7 @@ from mbd.topology.plan import Plan, plan
 if TYPE_CHECKING:
     from mbd.description import Description
 
-__all__ = ["FrontDoor", "derive", "state_balance"]
+__all__ = ["FrontDoor", "derivation_faults", "derive", "state_balance"]
 
 
 @runtime_checkable
@@ -66,6 +67,14 @@ def derive(model: Description | FrontDoor) -> Equations:
     return _derived(model, chosen)
 
 
+def derivation_faults(model: Description | FrontDoor) -> list[str]:
+    """What the derivation of a model refuses whose description has no fault of its own, one sentence each."""
+    gathered = Gathered()
+    with gathered.catch():
+        derive(model)
+    return [fault for error in gathered.errors for fault in getattr(error, "faults", (str(error),))]
+
+
 def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] = ()) -> Equations:
     """Kinematics, causes of forces, balance, constraints, results.
 
@@ -83,15 +92,17 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     vectors = all(joint.is_vector for joint in plan.edges)
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
     dynamics = Dynamics(moving, masses, scope.placement, scope.views, scope.inputs)
-    found = causes(scope, (*plan.edges, *plan.cut), model.forces)
+    gathered = Gathered()
+    found = causes(scope, (*plan.edges, *plan.cut), model.forces, gathered)
     work = sum((cause.work for cause in found), Work())
-    rests = state_balance(scope, found)
+    rests: list[Node] = []
+    with gathered.catch():
+        rests = state_balance(scope, found)
     joints = (*plan.edges, *plan.cut)
     written = {name for controller in model.controllers for name in controller.writes}
     always = [*model.bilaterals, *model.nonholonomic]
-    constraints = laws(scope, dynamics, joints, always, model.contacts, model.events, written=written)
-    if constraints.faults:
-        raise ModelError(constraints.faults)
+    constraints = laws(scope, dynamics, joints, always, model.contacts, model.events, gathered, written=written)
+    gathered.raise_all()
     weight = weight_of(scope, dynamics)
     stored = [weight, *found] if weight.acts else found
     effects = (*(effect_of(cause, scope, dynamics) for cause in stored), *constraints.effects)

@@ -10,6 +10,7 @@ from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Effect
+from mbd.equations.gathered import Gathered
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.joints.base import Joint
@@ -43,8 +44,8 @@ class Cause:
         return bool(self.rates) or any(not isinstance(part, float) and not part.is_zero for part in parts)
 
 
-def causes(scope: DerivationScope, joints: Iterable[Joint], forces: Iterable[Force]) -> list[Cause]:
-    """Springs and losses of all joints, then the forces, without what folds away.
+def causes(scope: DerivationScope, joints: Iterable[Joint], forces: Iterable[Force], gathered: Gathered) -> list[Cause]:
+    """Springs and losses of all joints, then the forces, without what folds away; errors are `gathered`.
 
     A force may be named like the spring that a joint could have: then the parameters of that name are the force's.
     """
@@ -52,10 +53,13 @@ def causes(scope: DerivationScope, joints: Iterable[Joint], forces: Iterable[For
     forces = list(forces)
     taken = {force.name for force in forces}
     for joint in joints:
-        if f"{joint.name} spring" not in taken:
-            found.append(_joint_spring(joint, scope))
-        found.append(_joint_loss(joint, scope))
-    found += [_force(force, scope) for force in forces]
+        with gathered.catch(joint.name):
+            if f"{joint.name} spring" not in taken:
+                found.append(_joint_spring(joint, scope))
+            found.append(_joint_loss(joint, scope))
+    for force in forces:
+        with gathered.catch(force.name):
+            found.append(_force(force, scope))
     return [cause for cause in found if cause.acts]
 
 

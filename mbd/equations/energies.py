@@ -13,6 +13,7 @@ from mbd.equations.derivation import state_balance
 from mbd.equations.dynamics import Work
 from mbd.equations.effects import causes, effect_of
 from mbd.equations.equations import Effect, Equations, Row
+from mbd.equations.gathered import Gathered
 from mbd.equations.laws import Laws
 from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
@@ -113,10 +114,14 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     balance = [p - t + v + d - f for p, t, v, d, f in zip(momentum_rates, dT, dV, dD, Q, strict=True)]
     own = _effects(system, lowering, dV, dD)
     scope.parameters.expect(system.parameters)
-    found = causes(scope, (), system.applied)
+    gathered = Gathered()
+    found = causes(scope, (), system.applied, gathered)
     acting = scope.generalized(sum((cause.work for cause in found), Work()))
-    balance = [r + f for r, f in zip(balance, acting, strict=True)] + state_balance(scope, found)
-    known = _laws(system, lowering)
+    balance = [r + f for r, f in zip(balance, acting, strict=True)]
+    with gathered.catch():
+        balance += state_balance(scope, found)
+    known = _laws(system, lowering, gathered)
+    gathered.raise_all()
     effects = (*own, *(effect_of(cause, scope, scope) for cause in found), *known.effects)
     potential = V
     for effect in effects[len(own) :]:
@@ -145,14 +150,8 @@ def energy_of_motion(lowering: Lowering) -> Node:
     return _sum(lowering.tape, [momentum * rate for momentum, rate in zip(momenta, v, strict=True)]) - T
 
 
-def _laws(system: EnergyDescription, lowering: Lowering) -> Laws:
-    """Constraints given as expressions, then those given as words.
-
-    Raises
-    ------
-    ModelError
-        for words that constrain nothing, or what they cannot.
-    """
+def _laws(system: EnergyDescription, lowering: Lowering, gathered: Gathered) -> Laws:
+    """Constraints given as expressions, then those given as words; errors are `gathered`."""
     scope, tape = lowering.scope, lowering.tape
     rates = scope.rates(list(lowering.h.values()))
     known = Laws(viewed=[*lowering.h.values(), *lowering.rates.values()])
@@ -160,9 +159,7 @@ def _laws(system: EnergyDescription, lowering: Lowering) -> Laws:
     known.rows += [Row(name, "", tape.zero, rate, unit="", kind="velocity") for name, rate in lowering.rates.items()]
     always = [word for word in system.words if word.kind in ("bilateral", "nonholonomic")]
     written = {name for controller in system.controllers for name in controller.writes}
-    laws(scope, scope, (), always, system.contacts, system.events, before=known, written=written)
-    if known.faults:
-        raise ModelError(known.faults)
+    laws(scope, scope, (), always, system.contacts, system.events, gathered, before=known, written=written)
     return known
 
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.errors import GaitError
+from mbd.bodies.values import named_number_faults
+from mbd.errors import GaitError, ModelError
 from mbd.gait.derivatives import Derivatives
 from mbd.gait.energies import cost_of_transport, energy_by_cause
 from mbd.gait.floquet import Multipliers
@@ -132,12 +133,15 @@ class LimitCycle:
         Raises
         ------
         ModelError
-            for values that the model does not allow, or of one side alone where the gait has a mirror.
+            for values that are no finite numbers or that the model does not allow, or of one side alone where the gait
+            has a mirror.
         GaitError
             where the walk is lost.
         """
         from mbd.gait.search import on_section, search
 
+        if faults := named_number_faults(parameters, "parameters"):
+            raise ModelError(faults)
         values = {**self.parameters, **parameters}
         self.map.require_free(parameters, values)
         self.map.require(values)

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from mbd.analysis.interrupted import stopped
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
 from mbd.errors import GaitError, MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.derivatives import parameter_value
 from mbd.sensitivity.result import Sensitivities
+from mbd.simulation.interrupted import stopped
 
 __all__ = ["FunctionSource", "GaitSource", "Point", "Source", "gait_numbers"]
 

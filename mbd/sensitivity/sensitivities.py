@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from mbd.bodies.values import among, is_number, shown
+from mbd.bodies.values import among, is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of, tunable_model
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
@@ -185,6 +185,9 @@ def _names_in(wrt: Any) -> tuple[list[str], list[str]]:
             single.append(each)
         elif isinstance(each, Mapping) and each and all(isinstance(v, Mapping) and v for v in each.values()):
             grouped += [name for functions in each.values() for name in functions]
+            rates = [rate for functions in each.values() for rate in functions.values() if is_number(rate)]
+            if not all(map(is_finite_number, rates)):
+                raise ModelError(f"wrt: rates of parameters must be finite numbers, or functions, not {shown(each)}")
         else:
             raise ModelError(
                 f"wrt: expected names, or functions of parameters {{name: {{parameter: function}}}}, not {shown(each)}"
@@ -215,8 +218,8 @@ def _check_of(of: Any) -> None:
 def _values_of(at: Any) -> dict[str, float]:
     if at is None:
         return {}
-    if not isinstance(at, Mapping) or not all(isinstance(k, str) and is_number(v) for k, v in at.items()):
-        raise ModelError(f"at maps names of quantities to numbers, such as {{'slope': 0.05}}, not {shown(at)}")
+    if not isinstance(at, Mapping) or not all(isinstance(k, str) and is_finite_number(v) for k, v in at.items()):
+        raise ModelError(f"at maps names of quantities to finite numbers, such as {{'slope': 0.05}}, not {shown(at)}")
     return {name: float(value) for name, value in at.items()}
 
 

@@ -304,7 +304,7 @@ def massless_faults(model: Description, values: Mapping[str, float]) -> list[str
     ----------
     values : of all parameters by full name
     """
-    bound = {m.body.name if isinstance(m, Frame) else m.name for m in _constrained(model) if not isinstance(m, str)}
+    bound = _bound(model)
     planar, found = is_planar(model), []
     held: dict[str, list[Joint]] = {}
     for joint in model.joints:
@@ -366,8 +366,15 @@ def _tilts(joint: Joint) -> bool:
     return turns and not joint.is_planar and not along_z
 
 
-def _constrained(model: Description) -> list[Frame | Joint | str]:
-    return [mention for word in model.constraints for mention in word.mentions()]
+def _bound(model: Description) -> set[str]:
+    """Bodies and joints that constraints refer to, by objects or by the names of quantities."""
+    mentions = [mention for word in model.constraints for mention in word.mentions()]
+    found = {each.body.name if isinstance(each, Frame) else each.name for each in mentions if not isinstance(each, str)}
+    named = {each for each in mentions if isinstance(each, str)}
+    if named:
+        found |= {joint.name for joint in model.joints if any(each.startswith(f"{joint.name}.") for each in named)}
+        found |= {body for body in model.bodies if any(each.startswith(f"{body}.") for each in named)}
+    return found
 
 
 def _spins(joint: Joint, body: Body, values: Mapping[str, float]) -> bool:

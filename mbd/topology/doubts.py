@@ -1,23 +1,30 @@
-"""What is possible in a description but was hardly meant: millimetres for metres, a hinge twice."""
+"""What is possible in a description but was hardly meant: millimetres for metres, grams for kilograms, twin hinges."""
 
 from __future__ import annotations
 
 from itertools import combinations
 from typing import Any
 
+from mbd.bodies.ground import Ground
+from mbd.bodies.link import Link
 from mbd.joints.base import AWAITED, Joint
+from mbd.topology.graph import links_of, spanning_tree
 
 __all__ = ["doubts"]
 
 LONG = 50.0
 """Length of a body of less than a ton above which it may be given in millimetres [m]."""
+HEAVY = 200.0
+"""Mass of a link above which it may be given in grams [kg]."""
+DENSE = 22_600.0
+"""Density of osmium, which no body exceeds: that of a link in the cube of its length [kg/m³]."""
 GRIPPING = 10.0
 """Coefficient of friction above which it may be given in percent [-]."""
 
 
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    return _lengths(model) + _twice(model) + _grips(model) + _awaited(model)
+    return _lengths(model) + _masses(model) + _turned(model) + _twice(model) + _grips(model) + _awaited(model)
 
 
 def _lengths(model: Any) -> list[str]:
@@ -31,6 +38,56 @@ def _lengths(model: Any) -> list[str]:
                 f"'{body.name}' is {length:g} m long; lengths are in metres, and {length:g} mm is {length / 1e3:g}"
             )
     return found
+
+
+def _masses(model: Any) -> list[str]:
+    """Masses, centers and inertias that no link of its length has."""
+    found = []
+    for link in getattr(model, "bodies", {}).values():
+        if not isinstance(link, Link) or not link.length > 0.0 or not link.mass > 0.0:
+            continue
+        name, mass, length, center = link.name, link.mass, link.length, link.center_distance
+        if mass > HEAVY and mass > DENSE * length**3:
+            found.append(
+                f"'{name}' has {mass:g} kg in {length:g} m, more than any metal; masses are in kg, and {mass:g} g is "
+                f"{mass / 1e3:g} kg"
+            )
+        if not -0.5 * length <= center <= length:
+            found.append(
+                f"the center of mass of '{name}' is {center:g} m from its start, outside its length of {length:g} m; "
+                f"center is the distance from start to center [m], {0.5 * length:.3g} m for a uniform rod"
+            )
+        largest = max(link.inertia) if isinstance(link.inertia, tuple) else link.inertia
+        if largest > mass * length**2:
+            found.append(
+                f"the inertia of '{name}' is {largest:g} kg m², more than all its mass at its length has, m L² = "
+                f"{mass * length**2:.3g} kg m²; inertia is about the center of mass, m L²/12 = "
+                f"{mass * length**2 / 12.0:.3g} kg m² for a uniform rod"
+            )
+    return found
+
+
+def _turned(model: Any) -> list[str]:
+    """Joints that alone hold a body to the ground, and have the ground as their child."""
+    found = []
+    for joint in getattr(model, "joints", ()):
+        child, parent = joint.child.body, joint.parent.body
+        if not isinstance(child, Ground) or isinstance(parent, Ground) or not joint.labels:
+            continue
+        reached = spanning_tree(links_of(model, [joint.name]), model.ground.name)[2]
+        if parent.name not in reached:
+            found.append(
+                f"'{joint.name}' has the ground as its child, so that its coordinates tell how the ground moves seen "
+                f"from '{parent.name}', with the opposite sign; the parent comes first: "
+                f"mbd.{type(joint).__name__}({joint.name!r}, {_written(joint.child)}, {_written(joint.parent)})"
+            )
+    return found
+
+
+def _written(frame: Any) -> str:
+    """A frame as it is written: 'model.ground.origin', 'thigh.start'."""
+    owner = "model.ground" if isinstance(frame.body, Ground) else frame.body.name.replace(" ", "_")
+    return f"{owner}.{frame.name or 'origin'}"
 
 
 def _grips(model: Any) -> list[str]:

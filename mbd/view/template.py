@@ -9,9 +9,19 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from mbd.errors import TrajectoryError
 from mbd.results.archive import named_file, write_whole
 
 __all__ = ["filled", "part", "written"]
+
+PICTURE = "; pictures are those of run.plot(path=…) and run.final.plot('start.png')"
+OTHERS = {
+    **dict.fromkeys((".png", ".svg", ".pdf", ".jpg", ".jpeg"), PICTURE),
+    **dict.fromkeys((".gif", ".mp4", ".webm", ".mov", ".avi"), "; it moves, and a recording of the screen is a video"),
+    **dict.fromkeys((".csv", ".xlsx"), "; run.to_dataframe().to_csv(…) writes a table"),
+    ".npz": "; run.save(…) writes the run",
+}
+"""What is meant by names of files that are no pages, by their suffix."""
 
 
 def filled(
@@ -42,7 +52,18 @@ def part(folder: str, name: str) -> str:
 
 
 def written(page: str, path: str | Path) -> Path:
-    """Where the page was written; folders are made."""
+    """Where the page was written; folders are made.
+
+    Raises
+    ------
+    TrajectoryError
+        for the name of a picture, a video or a table.
+    """
     target = named_file(path)
+    if target.suffix.lower() in OTHERS:
+        raise TrajectoryError(
+            f"a page is an HTML file, which a browser shows; got {target.name!r}; name it '{target.stem}.html'"
+            f"{OTHERS[target.suffix.lower()]}"
+        )
     write_whole(target, lambda partial: partial.write_text(page, encoding="utf-8"))
     return target

@@ -12,13 +12,13 @@ import numpy as np
 from mbd.analysis.accuracy.published import Published, published, table_of
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion
-from mbd.analysis.interrupted import stopped
 from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.capabilities import refusals
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.run.strategy import chosen as strategy_of
 from mbd.simulation.simulate import simulate
 from mbd.state import State

@@ -13,10 +13,10 @@ import numpy as np
 from mbd.analysis.accuracy.published import Published
 from mbd.analysis.accuracy.settings import Setting
 from mbd.analysis.accuracy.truth import CLEAR, Truth
-from mbd.analysis.interrupted import stopped
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError
 from mbd.integrators import Integrator
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 

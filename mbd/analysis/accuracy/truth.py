@@ -11,12 +11,12 @@ import numpy as np
 
 from mbd.analysis.accuracy.compare import Difference, differences, ranges
 from mbd.analysis.accuracy.reference import Method, RungeKuttaReference
-from mbd.analysis.interrupted import stopped
 from mbd.arrays import Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError
 from mbd.integrators import Integrator, RadauIIA, RungeKutta853
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 

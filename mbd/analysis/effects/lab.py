@@ -16,7 +16,6 @@ from mbd.analysis.effects.contribution import Change, Contribution, Together
 from mbd.analysis.effects.result import Effects
 from mbd.analysis.effects.scenes import Element, Scene, elements, reduced
 from mbd.analysis.effects.timing import Pair, Timing, timed
-from mbd.analysis.interrupted import stopped
 from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.description import Description
@@ -26,6 +25,7 @@ from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, 
 from mbd.integrators import Integrator
 from mbd.progress import Progress, share_bar
 from mbd.results.ledger import Ledger
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.run.memory import without_memory
 from mbd.simulation.simulate import simulate
 from mbd.state import State

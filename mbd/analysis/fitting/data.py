@@ -69,10 +69,13 @@ def _columns(table: Any, faults: list[str]) -> dict[str, tuple[Vector, Vector]]:
         return {}
     try:
         names = [str(name) for name in table]
-        parts = {name: np.asarray(table[name], dtype=float) for name in names}
+        found = {name: np.asarray(table[name]) for name in names}
+        if any(np.iscomplexobj(values) for values in found.values()):
+            raise TypeError
+        parts = {name: values.astype(float) for name, values in found.items()}
     except (TypeError, ValueError, KeyError, IndexError):
         faults.append(
-            "data must be a table of numbers by name with a column 'time', a dictionary or a pandas DataFrame, "
+            "data must be a table of real numbers by name with a column 'time', a dictionary or a pandas DataFrame, "
             f"not {shown(table)}"
         )
         return {}

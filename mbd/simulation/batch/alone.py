@@ -15,6 +15,7 @@ from mbd.compile.python import array_function
 from mbd.errors import MbdError
 from mbd.kernel import codes
 from mbd.simulation.diagnostics.energy import TELLING, UNDRIVEN, kinds_of
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.run.many import Ends
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -47,7 +48,7 @@ class Alone:
 
 
 def made_alone(model: Any, start: State, arguments: dict[str, Any], terminal: frozenset[str]) -> Alone:
-    """One run by `simulate`; whatever goes wrong is its outcome.
+    """One run by `simulate`; whatever goes wrong is its outcome, but that somebody interrupts it (KeyboardInterrupt).
 
     terminal : names of the events that end runs
     """
@@ -55,6 +56,8 @@ def made_alone(model: Any, start: State, arguments: dict[str, Any], terminal: fr
         run = simulate(model, start, progress=False, on_failure="return", **arguments)
     except MbdError as error:
         return Alone("refused", None, "", str(error), None)
+    if stopped(run):
+        raise KeyboardInterrupt
     if not run.success:
         return Alone("failed", run.final, "", run.message, run)
     if not run.message.startswith("ended by"):

@@ -18,7 +18,7 @@ from mbd.simulation.arguments import check_arguments
 from mbd.simulation.batch.result import Batch
 from mbd.simulation.batch.runner import Runner
 from mbd.simulation.batch.starts import Starts, columns_of, given_starts, places_of, starts_of
-from mbd.simulation.batch.workers import processors
+from mbd.simulation.batch.workers import Interrupted, processors
 from mbd.simulation.run.begin import check_rank
 from mbd.simulation.simulate import REST_SPEED
 
@@ -68,7 +68,8 @@ def batch(
     -------
     Batch
         a table: final states, times, what ended each run, results. A failed run has its outcome; ``batch.message(k)``
-        says why, and ``batch.run(k)`` makes it again as a `Trajectory`.
+        says why, and ``batch.run(k)`` makes it again as a `Trajectory`. Ctrl-C ends the batch and keeps the runs that
+        were over, see ``complete``.
 
     Raises
     ------
@@ -127,7 +128,12 @@ def _table(runner: Runner, starts: Starts, results: tuple[str, ...], report: Cal
         found.take_alone(range(count), report)
         return found
     lines = starts.lines(runner.run, places)
-    ends = runner.ends(lines, changes, report)
+    try:
+        ends = runner.ends(lines, changes, report)
+    except Interrupted as stop:  # runs that `simulate` would have to judge count as not made
+        found.take(stop.ends)
+        found.not_made(~stop.done | runner.judged(lines, stop.ends, changes))
+        return found
     found.take(ends)
     found.take_alone([int(k) for k in np.flatnonzero(runner.judged(lines, ends, changes))], None)
     return found

@@ -28,18 +28,24 @@ if TYPE_CHECKING:
 __all__ = ["Batch"]
 
 
+NOT_RUN = "not run"
+"""The outcome of runs that an interrupted batch never came to."""
+
+
 class Batch:
     """The ends of N runs.
 
     Attributes
     ----------
     outcome (N,) : 'end' (the time that was asked for is reached), 'event' (one has ended the run), 'refused' (its start
-        is none of this model), or how it failed: 'not converged', 'not finite', 'chatter', …
+        is none of this model), 'not run' (the batch was interrupted before), or how it failed: 'not converged',
+        'not finite', 'chatter', …
     success (N,) : whether the run is whole
     time (N,) : of the end [s]; q (N, n_q), v (N, n_v), z (N, n_z) : the state there, NaN of a refused start
     stopped_by (N,) : name of the event that ended the run, '' if none did
     steps, events (N,) : how many there were; −1 of runs that were made alone
     results : {name: (N,)} at the end, NaN of runs that are not whole
+    complete : False where Ctrl-C ended the batch; runs that it never came to have the outcome 'not run'
     how : '' where all runs were made in the kernel, else why they were made one by one
     """
 
@@ -53,7 +59,7 @@ class Batch:
         self.steps: NDArray[np.int64] = np.full(count, -1)
         self.events: NDArray[np.int64] = np.full(count, -1)
         self.results: dict[str, Vector] = {name: np.full(count, np.nan) for name in results}
-        self.how = runner.slow
+        self.how, self.complete = runner.slow, True
         self._alone: dict[int, Alone] = {}
         self._ends: Ends | None = None
 
@@ -91,11 +97,24 @@ class Batch:
             self.results[name] = np.where(whole, column, np.nan)
 
     def take_alone(self, runs: Sequence[int], report: Callable[[int], None] | None) -> None:
-        """Runs that `simulate` makes."""
-        for number, k in enumerate(runs):
-            self._put(k, self._made(k))
-            if report is not None:
-                report(number + 1)
+        """Runs that `simulate` makes; Ctrl-C ends that."""
+        done = 0
+        try:
+            for k in runs:
+                self._put(k, self._made(k))
+                done += 1
+                if report is not None:
+                    report(done)
+        except KeyboardInterrupt:
+            self.not_made(np.isin(np.arange(len(self)), list(runs)[done:]))
+
+    def not_made(self, runs: NDArray[np.bool_]) -> None:
+        """Runs that the batch never came to, or whose end nobody has judged, as it was interrupted."""
+        self.complete = False
+        self.outcome[runs], self.stopped_by[runs] = NOT_RUN, ""
+        self.steps[runs] = self.events[runs] = -1
+        for numbers in (self.time, self.q, self.v, self.z, *self.results.values()):
+            numbers[runs] = np.nan
 
     def _made(self, k: int) -> Alone:
         return self._runner.alone(self.start(k), self._runner.changes.at(k))
@@ -133,6 +152,8 @@ class Batch:
             for a run that was refused.
         """
         k = self._number(k)
+        if self.outcome[k] == NOT_RUN:
+            raise SimulationError(f"run {k} was not made: the batch was interrupted; batch.run({k}) makes it")
         if k in self._alone:
             state = self._alone[k].state
             if state is None:
@@ -157,6 +178,8 @@ class Batch:
     def message(self, k: int) -> str:
         """The sentence of the k-th run: how it ended, or why it could not go on."""
         k = self._number(k)
+        if self.outcome[k] == NOT_RUN:
+            return "not run: interrupted"
         if k not in self._alone and not self.success[k]:
             self._alone[k] = self._made(k)
         if k in self._alone:

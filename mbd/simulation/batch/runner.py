@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import manager_of
@@ -16,7 +17,7 @@ from mbd.integrators import Integrator
 from mbd.kernel import codes
 from mbd.simulation.batch.alone import Alone, made_alone, needs_judgement
 from mbd.simulation.batch.changes import Changes, telling_values
-from mbd.simulation.batch.workers import Workers
+from mbd.simulation.batch.workers import Interrupted, Workers
 from mbd.simulation.run.late_resets import reset_ends
 from mbd.simulation.run.many import Ends, may_be_many
 from mbd.simulation.run.run import Run
@@ -58,15 +59,26 @@ class Runner:
         self.terminal = frozenset(guards | ({self.run.stop} if self.run.stop else set()))
 
     def ends(self, starts: Matrix, changes: Changes, report: Callable[[int], None] | None = None) -> Ends:
-        """The ends of runs from lines of starts, reset where the event that ended them does so."""
-        ends = self.workers(starts, changes.vectors if changes.varies else changes.constant, report)
-        self._reset(ends, changes)
+        """The ends of runs from lines of starts, reset where the event that ended them does so.
+
+        Raises
+        ------
+        Interrupted
+            by Ctrl-C, with the runs that were over.
+        """
+        try:
+            ends = self.workers(starts, changes.vectors if changes.varies else changes.constant, report)
+        except Interrupted as stop:
+            self._reset(stop.ends, changes, stop.done)
+            raise
+        self._reset(ends, changes, np.ones(len(starts), dtype=bool))
         return ends
 
-    def _reset(self, ends: Ends, changes: Changes) -> None:
+    def _reset(self, ends: Ends, changes: Changes, done: NDArray[np.bool_]) -> None:
         v = self.run.kernel
         for e, guard in enumerate(self.manager.guards):
-            here = np.flatnonzero(ends.stopped_by == v.n_contacts + e) if guard.reset is not None else ()
+            by = (ends.stopped_by == v.n_contacts + e) & done
+            here = np.flatnonzero(by) if guard.reset is not None else ()
             if not len(here):
                 continue
             q, y = ends.row[here, 1 : 1 + v.n_q], ends.row[here, 1 + v.n_q : 1 + v.n_q + v.n]

@@ -9,12 +9,13 @@ from dataclasses import fields
 from threading import Event, Lock
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.simulation.run.many import Ends, ManyRuns
 from mbd.simulation.run.run import Run
 
-__all__ = ["Workers", "processors"]
+__all__ = ["Interrupted", "Workers", "processors"]
 
 AT_ONCE = 4096
 """Runs that a thread takes together at most."""
@@ -27,8 +28,12 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Stopped(Exception):
-    """The runs of a thread that was told to stop."""
+class Interrupted(KeyboardInterrupt):
+    """Somebody has interrupted runs: the `ends` of all; those that are not `done` are zeros."""
+
+    def __init__(self, ends: Ends, done: NDArray[np.bool_]) -> None:
+        super().__init__()
+        self.ends, self.done = ends, done
 
 
 class Workers:
@@ -61,6 +66,11 @@ class Workers:
         starts : as `ManyRuns` takes them
         parameters : gives the vectors of the runs from one number to before another; None: those of the run
         report : called with the number of runs that are over
+
+        Raises
+        ------
+        Interrupted
+            by Ctrl-C, with the runs that were over.
         """
         size = max(min(AT_ONCE, -(-len(starts) // (PARTS * self.count))), 1)
         parts = [(first, min(first + size, len(starts))) for first in range(0, len(starts), size)] or [(0, 0)]
@@ -70,10 +80,6 @@ class Workers:
         found: list[Ends | None] = [None] * len(parts)
         waiting, halt, over = iter(range(len(parts))), Event(), [0]
 
-        def stop(done: int) -> None:
-            if halt.is_set():
-                raise Stopped
-
         def work(many: ManyRuns) -> None:
             while not halt.is_set():
                 with self._lock:
@@ -82,26 +88,44 @@ class Workers:
                     return
                 first, last = parts[place]
                 own = None if parameters is None else parameters(first, last)
-                found[place] = many(starts[first:last], own, between=stop)
+                found[place] = many.until_stopped(starts[first:last], own, stopped=halt.is_set)
+                if many.interrupted:
+                    halt.set()
                 with self._lock:
                     over[0] += last - first
                 if report is not None:
                     report(over[0])
 
-        if count == 1:
-            work(self._many[0])
-        else:
-            with ThreadPoolExecutor(count) as pool:
-                tasks = [pool.submit(work, many) for many in self._many[:count]]
-                try:
-                    for task in tasks:
-                        task.result()
-                except BaseException:
-                    halt.set()
-                    raise
-        return _joined([ends for ends in found if ends is not None])
+        try:
+            if count == 1:
+                work(self._many[0])
+            else:
+                with ThreadPoolExecutor(count) as pool:
+                    try:
+                        for task in [pool.submit(work, many) for many in self._many[:count]]:
+                            task.result()
+                    except BaseException:
+                        halt.set()
+                        raise
+        except KeyboardInterrupt:
+            halt.set()
+        none = self._many[0].none()
+        ends = [none if each is None else each for each in found]
+        if not halt.is_set():
+            return _joined(ends)
+        sizes = [last - first for first, last in parts]
+        done = [np.arange(size) < len(each.status) for size, each in zip(sizes, ends, strict=True)]
+        raise Interrupted(
+            _joined([_filled(each, size) for each, size in zip(ends, sizes, strict=True)]), np.concatenate(done)
+        )
 
 
 def _joined(parts: Sequence[Ends]) -> Ends:
     """Ends one behind the other."""
     return Ends(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Ends)))
+
+
+def _filled(part: Ends, size: int) -> Ends:
+    """Ends with zeros behind them, as many as there were to be."""
+    columns = [getattr(part, each.name) for each in fields(Ends)]
+    return Ends(*(np.concatenate([one, np.zeros((size - len(one), *one.shape[1:]), one.dtype)]) for one in columns))

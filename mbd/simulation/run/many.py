@@ -105,7 +105,7 @@ class ManyRuns:
     def __init__(self, run: Run) -> None:
         from mbd.simulation.run.begin import notify
 
-        self.run = run
+        self.run, self.interrupted = run, False
         notify(run)
         for e, guard in enumerate(run.manager.guards):
             run.kernel.resets[e] = int(guard.reset is not None)
@@ -122,10 +122,7 @@ class ManyRuns:
         v.last_time, v.near_end = run.end, run.boundaries.near
         v.chunk_of_runs = v.chunk
 
-    def __call__(
-        self, starts: Matrix, parameters: Matrix | None = None, lines: int = 0,
-        between: Callable[[int], None] | None = None,
-    ) -> Ends:  # fmt: skip
+    def __call__(self, starts: Matrix, parameters: Matrix | None = None, lines: int = 0) -> Ends:
         """The ends of runs from consistent starts.
 
         Parameters
@@ -133,7 +130,19 @@ class ManyRuns:
         starts : (N, 1 + n_q + n + n_anchors + 2 n_contacts): t, q, (v, z), anchors, closed, armed
         parameters : (N, P) vector of each run; None: that of the run
         lines : how many lines of the log to keep
-        between : called with the number of runs that are done, between two calls of the kernel
+        """
+        ends = self.until_stopped(starts, parameters, lines)
+        if self.interrupted:
+            raise KeyboardInterrupt
+        return ends
+
+    def until_stopped(
+        self, starts: Matrix, parameters: Matrix | None = None, lines: int = 0,
+        stopped: Callable[[], bool] | None = None,
+    ) -> Ends:  # fmt: skip
+        """The same of the runs that are done before somebody interrupts them, or `stopped` answers True.
+
+        Whether there was an interruption says `interrupted`; `stopped` is asked between two calls of the kernel.
         """
         v, stepper = self.run.kernel, self.run.stepper
         count = len(starts)
@@ -146,19 +155,23 @@ class ManyRuns:
         else:
             v.params[: len(self.run.first_parameters)] = self.run.first_parameters
         v.run, v.n_runs, v.begun = 0, count, 0
-        while True:
+        self.interrupted, done = False, False
+        while not done:
             v.steps_left = STEPS_AT_ONCE
             try:
                 status = stepper.march_many()
                 if status == codes.NEW_MODE:
                     stepper.add_mode()
-                elif status == codes.DONE:
-                    break
+                done = status == codes.DONE or (stopped is not None and stopped())
             except MbdError:  # no code for a mode: that is an outcome of this run
                 self._leave()
-            if between is not None:
-                between(int(v.run))
-        return self._ends(count, lines)
+            except KeyboardInterrupt:
+                self.interrupted = done = True
+        return self._ends(int(v.run), lines)
+
+    def none(self) -> Ends:
+        """The ends of no runs."""
+        return self._ends(0, 0)
 
     def adjust(self, dt: float, latest: float) -> None:
         """Another step and another latest time [s] for the next calls."""

@@ -1,0 +1,54 @@
+"""Numbers that are none where one is expected: complex ones, NaN; and files whose names are those of others."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.mechanisms import falling, pendulum
+
+
+@pytest.mark.parametrize("value", [np.complex128(1.0 + 2.0j), np.array(1.0j), 1.0j, np.nan, "1", None, True])
+def test_what_is_no_real_number_is_no_mass(value):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(mbd.ModelError, match="mass of 'ball' must be"):
+            mbd.PointMass("ball", value)
+
+
+def test_complex_columns_are_no_data():
+    model, _ = falling()
+    start = mbd.assemble(model, backend="python")
+    for values in (np.array([1.0, 2.0]) + 0j, [1.0, 2.0j]):
+        with pytest.raises(mbd.ModelError, match="a table of real numbers"):
+            mbd.fit(
+                model, start, {"time": [0.0, 0.1], "fall.displacement": values}, {"ball.mass": 1.0}, backend="python"
+            )
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1.0j])
+@pytest.mark.parametrize("where", ["at", "wrt"])
+def test_values_and_rates_of_derivatives_are_finite(where, value):
+    model = pendulum()
+    model = model[0] if isinstance(model, tuple) else model
+    names = list(model.parameters)
+    start = mbd.assemble(model, backend="python")
+    wrt = [{"slope": {names[0]: value if where == "wrt" else (lambda s: s)}}]
+    at = {"slope": value} if where == "at" else None
+    with pytest.raises(mbd.ModelError, match="number"):
+        mbd.sensitivities(model, start, dt=0.1, until=0.1, wrt=wrt, at=at, backend="python")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("x.gif", "name it 'x.html'; it moves"), ("x.PNG", "pictures are those"), ("x.csv", r"to_dataframe\(\)")],
+)
+def test_a_page_is_not_named_as_something_else(tmp_path, name, said):
+    model, _ = falling()
+    run = mbd.simulate(model, mbd.assemble(model, backend="python"), dt=0.1, until=0.2, backend="python")
+    with pytest.raises(mbd.TrajectoryError, match=f"a page is an HTML file, .* got '{name}'.*{said}"):
+        run.page(tmp_path / name)
+    assert not list(tmp_path.iterdir())
