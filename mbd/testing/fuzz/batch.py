@@ -15,7 +15,7 @@ from queue import Empty, Queue
 from typing import Any
 
 from mbd.testing.fuzz.scenes import STRUCTURES
-from mbd.testing.fuzz.structures import SPACE
+from mbd.testing.fuzz.structures import DRIVEN, SPACE
 
 __all__ = ["main", "run_batch", "summary"]
 
@@ -122,6 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m mbd.testing.fuzz", description=__doc__)
     parser.add_argument("--scenes", default="0:200", help="numbers of scenes, first:end")
     parser.add_argument("--space", action="store_true", help="scenes with joints that turn freely")
+    parser.add_argument("--driven", action="store_true", help="driven and held mechanisms, exact zeros, curved ground")
     parser.add_argument("--workers", type=int, default=1, help="processes side by side")
     parser.add_argument("--seconds", type=float, default=0.0, help="wall time after which no scene is begun")
     parser.add_argument("--out", default="", help="a file for all verdicts, one a line")
@@ -130,7 +131,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given.worker:
         _work()
         return
-    first, end = (int(part) + (SPACE if given.space else 0) for part in given.scenes.split(":"))
+    base = DRIVEN if given.driven else SPACE if given.space else 0
+    first, end = (int(part) + base for part in given.scenes.split(":"))
     began, lock, found = time.perf_counter(), threading.Lock(), list[dict[str, Any]]()
 
     def hear(told: dict[str, Any]) -> None:

@@ -78,7 +78,8 @@ def _motion(found: Faults, run: mbd.Trajectory, told: Readings, smooth: bool) ->
         return
     scheme, tied = run.settings["integrator"], bool(run.record.lam.shape[1])
     uncertain, share = int(run.stats["singular_steps"]), steps.error_share(scheme)
-    steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share)
+    tol = float(run.settings.get("tol") or 0.0)
+    steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share, tol)
 
 
 def _unresolved(run: mbd.Trajectory, times: Array) -> Array:
@@ -112,6 +113,8 @@ def _rows(found: Faults, run: mbd.Trajectory, model: mbd.Model, told: Readings, 
     laws.closure(there, bodies, rates=smooth and "index3" not in run.settings["integrator"], told=uncertain)
     laws.constraints(there, bodies)
     acting = loads(bodies)
+    if smooth and "index3" not in run.settings["integrator"]:
+        laws.drives(there, bodies, run)
     if smooth:
         laws.balance(there, bodies, acting, SHARE, np.where(laws.kinks(bodies), np.inf, 0.0))
     laws.contacts(there, bodies, acting, run)

@@ -16,7 +16,18 @@ from mbd.testing.fuzz.loads import Loads
 from mbd.testing.fuzz.quantities import gap_of, named, value_of
 from mbd.testing.fuzz.round_bodies import edge_gap
 
-__all__ = ["balance", "closure", "constraints", "contacts", "energies", "places", "kinks", "partings", "size_of"]
+__all__ = [
+    "balance",
+    "closure",
+    "constraints",
+    "contacts",
+    "drives",
+    "energies",
+    "places",
+    "kinks",
+    "partings",
+    "size_of",
+]
 
 HELD = 1e-7
 """What rows may miss, over the size of the mechanism [-]."""
@@ -134,9 +145,10 @@ def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any, more: Any 
         heavy = mass.mass * (np.linalg.norm(a, axis=1) + whirl) + load.force_size
         twisted = np.linalg.norm(turn, axis=1) + np.linalg.norm(gyro, axis=1) + load.torque_size
         twisted = twisted + mass.mass * reach * whirl
-        limit = share * heavy + 1e-3 * share * whole + 1e-9 + more
+        limit = share * heavy + 1e-3 * share * whole + 1e-9 * (1.0 + np.max(whole, initial=0.0)) + more
         found.small("balance of forces", name, np.linalg.norm(force, axis=1), limit)
-        limit = share * twisted + 1e-3 * share * reach * whole + 1e-9 + reach * more
+        small = 1e-9 * (1.0 + reach * np.max(whole, initial=0.0))
+        limit = share * twisted + 1e-3 * share * reach * whole + small + reach * more
         if not (mass.planar and not planar):
             found.small("balance of torques", name, np.linalg.norm(torque, axis=1), limit)
 
@@ -177,6 +189,36 @@ def constraints(found: Faults, bodies: Bodies, loose: float = HELD) -> None:
             found.small("row on velocities holds", word.name, off, loose * size * 100.0)
         elif isinstance(word, mbd.Rolling):
             found.small("row on velocities holds", word.name, _slip(word, bodies), loose * size * 100.0)
+
+
+def drives(found: Faults, bodies: Bodies, run: Any) -> None:
+    """A driven coordinate has the acceleration of what drives it, within what the scheme errs in its steps.
+
+    With `tol` that is round-off, as steps of explicit schemes and Radau's are. In fixed steps of the Newmark family it
+    is a few times the largest difference of that acceleration over a step.
+    """
+    told = bodies.told
+    exact = bool(run.settings.get("tol")) or run.settings["integrator"].startswith(("Runge", "Radau"))
+    h = float(np.max(np.diff(run.time), initial=0.0))
+    grid = np.linspace(float(run.time[0]), float(run.time[-1]), 400)
+    for word in bodies.model.bilaterals:
+        timed = isinstance(word, mbd.Bilateral) and isinstance(word.subject, Joint) and callable(word.value)
+        if not timed or word.subject.coordinate_names[0] not in told.tree:
+            continue
+        change, sure = _second(word.value, told.time)
+        limit = 1e-4 * np.max(np.abs(_second(word.value, grid)[0])) + 1e-4
+        if not exact:
+            around = np.stack([_second(word.value, grid + shift)[0] for shift in (-h, 0.0, h)])
+            limit = limit + 2.0 * np.max(np.ptp(around, axis=0))
+        off = told[f"{word.subject.coordinate_names[0]}.acceleration"] - change
+        found.small("a drive gives its acceleration", word.name, off, limit, sure)
+
+
+def _second(function: Any, t: Array) -> tuple[Array, Array]:
+    """d²f/dt² by central differences, and where two of them agree, so that nothing jumps there."""
+    fine, coarse = ((function(t + d) - 2.0 * function(t) + function(t - d)) / d**2 + 0.0 * t for d in (5e-5, 1e-4))
+    scale = np.max(np.abs(function(t)), initial=1.0)
+    return np.asarray(coarse), np.abs(fine - coarse) <= 1e-3 * np.max(np.abs(coarse), initial=0.0) + 1e-6 * scale
 
 
 def _slip(word: mbd.Rolling, bodies: Bodies) -> Array:
@@ -235,7 +277,8 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
                 "an open contact is outside", word.name, np.minimum(gap.value, 0.0), 10.0 * HELD * size, ~closed
             )
         if word.slides and gap.tangents and f"{word.name}.friction" in told:
-            mu = told.parameters[f"{word.name}.mu"]
+            slipping = np.linalg.norm([np.sum(gap.slip(bodies) * e, axis=1) for _, e in gap.tangents], axis=0)
+            mu = _coefficient(word, slipping, told.parameters)
             limit = np.where(closed, mu * np.maximum(force, 0.0), 0.0)
             if f"{word.name}.friction.sideways" in told:
                 _cone(found, word, gap, bodies, limit, largest, located)
@@ -244,6 +287,19 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
             _dry(found, word.name, told[f"{word.name}.friction"], speed, limit, largest, located)
     for joint in bodies.model.joints:
         _joint_friction(found, joint, bodies, largest, located)
+
+
+def _coefficient(word: Any, speed: Array, parameters: Any) -> Any:
+    """μ of a contact at a speed of its slip."""
+    if isinstance(word.friction, mbd.Stribeck):
+        return _falling(f"{word.name} friction", speed, parameters)
+    return parameters[f"{word.name}.mu"]
+
+
+def _falling(owner: str, speed: Array, parameters: Any) -> Array:
+    """Stribeck's T_k + (T_s − T_k) e^{−(v/v_s)²}."""
+    static, kinetic, rapid = (parameters[f"{owner}.{field}"] for field in ("static", "kinetic", "speed"))
+    return np.asarray(kinetic + (static - kinetic) * np.exp(-((speed / rapid) ** 2)))
 
 
 def _force_law(found: Faults, word: mbd.Penalty, measured: Any, rate: Array, bodies: Bodies) -> None:
@@ -302,18 +358,20 @@ def _joint_friction(found: Faults, joint: Any, bodies: Bodies, largest: Array, l
         load = np.linalg.norm(told.vector(f"{joint.name}.reaction_force"), axis=1)
         for place, owner, loss in joint.losses():
             if place == k:
-                limit = limit + _limit(loss, owner, load, told.parameters)
+                limit = limit + _limit(loss, owner, load, told.parameters, told[joint.velocity_names[k]])
         _dry(found, friction, told[friction], told[joint.velocity_names[k]], limit, largest, located)
 
 
-def _limit(loss: Any, owner: str, load: Array, parameters: Any) -> Any:
+def _limit(loss: Any, owner: str, load: Array, parameters: Any, rate: Array) -> Any:
     """Largest friction of a loss that truly sticks."""
+    if isinstance(loss, mbd.Stribeck):
+        return _falling(owner, rate, parameters)
     if isinstance(loss, mbd.PinFriction):
         return parameters[f"{owner}.mu"] * parameters[f"{owner}.radius"] * load
     if isinstance(loss, mbd.Coulomb) and loss.smoothing is None:
         return parameters[f"{owner}.torque"]
     if hasattr(loss, "losses"):
-        return sum(_limit(part, name, load, parameters) for name, part in loss.named(owner))
+        return sum(_limit(part, name, load, parameters, rate) for name, part in loss.named(owner))
     return 0.0
 
 

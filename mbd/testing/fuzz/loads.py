@@ -183,7 +183,7 @@ def loss_force(loss: Any, rate: Array, owner: str, parameters: Any) -> Any:
         if loss.smoothing is None:
             return 0.0 * rate
         return parameters[f"{owner}.torque"] * rate / np.sqrt(rate**2 + parameters[f"{owner}.smoothing"] ** 2)
-    if isinstance(loss, mbd.PinFriction):
+    if isinstance(loss, mbd.PinFriction | mbd.Stribeck):
         return 0.0 * rate
     if isinstance(loss, mbd.Tabulated):
         return _tabulated(loss, rate)

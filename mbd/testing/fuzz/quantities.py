@@ -56,13 +56,18 @@ def triple(value: Any, arguments: Any, bodies: Bodies, owner: str, field: str) -
 
 
 def _signal(samples: mbd.Samples, time: Array) -> Array:
-    """The signal between its samples, constant beyond them."""
-    inside = np.clip(time, samples.time[0], samples.time[-1])
+    """The signal between its samples, constant beyond them or repeated."""
+    first, last = samples.time[0], samples.time[-1]
+    inside = first + np.mod(time - first, last - first) if samples.periodic else np.clip(time, first, last)
     if samples.kind == "linear":
         return np.asarray(np.interp(inside, samples.time, samples.values))
     from scipy.interpolate import PchipInterpolator
 
-    return np.asarray(PchipInterpolator(samples.time, samples.values)(inside), dtype=float)
+    t, values = np.asarray(samples.time), np.asarray(samples.values)
+    if samples.periodic:  # slopes at the seam are those of a long table
+        t = np.concatenate([t[:-1] - (last - first), t, t[1:] + (last - first)])
+        values = np.concatenate([values[:-1], values, values[1:]])
+    return np.asarray(PchipInterpolator(t, values)(inside), dtype=float)
 
 
 def _argument(label: str, given: Any, bodies: Bodies, owner: str) -> Any:
@@ -163,7 +168,11 @@ def _on_surface(measure: Touchdown, bodies: Bodies) -> Gap:
     slope = np.imag(np.asarray(height(p[:, 0] + 1j * TINY, p[:, 2], t)) + 0j) / TINY + zero
     forward = np.stack([np.ones_like(slope), slope, zero], axis=1) / np.sqrt(1.0 + slope**2)[:, None]
     direction = np.stack([part + zero for part in slopes[:3]], axis=1)
-    return Gap(value + zero, [(measure.point.body.name, p, direction)], [], slopes[3] + zero, [("forward", forward)])
+    tangents = [("forward", forward)]
+    if "z" in names:  # across the normal and the first tangent
+        normal = np.cross(forward, np.cross(direction, forward))
+        tangents.append(("sideways", np.cross(forward, normal / np.linalg.norm(normal, axis=1)[:, None])))
+    return Gap(value + zero, [(measure.point.body.name, p, direction)], [], slopes[3] + zero, tangents)
 
 
 def user_gap(measure: UserMeasure, bodies: Bodies, owner: str = "measure") -> Gap:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mbd
-from mbd.testing.fuzz.structures import SPACE, Structure, structure
+from mbd.testing.fuzz.structures import DRIVEN, SPACE, Structure, structure
 
 __all__ = ["STRUCTURES", "Scene", "scene"]
 
@@ -46,7 +46,7 @@ class Scene:
     cut : which joints are cut; start : arguments of `mbd.assemble`
     options : arguments of `mbd.simulate` besides model and start
     check : what is compared beside the laws: '', 'restart', 'file', 'cut', 'twin', 'between', 'step there', 'one ulp',
-        'tolerance'
+        'tolerance', 'schemes'
     """
 
     number: int
@@ -80,7 +80,7 @@ def scene(number: int, structures: int = STRUCTURES) -> Scene:
     ModelError
         where the library refuses the words of its mechanism.
     """
-    form = structure(number % structures + (SPACE if number >= SPACE else 0))
+    form = structure(number % structures + (DRIVEN if number >= DRIVEN else SPACE if number >= SPACE else 0))
     rng = random.Random(f"scene {number}")
     cut: Any = rng.choices(["auto", *form.cuts], [3, *(1 for _ in form.cuts)])[0]
     scheme = rng.choice(SCHEMES)
@@ -103,7 +103,45 @@ def scene(number: int, structures: int = STRUCTURES) -> Scene:
         check = "tolerance"
     if rng.random() < 0.02:
         check = "twin"
+    if number >= DRIVEN:
+        return _driven(rng, Scene(number, form, cut, {}, options, check))
     return Scene(number, form, cut, _start(rng, form), options, check)
+
+
+def _driven(rng: random.Random, made: Scene) -> Scene:
+    """A scene of a driven mechanism: at rest or with the rates that its drives have, long enough to dwell.
+
+    More schemes and comparisons than others have.
+    """
+    form, options = made.form, dict(made.options)
+    scheme = rng.choice([*SCHEMES, mbd.RungeKutta4(), mbd.HHT(0.05), mbd.HHT(0.05), mbd.RadauIIA()])
+    explicit = not hasattr(scheme, "coefficients")
+    options["integrator"] = scheme
+    until = rng.uniform(0.1, 1.0)
+    index3 = getattr(scheme, "formulation", "ggl") == "index3"
+    if rng.random() < 0.4 and not index3 and scheme.order() > 1:
+        options.pop("dt", None)
+        options |= {"tol": 10.0 ** rng.uniform(-7 if explicit else -4, -2), "until": until}
+    else:
+        options.pop("tol", None)
+        steps = 10.0 ** (rng.uniform(0.7, 1.7) if explicit else rng.uniform(1.3, 2.7))
+        options |= {"dt": until / steps, "until": until}
+    if options.get("contact") == "nonsmooth" and "tol" in options:
+        options["contact"] = "events"
+    check = rng.choice(["", "cut", "between", "schemes", "schemes", "step there", "restart", "one ulp"])
+    if "tol" in options:
+        check = rng.choice(["tolerance", "tolerance", "cut", "between"])
+    free = [name for name in form.position if name not in form.held and ".orientation" not in name]
+    velocity = {}
+    if free and rng.random() < 0.5:
+        fast = rng.choice([1.0, 0.1, 3.0])
+        velocity = {name: fast * rng.choice([rng.uniform(-1, 1), 1.0, 0.0]) for name in free}
+    tied = form.loops and bool(form.held)
+    if form.kind == "driven linkage":
+        tied, velocity = False, {}
+    values = {} if form.loops else _parameters(rng, form)
+    start = {"position": form.position, "velocity": velocity, "parameters": values, "project": not tied}
+    return replace(made, start=start, options=options, check=check)
 
 
 def _start(rng: random.Random, form: Structure) -> dict[str, Any]:

@@ -38,6 +38,7 @@ def motion(
     uncertain: int = 0,
     tied: bool = True,
     share: float = 0.0,
+    tol: float = 0.0,
 ) -> None:
     """Each coordinate is the integral of its rate, and that of its acceleration, from one row to the next.
 
@@ -51,6 +52,7 @@ def motion(
     uncertain : how many steps next to singular poses the run says to have less accurate velocities
     tied : whether there are rows, onto which corrections move all velocities by what one of them errs
     share : error of a position in a step over h² times the change of its acceleration [-]
+    tol : what positions may err by in the whole run [m, rad]: long steps pass more than these laws see
     """
     h = np.diff(told.time)
     steps = np.flatnonzero(h > 0.0)
@@ -71,7 +73,7 @@ def motion(
         off = np.diff(q)[steps] - h * (v[steps] + v[steps + 1]) / 2.0
         if smooth:
             off = off + h**2 * np.diff(a)[steps] / 12.0
-        limit = 6.0 * h**2 * (change + leaps) + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast)
+        limit = 6.0 * h**2 * (change + leaps) + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast) + tol
         if not smooth:  # bodies are lifted out of surfaces
             limit = limit + h * (10.0 * _range(v)[steps] + fastest)
         elif not rates:
@@ -79,7 +81,7 @@ def motion(
         there.small("a coordinate is the integral of its rate", name, off, limit)
         if smooth and rates:
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-            limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast)
+            limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast) + tol / h
             there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * uncertain)
 
     for name in spins if smooth and rates else []:
@@ -87,7 +89,7 @@ def motion(
         change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
         fast = np.maximum(np.abs(v[steps]), np.abs(v[steps + 1]))
         off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-        limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast)
+        limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast) + tol / h
         there.small("an angular velocity is the integral of its rate", name, off, limit, told=2 * uncertain)
     for owner in [name.removesuffix(".orientation.w") for name in told.values if name.endswith(".orientation.w")]:
         turning = told.attitude(owner)
@@ -101,7 +103,7 @@ def motion(
             step = step - h[:, None] ** 2 * (a[steps + 1] - a[steps]) / 12.0
         change = np.linalg.norm(_around(np.abs(np.diff(a, axis=0)).max(axis=1)[steps])[:, None], axis=1)
         fast = np.maximum(np.linalg.norm(v[steps], axis=1), np.linalg.norm(v[steps + 1], axis=1))
-        limit = 6.0 * h**2 * (change + leaps) + 2.0 * bend + 1e-8 * (1.0 + h * fast)
+        limit = 6.0 * h**2 * (change + leaps) + 2.0 * bend + 1e-8 * (1.0 + h * fast) + tol
         if not smooth:
             limit = limit + h * 10.0 * _range(np.linalg.norm(v, axis=1))[steps] + h * fastest
         elif not rates:

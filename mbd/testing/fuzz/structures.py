@@ -13,6 +13,7 @@ import numpy as np
 
 import mbd
 from mbd.joints.base import Joint
+from mbd.testing.fuzz.driven_structures import DRIVEN_KINDS
 from mbd.testing.fuzz.parts import (
     add_event,
     add_loads,
@@ -26,7 +27,7 @@ from mbd.testing.fuzz.parts import (
 from mbd.testing.fuzz.spatial_structures import SPATIAL_KINDS
 from mbd.testing.fuzz.tree_poses import close_loop, pose
 
-__all__ = ["KINDS", "SPACE", "Structure", "structure"]
+__all__ = ["DRIVEN", "KINDS", "SPACE", "Structure", "structure"]
 
 
 @dataclass
@@ -321,18 +322,34 @@ KINDS: dict[str, tuple[Callable[[random.Random], tuple[mbd.Model, dict[str, floa
 """By name: what makes it, whether it is spatial, whether rows tie its coordinates together."""
 
 
+Kinds = dict[str, tuple[Callable[[random.Random], tuple[mbd.Model, dict[str, Any]]], bool]]
+
 SPACE = 1_000_000
 """From this number on mechanisms are of `SPATIAL_KINDS`, with joints that turn freely."""
 
 
-def _in_space(number: int) -> Structure:
-    """The same of a number from `SPACE` on."""
-    kind = list(SPATIAL_KINDS)[number % len(SPATIAL_KINDS)]
-    make, loops = SPATIAL_KINDS[kind]
+DRIVEN = 2_000_000
+"""From this number on they are of `DRIVEN_KINDS`: prescribed motions, rest, exact zeros, curved ground."""
+
+
+def _of_kinds(number: int, kinds: Kinds) -> Structure:
+    """The same of a number from `SPACE` or `DRIVEN` on."""
+    kind = list(kinds)[number % len(kinds)]
+    make, loops = kinds[kind]
     rng = random.Random(f"structure {number}")
     model, position = make(rng)
     names = [joint.name for joint in model.joints]
-    return Structure(number, kind, model, position, ["all", (rng.choice(names),)], loops)
+    cuts: list[Any] = ["all", (rng.choice(names),)]
+    if kind == "driven linkage":
+        cuts = [("main",), ("pin",)]
+    return Structure(number, kind, model, position, cuts, loops, _held(model))
+
+
+def _held(model: mbd.Model) -> tuple[str, ...]:
+    """Coordinates that are driven."""
+    words = [word for word in model.bilaterals if isinstance(word, mbd.Bilateral)]
+    drives = [word.subject for word in words if isinstance(word.subject, Joint)]
+    return tuple(name for joint in drives for name in joint.coordinate_names)
 
 
 @lru_cache(maxsize=16)
@@ -344,8 +361,10 @@ def structure(number: int) -> Structure:
     ModelError
         where the library refuses its words.
     """
+    if number >= DRIVEN:
+        return _of_kinds(number, DRIVEN_KINDS)
     if number >= SPACE:
-        return _in_space(number)
+        return _of_kinds(number, SPATIAL_KINDS)
     kind = list(KINDS)[number % len(KINDS)]
     make, spatial, loops = KINDS[kind]
     rng = random.Random(f"structure {number}")
@@ -356,7 +375,4 @@ def structure(number: int) -> Structure:
     cuts: list[Any] = [] if spatial else ["all", some]
     if spatial and loops:
         cuts = [(rng.choice([name for name in names if name.startswith(("joint", "closer"))]),)]
-    held_by = [word for word in model.bilaterals if isinstance(word, mbd.Bilateral)]
-    drives = [word.subject for word in held_by if isinstance(word.subject, Joint)]
-    held = tuple(name for joint in drives for name in joint.coordinate_names)
-    return Structure(number, kind, model, position, cuts, loops or pins, held)
+    return Structure(number, kind, model, position, cuts, loops or pins, _held(model))

@@ -94,6 +94,8 @@ def _compared(made: Scene, run: mbd.Trajectory) -> list[str]:
         return _twin(made, run)
     if check == "one ulp":
         return _one_ulp(made, run)
+    if check == "schemes":
+        return _schemes(made, run)
     if check == "tolerance":
         return _tolerance(made, run)
     return []
@@ -275,6 +277,26 @@ def _one_ulp(made: Scene, run: mbd.Trajectory) -> list[str]:
 def _story(run: mbd.Trajectory) -> tuple[int, list[tuple[str, str]]]:
     """What a run decided: its rows and its events."""
     return len(run), [(event.kind, event.name) for event in run.events]
+
+
+def _schemes(made: Scene, run: mbd.Trajectory) -> list[str]:
+    """Another scheme comes to the same end, within what two thirds of the step change there, and its half there."""
+    if run.settings["contact"] == "nonsmooth" or "dt" not in made.options:
+        return []
+    finer = run_of(made, dt=made.options["dt"] / 1.5)
+    scheme = mbd.RadauIIA() if isinstance(made.options["integrator"], mbd.RungeKutta853) else mbd.RungeKutta853()
+    other, near = (run_of(made, integrator=scheme, dt=made.options["dt"] / part) for part in (1.0, 1.5))
+    if not (finer.success and other.success and near.success):
+        return []
+    if any(_story(each)[1] != _story(run)[1] for each in (finer, other, near)):
+        return []
+    names = [name for joint in made.model.joints for name in joint.coordinate_names]
+    a, b, c, d = (_ends(names, each, run) for each in (run, finer, other, near))
+    off, allowed = np.abs(a - c), 27.0 * (np.max(np.abs(a - b)) + np.max(np.abs(c - d))) + 1e-6 * (1.0 + np.abs(a))
+    return [
+        f"schemes: {names[k]!r} ends at {a[k]:.9g}, with {scheme!r} at {c[k]:.9g}, allowed {allowed[k]:.2g}"
+        for k in np.flatnonzero(~(off <= allowed))
+    ]
 
 
 def _tolerance(made: Scene, run: mbd.Trajectory) -> list[str]:
