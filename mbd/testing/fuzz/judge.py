@@ -20,6 +20,8 @@ __all__ = ["Judgement", "judge"]
 
 MOST = 48
 """Rows at which forces are balanced, at most."""
+FEW = 12
+"""Rows of a run that follows a tolerance below which steps are too long for laws from row to row."""
 BRIEFEST = 3e-7
 """Duration of steps [s] in which round-off of positions of a metre is a velocity of 10⁻⁹ m/s."""
 SHARE = 1e-6
@@ -76,9 +78,11 @@ def _motion(found: Faults, run: mbd.Trajectory, told: Readings, smooth: bool) ->
     """Laws along rows, unless a note tells that dt resolves no steps: schemes that lag behind those err for a while."""
     if any("not resolved by dt" in str(note) for note in run.stats["notes"]):
         return
+    tol = float(run.settings.get("tol") or 0.0)
+    if tol and len(told) < FEW:
+        return
     scheme, tied = run.settings["integrator"], bool(run.record.lam.shape[1])
     uncertain, share = int(run.stats["singular_steps"]), steps.error_share(scheme)
-    tol = float(run.settings.get("tol") or 0.0)
     steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share, tol)
 
 
@@ -163,7 +167,7 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
             laws.balance(found, bodies, loads(bodies), share, stiff + _turned(run, model, times))
             if precise:
-                laws.constraints(found, bodies, 1e-6)
+                laws.constraints(found, bodies, 1e-6 + 0.3 * tol)
         except NotImplementedError as error:
             return Judgement(tuple(found.found), found.tried, str(error))
     return Judgement(tuple(found.found), found.tried)

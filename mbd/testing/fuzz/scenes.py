@@ -22,6 +22,8 @@ SCHEMES: tuple[Any, ...] = (
     mbd.GeneralizedAlpha(0.7, formulation="index3"), mbd.RadauIIA(), mbd.RadauIIA(), mbd.RungeKutta853(),
     mbd.RungeKutta853(),
 )  # fmt: skip
+LONGEST = 0.015
+"""Step of driven scenes at most [s]: a drive moves any way within a step, which laws along rows do not see."""
 VARIED = (
     ".mass",
     ".inertia",
@@ -125,7 +127,7 @@ def _driven(rng: random.Random, made: Scene) -> Scene:
     else:
         options.pop("tol", None)
         steps = 10.0 ** (rng.uniform(0.7, 1.7) if explicit else rng.uniform(1.3, 2.7))
-        options |= {"dt": until / steps, "until": until}
+        options |= {"dt": min(until / steps, LONGEST), "until": until}
     if options.get("contact") == "nonsmooth" and "tol" in options:
         options["contact"] = "events"
     check = rng.choice(["", "cut", "between", "schemes", "schemes", "step there", "restart", "one ulp"])
