@@ -10,6 +10,7 @@ from mbd.hardcases import (
     blocks,
     clearances,
     cradles,
+    driven_leg,
     four_bars,
     frictions,
     governor,
@@ -39,9 +40,9 @@ from mbd.hardcases.case import HardCase
 __all__ = ["CASES"]
 
 MODULES = (
-    absent_effects, balls, blocks, clearances, cradles, four_bars, frictions, governor, grazes, hills, knees,
-    light_links, long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations, shakers,
-    singular_poses, sleighs, starts, tiny_steps, user_force, walls, wheel,
+    absent_effects, balls, blocks, clearances, cradles, driven_leg, four_bars, frictions, governor, grazes, hills,
+    knees, light_links, long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations,
+    shakers, singular_poses, sleighs, starts, tiny_steps, user_force, walls, wheel,
 )  # fmt: skip
 
 

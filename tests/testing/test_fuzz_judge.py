@@ -15,7 +15,7 @@ from mbd.testing.fuzz import batch
 from mbd.testing.fuzz.geometry import Signal, inverse, product, shift, turn, twist
 from mbd.testing.fuzz.judge import between, judge
 from mbd.testing.fuzz.scenes import STRUCTURES, scene
-from mbd.testing.fuzz.structures import SPACE
+from mbd.testing.fuzz.structures import DRIVEN, SPACE
 from mbd.testing.fuzz.verdict import run_of, verdict
 from tests.helpers import altered
 
@@ -339,3 +339,23 @@ def test_the_judge_sees_what_is_wrong_in_space():
     assert "a quaternion has length 1" in laws_broken(bent, model, made.parameters)
     turned = altered(run, "v", np.s_[:, 4], lambda right: right + 0.1)
     assert "an orientation is the integral of its angular velocity" in laws_broken(turned, model, made.parameters)
+
+
+# drives, rest, exact zeros -------------------------------------------------------------------------------------------
+QUICK_DRIVEN = [1, 2, 6, 12]
+"""A linkage, forces in time, watched contacts, zeros."""
+
+
+@pytest.mark.parametrize("number", [*QUICK_DRIVEN, *(pytest.param(k, marks=pytest.mark.slow) for k in range(13, 60))])
+def test_driven_scenes_are_sound(number):
+    told = verdict(DRIVEN + number)
+    assert told["kind"] != "bad", told
+
+
+def test_the_judge_sees_accelerations_that_alternate_around_those_of_a_drive():
+    made = scene(DRIVEN + 1)
+    run, model = run_of(made), made.model
+    assert not judge(run, model, made.parameters).faults
+    place = [c.name for c in run.record.equations.coordinates].index("main.angle")
+    wrong = altered(run, "a", np.s_[3::2, place], lambda right: right + 0.2 * np.max(np.abs(right)))
+    assert "a drive gives its acceleration" in laws_broken(wrong, model, made.parameters)

@@ -206,7 +206,8 @@ def drives(found: Faults, bodies: Bodies, run: Any) -> None:
         if not timed or word.subject.coordinate_names[0] not in told.tree:
             continue
         change, sure = _second(word.value, told.time)
-        limit = 1e-4 * np.max(np.abs(_second(word.value, grid)[0])) + 1e-4
+        bend = _second(word.value, grid)[0]
+        limit = 1e-4 * np.max(np.abs(bend)) + 1e-4 + 2e-4 * np.max(np.abs(np.diff(bend))) / (grid[1] - grid[0])
         if not exact:
             around = np.stack([_second(word.value, grid + shift)[0] for shift in (-h, 0.0, h)])
             limit = limit + 2.0 * np.max(np.ptp(around, axis=0))
