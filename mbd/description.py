@@ -18,7 +18,7 @@ from mbd.constraints.event import Event
 from mbd.constraints.observation import Observation
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
-from mbd.forces.quantities import Mention, instants_of
+from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 
 __all__ = ["Description", "all_are", "on_slope", "served"]
@@ -235,11 +235,6 @@ class Description:
         """The frames that joints, forces and constraints refer to."""
         frames = [frame for joint in self.joints for frame in (joint.parent, joint.child)]
         return frames + [mention for mention in self.mentions() if isinstance(mention, Frame)]
-
-    def instants(self, begin: float, end: float) -> list[float]:
-        """Times at which sampled signals have a kink, in order: steps end there [s]."""
-        words: list[Force | Constraint] = [*self.forces, *self.constraints]
-        return instants_of(words, begin, end)
 
     def without(self, *names: str) -> Self:
         """A copy that lacks some joints, constraints or effects.

@@ -48,8 +48,17 @@ class Scope(ParameterSource, Protocol):
     def time(self) -> Node:
         """t [s]."""
 
-    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
-        """A piecewise cubic stored beside the parameters; evaluate it with ``scope.tape.lookup(table, x)``."""
+    def table(
+        self,
+        owner: str,
+        breaks: Sequence[float],
+        coefficients: Sequence[Sequence[float]],
+        jumps: Sequence[int] | None = None,
+    ) -> Table:
+        """A piecewise cubic stored beside the parameters; evaluate it with ``scope.tape.lookup(table, x)``.
+
+        jumps : the lowest derivative that jumps at each break but the first; by default it is measured
+        """
 
     def increment(self, owner: str, field: str) -> Scalar:
         """What is added to the law ``owner.field`` where an analysis asks for it as an input; 0 otherwise."""

@@ -10,7 +10,7 @@ from mbd.bodies.domains import Parameterized
 from mbd.bodies.values import name_of
 from mbd.constraints.law import Equation, Hold, Law
 from mbd.constraints.measure import mentioned_names
-from mbd.forces.quantities import Instants, Mention
+from mbd.forces.quantities import Mention
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
@@ -60,10 +60,6 @@ class Constraint(Parameterized, ABC):
     @property
     def others(self) -> tuple[str, ...]:
         """Names of the other constraints it refers to."""
-        return ()
-
-    def instants(self) -> Instants:
-        """Times at which its sampled signals have a kink [s]."""
         return ()
 
     def bare(self) -> dict[str, Constraint | None]:

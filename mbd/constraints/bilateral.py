@@ -16,10 +16,9 @@ from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
 from mbd.forces.quantities import (
-    Instants,
     Mention,
+    Samples,
     arguments_of,
-    kinks,
     law_names,
     mentioned,
     quantity_of,
@@ -43,7 +42,8 @@ class Bilateral(Constraint):
     ----------
     name : its name
     subject : a measure, or a joint whose one coordinate is prescribed
-    value : a number (the run-time parameter 'name.value'), a function, a sympy expression or `Samples`
+    value : a number (the run-time parameter 'name.value'), a function, a sympy expression, or `Samples` of a kind
+        that has accelerations: 'spline', the default here, or 'smooth'
     arguments : what a function is called with, in order; the time by default
     """
 
@@ -64,6 +64,8 @@ class Bilateral(Constraint):
             )
         object.__setattr__(self, "value", quantity_of(self.value, f"value of '{self.name}'"))
         object.__setattr__(self, "arguments", arguments_of(self.arguments, f"Bilateral '{self.name}'"))
+        if isinstance(self.value, Samples):
+            self.value.require_motion(f"value of '{self.name}'")
 
     @property
     def measure(self) -> Measure:
@@ -82,7 +84,7 @@ class Bilateral(Constraint):
         ``h = atan2(sin(g − value), cos(g − value))``.
         """
         gap = gap_of(self.measure, scope)
-        h = gap - scalar(self.value, self.arguments, scope, self.name, "value")
+        h = gap - scalar(self.value, self.arguments, scope, self.name, "value", "spline")
         wraps = isinstance(self.subject, Joint) and isinstance(gap, Node) and any(n.op == "atan2" for n in live([gap]))
         return atan2(sin(h), cos(h)) if wraps else h
 
@@ -111,10 +113,6 @@ class Bilateral(Constraint):
     def laws(self) -> tuple[str, ...]:
         """`value` where it is no number."""
         return law_names(self.value, self.name, "value")
-
-    def instants(self) -> Instants:
-        """Kinks of its samples."""
-        return kinks(self.value)
 
     def faults(self) -> list[str]:
         """Those of its measure."""

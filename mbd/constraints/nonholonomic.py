@@ -11,11 +11,9 @@ from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.expressions import is_expression, plain, quantities_in
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
-    Instants,
     Mention,
     Samples,
     arguments_of,
-    kinks,
     law_names,
     mentioned,
     quantity_of,
@@ -68,6 +66,8 @@ class Nonholonomic(VelocityConstraint):
         put(self, "row", quantity_of(self.row, f"row of '{self.name}'"))
         put(self, "bias", quantity_of(self.bias, f"bias of '{self.name}'"))
         put(self, "arguments", arguments_of(self.arguments, f"Nonholonomic '{self.name}'"))
+        if isinstance(self.bias, Samples):
+            self.bias.require_motion(f"bias of '{self.name}'", rate=True)
         if is_number(self.row) or isinstance(self.row, Samples):
             raise ModelError(
                 f"row of Nonholonomic '{self.name}' must be a function or a sympy expression of rates, got {self.row!r}"
@@ -84,7 +84,7 @@ class Nonholonomic(VelocityConstraint):
         """Its one row."""
         given = resolved(self.arguments, scope, self.name)
         row = traced_scalar(self.row, given, f"row of '{self.name}'", scope.tape)
-        return [("", row + scalar(self.bias, TIME, scope, self.name, "bias"))]
+        return [("", row + scalar(self.bias, TIME, scope, self.name, "bias", "spline"))]
 
     def mentions(self) -> list[Mention]:
         """What its row depends on."""
@@ -97,7 +97,3 @@ class Nonholonomic(VelocityConstraint):
     def laws(self) -> tuple[str, ...]:
         """`bias` where it is no number."""
         return law_names(self.bias, self.name, "bias")
-
-    def instants(self) -> Instants:
-        """Kinks of its samples."""
-        return kinks(self.bias)

@@ -27,6 +27,7 @@ from mbd.equations.row_sizes import row_sizes
 from mbd.equations.shapes import offer_shapes, shapes_of
 from mbd.equations.sizes import require_room
 from mbd.equations.solids import offer_solids, solids_of
+from mbd.equations.switching_times import table_faults
 from mbd.errors import ModelError
 from mbd.joints.reflected import signs_in_a_mirror
 from mbd.tape.derivatives import live
@@ -60,11 +61,15 @@ def derive(model: Description | FrontDoor) -> Equations:
     model : a `Model`, or another front door; all its faults are raised together as a `ModelError`
     """
     if isinstance(model, FrontDoor):
-        return model.equations_of_motion()
-    require_valid(model)
-    chosen = plan(model)
-    require_room(chosen)
-    return _derived(model, chosen)
+        equations = model.equations_of_motion()
+    else:
+        require_valid(model)
+        chosen = plan(model)
+        require_room(chosen)
+        equations = _derived(model, chosen)
+    if faults := table_faults(equations):
+        raise ModelError(faults)
+    return equations
 
 
 def derivation_faults(model: Description | FrontDoor) -> list[str]:

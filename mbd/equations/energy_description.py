@@ -15,7 +15,6 @@ from mbd.constraints.observation import Observation
 from mbd.description import all_are, served
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
-from mbd.forces.quantities import instants_of
 
 __all__ = ["Coordinate", "EnergyDescription", "Expression"]
 
@@ -190,11 +189,6 @@ class EnergyDescription:
         """Names of what inputs of a linearization may be added to: the force on each coordinate, laws of its words."""
         own = tuple(f"{coordinate.name}.force" for coordinate in self.coordinates)
         return own + tuple(name for word in (*self.applied, *self.words) for name in word.laws())
-
-    def instants(self, begin: float, end: float) -> list[float]:
-        """Times at which sampled signals have a kink, in order: steps end there [s]."""
-        words: list[Force | Constraint] = [*self.applied, *self.words]
-        return instants_of(words, begin, end)
 
     @property
     def _constraints(self) -> Mapping[str, Any]:

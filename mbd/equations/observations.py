@@ -100,7 +100,13 @@ class _ObservingScope:
     def increment(self, owner: str, field: str) -> Scalar:
         return 0.0
 
-    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
+    def table(
+        self,
+        owner: str,
+        breaks: Sequence[float],
+        coefficients: Sequence[Sequence[float]],
+        jumps: Sequence[int] | None = None,
+    ) -> Table:
         raise ModelError(f"{self._what} takes no samples; look them up in the results instead")
 
     def state(self, owner: str, field: str, initial: float) -> Node:

@@ -24,7 +24,6 @@ class ParameterScope:
         self.tape = Tape()
         self.inputs = Inputs.sized(self.tape, n_q, n_v)
         self.parameters = ParameterTable(self.tape, tunable)
-        self._tables: dict[str, Table] = {}
 
     @property
     def time(self) -> Node:
@@ -39,8 +38,12 @@ class ParameterScope:
         """What a linearization adds to a law; 0 in every other derivation."""
         return self.parameters.increment(f"{owner}.{field}")
 
-    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
-        """A piecewise cubic, one for each owner."""
-        if owner not in self._tables:
-            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
-        return self._tables[owner]
+    def table(
+        self,
+        owner: str,
+        breaks: Sequence[float],
+        coefficients: Sequence[Sequence[float]],
+        jumps: Sequence[int] | None = None,
+    ) -> Table:
+        """A piecewise cubic; equal ones are one table, named for the owner that asked first."""
+        return self.tape.table(owner, breaks, coefficients, jumps)

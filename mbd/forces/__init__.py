@@ -7,7 +7,7 @@ from mbd.forces.damper import Damper
 from mbd.forces.dc_motor import DCMotor
 from mbd.forces.motor import Motor
 from mbd.forces.potential import Potential
-from mbd.forces.quantities import Samples
+from mbd.forces.samples import Samples
 from mbd.forces.spring import Spring
 from mbd.forces.tabulated_spring import TabulatedSpring
 from mbd.forces.torsion_spring import TorsionSpring

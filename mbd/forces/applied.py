@@ -13,11 +13,9 @@ from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import (
-    Instants,
     Mention,
     arguments_of,
     is_single,
-    kinks,
     law_names,
     mentioned,
     triple_at,
@@ -97,10 +95,6 @@ class Applied(Force):
     def laws(self) -> tuple[str, ...]:
         """Components that are no numbers."""
         return law_names(self.force, self.name, "force", True) + law_names(self.torque, self.name, "torque", True)
-
-    def instants(self) -> Instants:
-        """Kinks of its samples."""
-        return kinks(self.force, self.torque)
 
     def act(self, scope: Scope) -> Action:
         """Force on velocity, torque on angular velocity."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Parameterized
 from mbd.errors import ModelError
-from mbd.forces.quantities import Instants, Mention
+from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
@@ -78,10 +78,6 @@ class Force(Parameterized, ABC):
     def results(self) -> dict[str, Result]:
         """What runs know of it besides its power and energy, by field: {'force': Result(…)} is 'name.force'."""
         return {}
-
-    def instants(self) -> Instants:
-        """Times at which its sampled signals have a kink [s]."""
-        return ()
 
 
 def frame_of(value: object, what: str) -> Frame:

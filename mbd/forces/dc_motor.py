@@ -10,10 +10,8 @@ from mbd.bodies.values import name_of, number
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import (
-    Instants,
     Mention,
     arguments_of,
-    kinks,
     law_names,
     mentioned,
     quantity_of,
@@ -106,10 +104,6 @@ class DCMotor(Force):
     def laws(self) -> tuple[str, ...]:
         """`voltage` where it is no number."""
         return law_names(self.voltage, self.name, "voltage")
-
-    def instants(self) -> Instants:
-        """Kinks of its samples."""
-        return kinks(self.voltage)
 
     def act(self, scope: Scope) -> Action:
         """k i on q̇, and the rate of i."""

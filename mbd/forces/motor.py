@@ -9,10 +9,8 @@ from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import (
-    Instants,
     Mention,
     arguments_of,
-    kinks,
     law_names,
     mentioned,
     quantity_of,
@@ -92,10 +90,6 @@ class Motor(Force):
     def laws(self) -> tuple[str, ...]:
         """`torque` where it is no number."""
         return law_names(self.effort, self.name, self.field)
-
-    def instants(self) -> Instants:
-        """Kinks of its samples."""
-        return kinks(self.effort)
 
     def act(self, scope: Scope) -> Action:
         """The torque on the rate."""

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from mbd.bodies.base import Frame
-from mbd.bodies.values import among, flag, is_number, number, numbers, shown
+from mbd.bodies.values import is_number, number
 from mbd.errors import ModelError
+from mbd.forces.samples import Samples
+from mbd.forces.scipy_curves import is_curve
 from mbd.joints.base import Joint
 from mbd.scope import Scope
-from mbd.tape.interpolation import Pieces, linear, monotone
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "INCREMENT", "ArgumentSpec", "Instants", "Mention", "Repeated", "Samples", "arguments_of", "instants_of",
-    "is_single", "kinks", "law_names", "mentioned", "quantity_of", "resolved", "scalar", "triple_at", "triple_of",
-    "value_parameters",
+    "INCREMENT", "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_single", "law_names", "mentioned",
+    "quantity_of", "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
 ]  # fmt: skip
 
 INCREMENT = "+"
@@ -32,101 +30,6 @@ Mention: TypeAlias = Frame | Joint | str
 
 ArgumentSpec: TypeAlias = tuple[tuple[str, Mention | float], ...]
 """(label, what it stands for): the name of a quantity, a frame (its position), a joint (its coordinates), a number."""
-
-
-class Repeated(NamedTuple):
-    """Instants that come again after every period [s]."""
-
-    times: tuple[float, ...]
-    period: float
-
-    def within(self, begin: float, end: float) -> list[float]:
-        """Those from the period of begin to that of end, a million at most."""
-        first = math.floor((begin - self.times[0]) / self.period)
-        periods = min((end - begin) / self.period + 2.0, 1e6 / len(self.times))
-        return [time + count * self.period for count in range(first, first + int(periods) + 1) for time in self.times]
-
-
-Instants: TypeAlias = tuple[float | Repeated, ...]
-"""Times at which steps are to end [s]."""
-
-
-@dataclass(frozen=True, init=False)
-class Samples:
-    """A signal sampled in time, constant before its first sample and after its last, or repeated for ever.
-
-    Parameters
-    ----------
-    time : (n,) increasing [s]
-    values : (n,) samples, or (n, k) of k components
-    kind : 'cubic' keeps the shape of the samples with a continuous slope, 'linear' joins them by straight lines
-    periodic : whether the signal repeats itself, with the period from the first time to the last, as data of a gait
-        cycle do; the last value is the first
-    """
-
-    time: tuple[float, ...]
-    values: tuple[Any, ...]
-    kind: str = "cubic"
-    periodic: bool = False
-
-    def __init__(self, time: Any, values: Any, kind: str = "cubic", periodic: bool = False) -> None:
-        try:
-            table = np.asarray(values, dtype=float)
-        except (TypeError, ValueError, OverflowError):
-            raise ModelError(
-                f"values of Samples must be numbers, one for each time or a row (x, y, z) for each; got {shown(values)}"
-            ) from None
-        object.__setattr__(self, "time", numbers(time, "times of Samples"))
-        if not among(kind, ("cubic", "linear")):
-            raise ModelError(f"kind of Samples is 'cubic' or 'linear', got {kind!r}")
-        if table.ndim not in (1, 2) or len(table) != len(self.time):
-            raise ModelError(
-                f"Samples needs as many values as times; got {len(self.time)} times and values of shape {table.shape}"
-            )
-        if len(table) == 0:
-            raise ModelError("Samples needs one time and value at least, got none")
-        rows: Any = table.tolist()
-        object.__setattr__(self, "values", tuple(rows if table.ndim == 1 else map(tuple, rows)))
-        object.__setattr__(self, "kind", kind)
-        object.__setattr__(self, "periodic", flag(periodic, "periodic of Samples"))
-        if self.periodic and (len(rows) < 3 or self.values[0] != self.values[-1]):
-            raise ModelError(
-                "Samples that repeat need three values at least, of which the last is the first; got "
-                f"{len(rows)}, from {shown(self.values[0])} to {shown(self.values[-1])}"
-            )
-        for part in self.components:
-            part.pieces()
-
-    @property
-    def components(self) -> tuple[Samples, ...]:
-        """Each component as a signal of its own."""
-        if not isinstance(self.values[0], tuple):
-            return (self,)
-        columns = zip(*self.values, strict=True)
-        return tuple(Samples(self.time, column, self.kind, self.periodic) for column in columns)
-
-    def pieces(self) -> Pieces:
-        """Breaks and rows of coefficients as the tape stores them."""
-        through = linear if self.kind == "linear" else monotone
-        if not self.periodic:
-            return through(self.time, self.values, "constant", "Samples")
-        period = self.time[-1] - self.time[0]  # a sample of the period before and one of that after give equal slopes
-        time = (self.time[-2] - period, *self.time, self.time[1] + period)
-        return through(time, (self.values[-2], *self.values, self.values[1]), "constant", "Samples")
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """Times at which its slope jumps [s]: every sample of straight lines, the ends of a cubic unless it repeats."""
-        if self.periodic and self.kind == "cubic":
-            return ()
-        return self.time if self.kind == "linear" else (self.time[0], self.time[-1])
-
-    def signal(self, scope: Scope, owner: str) -> Scalar:
-        """Its value at the time t."""
-        time: Scalar = scope.time
-        if self.periodic:
-            time = self.time[0] + scope.tape.remainder(time - self.time[0], self.time[-1] - self.time[0])
-        return scope.tape.lookup(scope.table(owner, *self.pieces()), time)
 
 
 def is_single(value: Any) -> bool:
@@ -140,6 +43,11 @@ def quantity_of(value: Any, what: str) -> Any:
     """A quantity as users may give it, checked at the border; numbers become floats."""
     if is_number(value):
         return number(value, what)
+    if is_curve(value):
+        curve = Samples.of(value, what)
+        if isinstance(curve, tuple):
+            raise ModelError(f"{what}: a curve of one component is expected, got {len(curve)}")
+        return curve
     if isinstance(value, Samples):
         if len(value.components) != 1:
             raise ModelError(f"{what}: samples of one component are expected, got {len(value.components)}")
@@ -153,6 +61,9 @@ def triple_of(value: Any, what: str) -> Any:
     """Three components (two are x and y), each a quantity; or one function or table that gives them all."""
     if isinstance(value, Samples):
         parts = value.components
+    elif is_curve(value):
+        curve = Samples.of(value, what)
+        parts = curve if isinstance(curve, tuple) else (curve,)
     elif isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
         parts = tuple(value)
     elif callable(value):
@@ -214,12 +125,17 @@ def resolved(arguments: ArgumentSpec, scope: Scope, owner: str) -> list[Argument
     return result
 
 
-def scalar(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field: str) -> Scalar:
-    """A quantity on the tape; a number is the run-time parameter 'owner.field'."""
+def scalar(
+    value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field: str, otherwise: str = "monotone"
+) -> Scalar:
+    """A quantity on the tape; a number is the run-time parameter 'owner.field'.
+
+    otherwise : the kind of samples that were given none
+    """
     if is_number(value):
         return scope.parameter(owner, field, float(value))
     if isinstance(value, Samples):
-        return value.signal(scope, f"{owner}.{field}") + scope.increment(owner, field)
+        return value.signal(scope, f"{owner}.{field}", otherwise) + scope.increment(owner, field)
     given = resolved(arguments, scope, owner)
     return traced_scalar(value, given, f"{field} of '{owner}'", scope.tape) + scope.increment(owner, field)
 
@@ -238,14 +154,6 @@ def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, fie
         raise ModelError(f"{field} of '{owner}': three components (or two, x and y) are expected, {came} came")
     whole: tuple[Scalar, ...] = result if len(result) == 3 else (*result, 0.0)
     return tuple(part + scope.increment(owner, f"{field}.{axis}") for part, axis in zip(whole, "xyz", strict=True))
-
-
-def kinks(*values: Any) -> Instants:
-    """Times at which quantities given by samples have a kink [s]."""
-    parts = [part for value in values for part in (value if isinstance(value, tuple) else (value,))]
-    samples = [part for part in parts if isinstance(part, Samples)]
-    repeated = [Repeated(part.kinks, part.time[-1] - part.time[0]) for part in samples if part.periodic and part.kinks]
-    return (*(instant for part in samples if not part.periodic for instant in part.kinks), *repeated)
 
 
 def value_parameters(value: Any, arguments: ArgumentSpec, owner: str, field: str) -> dict[str, float]:
@@ -271,16 +179,3 @@ def law_names(value: Any, owner: str, field: str, components: bool = False) -> t
         return (f"{owner}.{field}",)
     parts = value if isinstance(value, tuple) else (None,) * 3
     return tuple(f"{owner}.{field}.{axis}" for part, axis in zip(parts, "xyz", strict=True) if not is_number(part))
-
-
-class Timed(Protocol):
-    """A word with signals in time."""
-
-    def instants(self) -> Instants: ...
-
-
-def instants_of(words: Iterable[Timed], begin: float, end: float) -> list[float]:
-    """Instants of words in order; of those that repeat, the ones from begin to end [s]."""
-    found = [instant for word in words for instant in word.instants()]
-    plain = [instant for instant in found if not isinstance(instant, Repeated)]
-    return sorted({*plain, *(t for each in found if isinstance(each, Repeated) for t in each.within(begin, end))})

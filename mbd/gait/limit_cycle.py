@@ -137,7 +137,7 @@ def map_of(
 def _require_the_same_later(mechanism: Mechanism, model: Any) -> None:
     """Raise a `ModelError` where the same state later is another one: a return begins at time 0 each time."""
     faults = []
-    if depends_on_time(mechanism) or (hasattr(model, "instants") and len(model.instants(0.0, 1.0))):
+    if depends_on_time(mechanism):
         faults.append(
             "something of the model depends on time itself (a prescribed motion, samples, a force of time), so that a "
             "state that comes back is not the same later; let it depend on coordinates, or put a clock among them that "

@@ -71,8 +71,14 @@ class StoredStates:
         return [found[node.index] for node in nodes]
 
     def all_inputs(self, rows: Rows) -> Mapping[str, NDArray[Any]]:
-        """The same, with the way of two directions that slide together: a little along λ_T, as γ is zero at onsets."""
+        """The same, with the way of two directions that slide together: a little along λ_T, as γ is zero at onsets.
+
+        The row before a jump in time has the time before it.
+        """
         inputs = self.inputs(rows)
+        if self.times_beside_jumps is not None:
+            own = rows.time == self.record.time[rows.source]
+            inputs = {**inputs, "t": np.where(own, self.times_beside_jumps[rows.source], rows.time)}
         if all(friction.partner < 0 for friction in self.equations.frictions):
             return inputs
         slips = inputs["slip"].astype(float)
@@ -91,6 +97,34 @@ class StoredStates:
             "t": rows.time, "q": rows.q, "v": rows.v, "z": rows.z, "a": rows.a, "s": rows.s, "lam": rows.lam,
             "anchor": rows.anchors, "switch": rows.closed, "slip": np.where(np.abs(rows.phase) == 1, rows.phase, 0),
         }  # fmt: skip
+
+    @cached_property
+    def times_beside_jumps(self) -> Vector | None:
+        """The times of the rows as steps end and begin there; None where the equations never jump in time.
+
+        The first row of an instant at which they do is before the jump, and a run that begins there is behind it.
+        """
+        from mbd.equations.equations import Equations
+        from mbd.equations.switching_times import jumps_between, switches_of
+
+        time, record = self.record.time, self.record
+        if not isinstance(self.equations, Equations) or not switches_of(self.equations):
+            return None
+        first = np.flatnonzero(np.append(time[1:] == time[:-1], True))  # a run ends before a jump at its end
+        step = float(time[-1] - time[0]) / len(time)
+        found, near = time.copy(), 1e-12 * max(abs(float(time[0])), abs(float(time[-1])))
+        for vector in (record.parameters, *(values for _, values in record.parameter_changes)):
+            span = float(time[0]) - step, float(time[-1]) + step
+            jumps = jumps_between(self.equations, vector, *span, step)
+            rights = np.array([jump.right for jump in jumps if jump.level <= 0])
+            lefts = np.array([jump.left for jump in jumps if jump.level <= 0])
+            if len(rights) and np.any((lefts <= time[0]) & (time[0] < rights)):
+                found[0] = rights[np.argmin(np.abs(rights - time[0]))]
+            for row in first if len(rights) else ():
+                place = int(np.argmin(np.abs(rights - time[row])))
+                if abs(rights[place] - time[row]) <= near:
+                    found[row] = min(found[row], lefts[place])
+        return found
 
     @cached_property
     def anchors(self) -> Matrix:

@@ -27,7 +27,7 @@ class Along:
 
     times (k,), values (k, results) : of the rows; slopes (k, results, D) : derivatives of the numbers of the rows;
     shifts (k, D) : of their instants, which move with the events before them; starts : times after which the motion is
-    smooth until the next; walked : the pass
+    smooth until the next; pieces (k,) : in which of these smooth parts each row is; walked : the pass
     """
 
     times: Vector
@@ -35,6 +35,7 @@ class Along:
     slopes: NDArray[np.float64]
     shifts: Matrix
     starts: Vector
+    pieces: NDArray[np.intp]
     walked: Passed
 
     def at(self, times: Vector) -> NDArray[np.float64]:
@@ -45,9 +46,8 @@ class Along:
         """
         out = np.zeros((len(times), *self.slopes.shape[1:]))
         piece = np.searchsorted(self.starts, times, side="right")
-        mine = np.searchsorted(self.starts, self.times, side="right")
         for number in np.unique(piece):
-            rows = np.flatnonzero(mine == number)
+            rows = np.flatnonzero(self.pieces == number)
             out[piece == number] = self._smooth(rows, times[piece == number])
         return out
 
@@ -104,8 +104,10 @@ def along(run: Trajectory, wrt: Sequence[Any], names: Sequence[str], held: Colle
     visit(len(run.time) - 1, walked.motion, walked.mode, walked.rates)
     values = np.array([run[name][seen] for name in names]).reshape(len(names), len(seen)).T
     shape = (len(seen), len(names), len(wanted))
-    starts = run.time[1:][np.diff(run.time) == 0.0]
-    return Along(run.time[seen], values, np.array(slopes).reshape(shape), np.array(shifts), starts, walked)
+    begins = np.concatenate([[False], np.diff(run.time) == 0.0])  # the second row of an instant begins a new part
+    pieces = np.cumsum(begins)[seen]
+    slopes_at_rows = np.array(slopes).reshape(shape)
+    return Along(run.time[seen], values, slopes_at_rows, np.array(shifts), run.time[begins], pieces, walked)
 
 
 def _slopes(programs: Programs, motion: Motion, mode: Mode, rates: Rates, names: Sequence[str]) -> Matrix:

@@ -67,7 +67,7 @@ def ended_in_rest(
     CapabilityError
         for a row that is not the end of such a step, and where γ does not pass zero.
     """
-    programs, time = steps.programs, float(steps.rows.record.time[row])
+    programs, time = steps.programs, float(steps.rows.ends[row])
     equations = programs.equations
     places = [2 * len(equations.contacts) + len(equations.guards) + k for k in (f, equations.frictions[f].partner)]
     begun, _ = programs.watched(motion.at(mode, memory.rates.rate, memory.rates.lam))

@@ -65,7 +65,7 @@ class NewmarkRows(SchemeSteps):
         self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
     ) -> tuple[Motion, Memory]:
         """A step to a row, from what the scheme remembers or from a start that the run does not store."""
-        h = float(self.rows.record.time[row]) - motion.t
+        h = float(self.rows.ends[row]) - motion.t
         rate, y = self.rows.rate[row], self.rows.y[row]
         if not self.steps.follows(motion, memory, h, y, rate):
             other = self._other_start(motion, memory, mode, h, row, fresh)
@@ -74,7 +74,7 @@ class NewmarkRows(SchemeSteps):
             memory = other
         rows = self.rows.step_to(row, motion, memory.rates)
         end, after = self._step(motion, memory, mode, rows, dh)
-        ahead = self.rows.record.time[row + 1 :]
+        ahead = self.rows.ends[row + 1 :]
         if not len(ahead) or not (np.any(dh) or self.rows.is_fixed(row)):
             return end, after
         if self.rows.is_fixed(row):

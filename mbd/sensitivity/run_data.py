@@ -15,10 +15,12 @@ from mbd import integrators
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanism import Mechanism
+from mbd.equations.switching_times import jumps_between
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.record import EventRecord, Record
+from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.trajectory import Trajectory
 
@@ -97,6 +99,12 @@ class RunRows:
         return found
 
     @cached_property
+    def ends(self) -> Vector:
+        """The times of the rows as steps end there: just before an instant at which forces jump."""
+        found = StoredStates(self.record, self.mechanism.equations).times_beside_jumps
+        return self.record.time if found is None else found
+
+    @cached_property
     def y(self) -> Matrix:
         return np.hstack([self.record.v, self.record.z])
 
@@ -129,7 +137,7 @@ class RunRows:
 
     def begins_late(self, time: float, row: int) -> bool:
         """Whether the pass is beyond a row, at an instant that the run does not store."""
-        return time != float(self.record.time[row])
+        return time != float(self.ends[row])
 
     def segment_end(self, row: int) -> int:
         """The row with which even steps from a row end: the next one stored twice or at a sample, or the last."""
@@ -149,11 +157,16 @@ class RunRows:
 
     @cached_property
     def _samples(self) -> frozenset[int]:
-        """Rows at samples of controllers, at which steps end whatever the grid of steps is."""
+        """Rows at samples of controllers and where forces jump in time: steps end there whatever their grid is."""
         time, found = self.record.time, set[int]()
         for period in self.periods or ():
             sample = time[0] + np.round((time - time[0]) / period) * period
             found.update(map(int, np.flatnonzero(np.abs(sample - time) <= 2e-12 * self.full)))
+        equations, near = self.mechanism.equations, 2e-12 * self.full
+        for vector in (self.record.parameters, *self.changes.values()):
+            for jump in jumps_between(equations, vector, float(time[0]), float(time[-1]), self.full):
+                first, last = np.searchsorted(time, (jump.right - near, jump.right + near))
+                found.update(range(int(first), int(last)))
         return frozenset(found)
 
     @cached_property
@@ -165,13 +178,13 @@ class RunRows:
     def between(self, first: int, last: int) -> Rows:
         """Rows from the first to the last one."""
         record, here = self.record, slice(first, last + 1)
-        return record.time[here], record.q[here], self.y[here], self.rate[here], record.lam[here]
+        return self.ends[here], record.q[here], self.y[here], self.rate[here], record.lam[here]
 
     def step_to(self, row: int, motion: Motion, rates: Rates) -> Rows:
         """The state of the pass, and a row of the run."""
         record = self.record
         return (
-            np.array([motion.t, record.time[row]]), np.array([motion.q, record.q[row]]),
+            np.array([motion.t, self.ends[row]]), np.array([motion.q, record.q[row]]),
             np.array([motion.y, self.y[row]]), np.array([rates.rate, self.rate[row]]),
             np.array([rates.lam, record.lam[row]]),
         )  # fmt: skip

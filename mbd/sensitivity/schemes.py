@@ -106,7 +106,7 @@ class SchemeSteps(ABC):
         CapabilityError
             for a row that is not the end of such a step.
         """
-        time = float(self.rows.record.time[row])
+        time = float(self.rows.ends[row])
         for end, rates in self.reached(motion, memory, mode, time, dh, row):
             if is_at(self.rows, end, row):
                 return end, rates

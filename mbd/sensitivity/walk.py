@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.equations.switching_times import instant_slopes
 from mbd.integrators import RadauIIA
 from mbd.integrators.family import NewmarkFamily
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
@@ -116,7 +117,7 @@ class Walk:
         """From the start with these derivatives to the end of the run."""
         record, rows = self.record, self.rows
         motion = Motion(
-            float(record.time[0]), np.array(record.q[0]), rows.y[0].copy(), rows.start_anchors(), tangent
+            float(rows.ends[0]), np.array(record.q[0]), rows.y[0].copy(), rows.start_anchors(), tangent
         )  # fmt: skip
         self._take_written(0)
         mode = self.mode(0, motion)
@@ -134,6 +135,7 @@ class Walk:
                     "with no time between: the run has a derivative on one side only"
                 )
             if same and row + 2 not in rows.events:
+                motion = replace(self._moved_with_jump(motion, row), t=float(record.time[row + 1]))
                 row, fresh = row + 1, True  # a boundary in time, where the scheme starts again
                 self._take_written(row)
                 motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
@@ -176,6 +178,24 @@ class Walk:
         if self._written:
             raise refused(f"a controller wrote parameters at t = {record.time[min(self._written)]:.9g} s within a step")
         return Passed(motion, mode, memory.rates if not fresh else rates, found)
+
+    def _moved_with_jump(self, motion: Motion, row: int) -> Motion:
+        """The motion behind an instant T(p) at which forces jump: ``δy⁺ = δy⁻ + (ẏ⁻ − ẏ⁺) δT`` at a fixed time."""
+        rows, p = self.rows, motion.tangent.p
+        if not self.programs.places:
+            return motion
+        slopes = instant_slopes(
+            self.programs.equations, self.programs.values, float(motion.t), rows.full, self.programs.places
+        )
+        if not len(slopes) or not any(slope.any() for slope in slopes):
+            return motion
+        if len(slopes) > 1:
+            raise refused(
+                f"forces jump at t = {motion.t:.9g} s for several reasons, whose instants parameters move apart: the "
+                "run has a derivative on one side only"
+            )
+        change = rows.rate[row] - rows.rate[row + 1]
+        return motion.with_tangent(y=motion.tangent.y + np.outer(change, slopes[0] @ p))
 
     def _take_written(self, row: int) -> None:
         """From a row on, take the parameters that controllers wrote there, which are held as they are."""

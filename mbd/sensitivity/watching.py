@@ -58,7 +58,7 @@ class Watching:
         wide = replace(motion, tangent=motion.tangent.widened())
         dh = np.zeros(len(wide.tangent.t))
         dh[-1] = 1.0
-        span = float(self.rows.record.time[row + 1]) - motion.t
+        span = float(self.rows.ends[row + 1]) - motion.t
         h = span * float(crossed[0, c] / (crossed[0, c] - crossed[1, c]))
         for _ in range(MOST):
             end, rates = next(self.steps.reached(wide, memory.widened(), mode, motion.t + h, dh, row))

@@ -291,8 +291,7 @@ def rebuild(tape: Tape, node: Node, args: Sequence[Node]) -> Node:
     if op == "table":
         table, order = node.data
         if tape is not node.tape:
-            twins = (known for known in tape.tables if known.name == table.name and known.flat == table.flat)
-            table = next(twins, None) or tape.table(table.name, table.breaks, table.coefficients)
+            table = tape.table(table.name, table.breaks, table.coefficients, table.jumps)
         return tape.lookup(table, args[0], order)
     if op in ("add", "sub", "mul", "div"):
         if op == "div" and args[1].is_zero:  # perhaps in a branch that is not taken

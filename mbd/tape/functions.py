@@ -143,7 +143,7 @@ NUMPY: dict[str, Callable[..., Any]] = {
 """The recorded function behind each numpy ufunc name."""
 
 INSTEAD = {
-    "interp": "mbd.Samples(time, values) for a signal in time, mbd.Tabulated for a loss",
+    "interp": "mbd.Samples(time, values), which may be called in a function, or mbd.Tabulated for a loss",
     "piecewise": "mbd.where(condition, x, y)", "select": "mbd.where(condition, x, y)",
 }  # fmt: skip
 """What to write for functions of numpy that are not recorded."""

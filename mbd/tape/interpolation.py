@@ -9,10 +9,13 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from mbd.errors import ModelError
 
-__all__ = ["Beyond", "Pieces", "integral", "joined", "linear", "monotone"]
+__all__ = ["Beyond", "Ends", "Pieces", "hold", "integral", "joined", "linear", "monotone", "spline"]
 
 Beyond: TypeAlias = Literal["constant", "linear"]
 """How a table goes on outside its samples: at the last value, or along the last slope."""
+
+Ends: TypeAlias = Literal["not-a-knot", "natural", "clamped", "periodic"]
+"""Ends of a spline: its third derivative does not jump beside them, no second derivative, no slope, or they meet."""
 
 Coefficients: TypeAlias = tuple[float, float, float, float]
 
@@ -64,6 +67,40 @@ def monotone(xs: Sequence[float], ys: Sequence[float], beyond: Beyond = "linear"
     rows: list[Coefficients] = [tuple(float(c) for c in reversed(column)) for column in curve.c.T]  # type: ignore[misc]
     first, last = (float(slope) for slope in curve.derivative()([x[0], x[-1]]))
     return _continued(x, y, rows, first, last, beyond)
+
+
+def spline(xs: Sequence[float], ys: Sequence[float], ends: Ends = "not-a-knot", what: str = "table") -> Pieces:
+    """Cubics with a continuous second derivative (`scipy.interpolate.CubicSpline`), constant outside.
+
+    Parameters
+    ----------
+    xs, ys : n ≥ 2 samples, xs increasing; n ≥ 3 that repeat, of which the last is the first
+    ends : what determines the first and the last cubic; one that repeats continues with the first behind the last
+    what : the user's object, for errors
+    """
+    from scipy.interpolate import CubicSpline
+
+    x, y = _checked(xs, ys, what)
+    _checked_slopes(x, y, what)
+    curve = CubicSpline(x, y, bc_type=ends)
+    rows: list[Coefficients] = [tuple(float(c) for c in reversed(column)) for column in curve.c.T]  # type: ignore[misc]
+    inside = _continued(x, y, rows, 0.0, 0.0, "constant")
+    return inside if ends != "periodic" else Pieces(inside.breaks, (*inside.coefficients[:-1], rows[0]))
+
+
+def hold(xs: Sequence[float], ys: Sequence[float], what: str = "table") -> Pieces:
+    """Each sample until the next one comes.
+
+    Parameters
+    ----------
+    xs, ys : n ≥ 1 samples, xs increasing
+    what : the user's object, for errors
+
+    >>> hold([0.0, 2.0], [1.0, 5.0]).coefficients
+    ((1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (5.0, 0.0, 0.0, 0.0))
+    """
+    x, y = _checked(xs, ys, what)
+    return _continued(x, y, [(value, 0.0, 0.0, 0.0) for value in y[:-1]], 0.0, 0.0, "constant")
 
 
 def joined(known: Sequence[tuple[float, float, float]]) -> tuple[Pieces, float]:

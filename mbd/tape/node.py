@@ -169,6 +169,9 @@ class Tape:
         self.lock = RLock()
         self.nodes: list[Node] = []
         self.tables: list[Table] = []
+        self._tables: dict[tuple[float, ...], Table] = {}
+        self.phases: dict[int, tuple[Node, float, float]] = {}
+        """Nodes that `phase` made, by number: what they are a phase of, where its cycle starts, and the period."""
         self._known: dict[Hashable, Node] = {}
         self._numbers: dict[float, Node] = {}
         self.zero = self.constant(0.0)
@@ -197,10 +200,19 @@ class Tape:
         """The node of a run-time input, known by its kind ('t', 'q', 'v', 'p', …) and place."""
         return self._make(("input", kind, index), "input", (), (kind, index))
 
-    def table(self, name: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
-        """A new table of this tape; see `Table` for the shapes."""
-        self.tables.append(Table(name, breaks, coefficients, len(self.tables)))
-        return self.tables[-1]
+    def table(
+        self,
+        name: str,
+        breaks: Sequence[float],
+        coefficients: Sequence[Sequence[float]],
+        jumps: Sequence[int] | None = None,
+    ) -> Table:
+        """The table of this tape with these numbers, made on first use; see `Table` for the shapes."""
+        table = Table(name, breaks, coefficients, len(self.tables), jumps)
+        known = self._tables.setdefault(tuple(table.flat), table)
+        if known is table:
+            self.tables.append(table)
+        return known
 
     def lookup(self, table: Table, x: Scalar, order: int = 0) -> Node:
         """``d^order/dx^order`` of the table at x."""
@@ -364,6 +376,13 @@ class Tape:
     def remainder(self, left: Scalar, right: Scalar) -> Node:
         """``left − right ⌊left / right⌋``."""
         return self.sub(left, self.mul(right, self.unary("floor", self.div(left, right))))
+
+    def phase(self, x: Scalar, start: float, period: float) -> Node:
+        """``start + (x − start) mod period``: where x stands in a cycle, such as that of a table that repeats."""
+        node = start + self.remainder(x - start, period)
+        if node.op != "const":
+            self.phases[node.index] = self.lift(x), start, period
+        return node
 
     def unary(self, op: str, argument: Scalar) -> Node:
         """A function of UNARY."""

@@ -8,6 +8,9 @@ from collections.abc import Sequence
 
 __all__ = ["Table"]
 
+ROUND_OFF = 1e-12
+"""Jump of a derivative beside the terms of the pieces below which their coefficients have rounded it there [-]."""
+
 
 class Table:
     """A piecewise cubic of one variable, stored beside the parameters and looked up at run time.
@@ -21,16 +24,41 @@ class Table:
     breaks : n increasing abscissae
     coefficients : n rows of 4; row i belongs to ``[breaks[i], breaks[i+1])``, row 0 also to the left of it
     index : its place among the tables of its tape
+    jumps : (n − 1) the lowest derivative that jumps where row i begins, i ≥ 1, 4 for none; by default it is measured
     """
 
-    __slots__ = ("breaks", "coefficients", "index", "name")
+    __slots__ = ("_jumps", "breaks", "coefficients", "index", "name")
 
     def __init__(
-        self, name: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]], index: int = 0
+        self,
+        name: str,
+        breaks: Sequence[float],
+        coefficients: Sequence[Sequence[float]],
+        index: int = 0,
+        jumps: Sequence[int] | None = None,
     ) -> None:
         self.name, self.index = name, index
         self.breaks = tuple(float(x) for x in breaks)
         self.coefficients = tuple(tuple(float(c) for c in row) for row in coefficients)
+        self._jumps = None if jumps is None else tuple(jumps)
+
+    @property
+    def jumps(self) -> tuple[int, ...]:
+        """The lowest derivative that jumps at each break but the first; 4 where none does."""
+        if self._jumps is None:
+            self._jumps = tuple(map(self._jump, range(1, len(self.breaks))))
+        return self._jumps
+
+    def _jump(self, piece: int) -> int:
+        """The lowest derivative that jumps by more than round-off where a piece begins; 4 for none."""
+        before, after = self.coefficients[piece - 1], self.coefficients[piece]
+        width = self.breaks[piece] - self.breaks[piece - 1]
+        sizes = [max(abs(row[k]) for row in self.coefficients[piece - 1 : piece + 1]) * width**k for k in range(4)]
+        for order in range(4):
+            left = sum(math.comb(k, order) * before[k] * width ** (k - order) for k in range(order, 4))
+            if abs(left - after[order]) * width**order > ROUND_OFF * sum(sizes):
+                return order
+        return 4
 
     @property
     def flat(self) -> list[float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
@@ -13,6 +14,9 @@ from mbd.tape.node import CONDITIONS, Node, Scalar, Tape
 from mbd.tape.sympy import lower
 
 __all__ = ["Argument", "traced", "traced_scalar"]
+
+CURVES = re.compile(r"[/\\\\]scipy[/\\\\]interpolate[/\\\\]")
+"""Files of the curves of scipy."""
 
 Argument: TypeAlias = tuple[str, Scalar | Sequence[Scalar]]
 """Name and value of what a user's function is called with; a value is a scalar or a triple."""
@@ -151,6 +155,11 @@ def _failure(what: str, title: str, names: str, exc: Exception) -> str:
     place, step = "", exc.__traceback__
     while step is not None:
         file = step.tb_frame.f_code.co_filename
+        if CURVES.search(file):
+            return (
+                f"{what}: {title} calls a curve of scipy{place}, which takes plain numbers only; make it a table, "
+                "curve = mbd.Samples.of(curve), and call that in its place"
+            )
         if not file.startswith(here):
             place = f" at {file}:{step.tb_lineno}"
         step = step.tb_next

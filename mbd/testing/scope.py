@@ -39,7 +39,6 @@ class FreeScope:
         self.recorded: dict[str, float] = {}
         self.numbers: dict[Node, float] = {self.time: 0.0}
         self._parameters: dict[str, Node] = {}
-        self._tables: dict[str, Table] = {}
         self._bodies: dict[str, int] = {}
         self.states: dict[str, Node] = {}
         self.asked: set[str] = set()
@@ -61,10 +60,14 @@ class FreeScope:
     def increment(self, owner: str, field: str) -> Scalar:
         return 0.0
 
-    def table(self, owner: str, breaks: Sequence[float], coefficients: Sequence[Sequence[float]]) -> Table:
-        if owner not in self._tables:
-            self._tables[owner] = self.tape.table(owner, breaks, coefficients)
-        return self._tables[owner]
+    def table(
+        self,
+        owner: str,
+        breaks: Sequence[float],
+        coefficients: Sequence[Sequence[float]],
+        jumps: Sequence[int] | None = None,
+    ) -> Table:
+        return self.tape.table(owner, breaks, coefficients, jumps)
 
     def state(self, owner: str, field: str, initial: float) -> Node:
         node = self.states.setdefault(f"{owner}.{field}", self.tape.input("z", len(self.states)))

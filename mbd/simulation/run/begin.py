@@ -43,7 +43,11 @@ def begin(run: RunData, start: State) -> None:
     v.closed[:n_contacts] = run.manager.flags(start.mode.closed)
     armed: Iterable[str] = set(run.manager.names) - start.mode.closed if start.armed is None else start.armed
     v.armed[:n_contacts] = run.manager.flags(armed)
-    v.time = v.grid_start = start.time
+    jump = run.boundaries.ahead
+    if jump is not None and jump.left <= start.time:  # the motion is that behind it
+        run.boundaries.place += 1
+        run.begins_behind_jump = True
+    v.time = v.grid_start = jump.right if run.begins_behind_jump and jump is not None else start.time
     v.last_switch = -np.inf
     require_consistent(run, start)
     v.restart_due, v.mode_id = 1, -1

@@ -2,42 +2,56 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.equations.switching_times import Jump
 from mbd.errors import ModelError
 from mbd.kernel import codes
 
-__all__ = ["Boundaries", "without_sharing"]
+__all__ = ["RESTARTS", "WINDOW", "Boundaries", "without_sharing"]
 
 NEAR = 8.0 * codes.EPS
 """Two instants are one where they differ by less, relative: round-off of a sum of steps [-]."""
+WINDOW = 64.0
+"""Steps before and after a kink in which others are counted [-]."""
 CROWD = 32
-"""Breaks within 64 steps before and after one, above which it is stepped over as one of a dense signal."""
+"""Kinks in that window above which one is stepped over as part of a dense signal."""
+CROWD_OF_JUMPS = 256
+"""The same of forces that jump."""
+RESTARTS = 1
+"""Highest level of a jump behind which a scheme starts again: what it remembers of accelerations holds before it."""
 
 
-def _sparse(instants: Vector, dt: float) -> Vector:
-    """The breaks at which steps end: not those of samples about as dense as the steps.
+def _ends_of_steps(jumps: Sequence[Jump], dt: float, order: int, follows_tolerance: bool) -> list[Jump]:
+    """The jumps at which steps end.
 
-    Judged around each of them, so that it does not depend on where a run begins or ends.
+    Those that a scheme of this order notices: jumps and kinks of forces, and jumps of the derivative number k with
+    k + 1 < p, which cost an error of dt^(k + 1). Not those about as dense as the steps, but for jumps where steps
+    follow a tolerance. Judged around each of them, so that it does not depend on where a run begins or ends.
     """
-    if not len(instants):
-        return instants
-    window = 64.0 * dt
-    around = np.searchsorted(instants, instants + window) - np.searchsorted(instants, instants - window)
-    return np.asarray(instants[around <= CROWD])
+    kept = []
+    for limit, group in (
+        (CROWD_OF_JUMPS, [jump for jump in jumps if jump.level <= 0]),
+        (CROWD, [jump for jump in jumps if 0 < jump.level <= max(1, order - 2)]),
+    ):
+        if limit == CROWD_OF_JUMPS and follows_tolerance:
+            kept += group
+        elif group:
+            times, window = np.array([jump.right for jump in group]), WINDOW * dt
+            around = np.searchsorted(times, times + window) - np.searchsorted(times, times - window)
+            kept += [jump for jump, crowd in zip(group, around, strict=True) if crowd <= limit]
+    return sorted(kept)
 
 
 class Boundaries:
     """Instants at which a step must end: samples of controllers, jumps and kinks of signals in time."""
 
-    def __init__(
-        self, controllers: Sequence[Any], instants: Sequence[float], begin: float, dt: float, end: float
-    ) -> None:
+    def __init__(self, controllers: Sequence[Any], begin: float, dt: float, end: float) -> None:
         self.controllers = tuple(controllers)
         fast = [c for c in self.controllers if c.period is not None and c.period < 1e-6 * dt]
         if fast:
@@ -47,18 +61,26 @@ class Boundaries:
         self.states = {controller.name: without_sharing(controller.state) for controller in self.controllers}
         self.begin_time = begin
         self.samples = {c.name: 0 for c in self.controllers if c.period is not None}
-        self.breaks = _sparse(np.asarray(instants, dtype=float), dt)
-        self.place = int(np.searchsorted(self.breaks, begin, side="right"))
+        self.breaks: Sequence[Jump] = ()
+        self.place = 0
         self.near = min(NEAR * abs(end), 1e-6 * dt)
+
+    def break_at(self, jumps: Sequence[Jump], now: float, dt: float, order: int, follows_tolerance: bool) -> None:
+        """End steps at these jumps from now on, as far as a scheme of this order notices them."""
+        self.breaks = _ends_of_steps(jumps, dt, order, follows_tolerance)
+        self._find_place(now)
+
+    def _find_place(self, now: float) -> None:
+        self.place = bisect_right(self.breaks, now, key=lambda jump: jump.right)
 
     # what a run keeps of it -----------------------------------------------------------------------------------------
     def kept(self) -> tuple[Any, ...]:
         """What changes as the run goes on; for `restore`."""
-        return self.begin_time, self.samples, self.states, self.place
+        return self.begin_time, self.samples, self.states, self.breaks, self.place
 
     def restore(self, kept: tuple[Any, ...]) -> None:
         """As it was."""
-        self.begin_time, self.samples, self.states, self.place = kept
+        self.begin_time, self.samples, self.states, self.breaks, self.place = kept
 
     def remembered(self) -> dict[str, Any]:
         """For a run that goes on from here."""
@@ -68,7 +90,7 @@ class Boundaries:
         """Go on with the samples and states of an earlier run."""
         self.begin_time, self.samples = remembered["begin"], dict(remembered["samples"])
         self.states = without_sharing(dict(remembered["states"]))
-        self.place = int(np.searchsorted(self.breaks, now, side="right"))
+        self._find_place(now)
 
     # the run --------------------------------------------------------------------------------------------------------
     def sample(self, controller: Any) -> float:
@@ -79,15 +101,28 @@ class Boundaries:
         """One more sample of a controller has been taken."""
         self.samples = {**self.samples, controller.name: self.samples[controller.name] + 1}
 
+    @property
+    def ahead(self) -> Jump | None:
+        """The next instant at which the equations jump."""
+        return self.breaks[self.place] if self.place < len(self.breaks) else None
+
     def next(self, end: float) -> tuple[float, bool]:
         """Where the kernel must stop next, and whether a boundary is there; one at round-off of the end is the end.
 
-        Just before a break, so that the step sees its left side.
+        Just before a jump or kink of the accelerations, so that the step sees its left side.
         """
-        due = [float(np.nextafter(time, -np.inf)) for time in self.breaks[self.place : self.place + 1]]
-        due += [self.sample(controller) for controller in self.controllers if controller.period is not None]
+        due = [self.sample(controller) for controller in self.controllers if controller.period is not None]
+        if self.ahead is not None:
+            due.append(self.ahead.left if self.ahead.level <= RESTARTS else self.ahead.right)
         first = min(due, default=np.inf)
         return (first, True) if first <= end + self.near else (end, False)
+
+    def is_end(self, target: float, end: float) -> bool:
+        """Whether the run ends at this target: on the left side of a jump that is at its end."""
+        jump = self.ahead
+        return target >= end - self.near or (
+            jump is not None and jump.level <= RESTARTS and jump.left <= target and jump.right >= end - self.near
+        )
 
 
 def without_sharing(value: Any) -> Any:

@@ -15,9 +15,15 @@ from mbd.constraints.expressions import evaluated, is_expression
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
-from mbd.simulation.run.boundaries import without_sharing
+from mbd.simulation.run.boundaries import RESTARTS, without_sharing
 from mbd.simulation.run.data import RunData
 from mbd.simulation.user_calls import call_user
+
+PRESCRIBED_JUMP = (
+    "t = {:.9g} s: a prescribed motion jumps there, which would need an infinite force: {}; let its value and its rate "
+    "be continuous. Samples are constant before the first and after the last: end the run there, repeat them with "
+    "periodic=True, or let them begin and end at rest with ends='clamped'"
+)
 
 __all__ = ["Named", "apply_reset", "arrive", "begin_controllers", "call_controllers", "reset_faults"]
 
@@ -182,13 +188,18 @@ def begin_controllers(run: RunData) -> None:
 def arrive(run: RunData, target: float) -> bool:
     """Do what is due at a boundary; False at the end of the run, where it is left to a run that goes on."""
     boundaries = run.boundaries
-    if target >= run.end - boundaries.near:
+    if boundaries.is_end(target, run.end):
         return False
-    ahead = boundaries.breaks[boundaries.place : boundaries.place + 1]
-    if len(ahead) and ahead[0] <= np.nextafter(target, np.inf):
-        run.move_to(float(ahead[0]))
+    jump = boundaries.ahead
+    if jump is not None and jump.left <= target:
         boundaries.place += 1
-        run.kernel.restart_due = 1
+        if jump.level <= RESTARTS:
+            usual = residuals_now(run)[:2] if jump.owner else None
+            run.move_to(jump.right)
+            run.kernel.restart_due = 1
+            off = violations_now(run, residuals_now(run), usual) if jump.owner else []
+            if off:
+                raise SimulationError(PRESCRIBED_JUMP.format(run.now, "; ".join(off)))
     for controller in boundaries.controllers:
         if controller.period is not None and boundaries.sample(controller) <= target:
             _call(run, controller)

@@ -13,13 +13,14 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
+from mbd.equations.switching_times import jumps_between
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
-from mbd.simulation.run.boundaries import Boundaries
+from mbd.simulation.run.boundaries import WINDOW, Boundaries
 from mbd.simulation.run.event_log import EventLog
 from mbd.simulation.run.stepper import Stepper
 from mbd.simulation.run.whole_turns import TurnCounter
@@ -143,9 +144,11 @@ class RunData:
         self.energy = EnergyFindings()
         self.room = RoomFindings()
         controllers = getattr(model, "controllers", ())
-        instants = model.instants(start.time, end) if hasattr(model, "instants") else ()
         self.turns = TurnCounter()
-        self.boundaries = Boundaries(controllers, instants, start.time, dt, end)
+        self.integrator = integrator
+        self.boundaries = Boundaries(controllers, start.time, dt, end)
+        self.begins_behind_jump = False
+        self._find_breaks(start.time)
         self.damage = ""  # of the memory of the start
         self.resumed = self.carried = False
 
@@ -167,6 +170,14 @@ class RunData:
         """Parameters that differ from the model's."""
         self.changed = dict(changed)
         self.kernel.params[: len(self.first_parameters)] = self._parameters()
+        self._find_breaks(self.now)
+
+    def _find_breaks(self, now: float) -> None:
+        """The instants at which the equations jump with the present parameters, and those in its neighbourhood."""
+        around = WINDOW * self.dt
+        span = min(self.start.time, now) - around, self.end + around
+        jumps = jumps_between(self.mechanism.equations, self.kernel.params, *span, self.dt)
+        self.boundaries.break_at(jumps, now, self.dt, self.integrator.order(), bool(self.kernel.adaptive))
 
     def collect(self) -> None:
         """Take over the rows and events that the kernel has stored."""
@@ -178,6 +189,8 @@ class RunData:
         if count:
             self._make_room(count)
             rows = v.store.reshape(-1, v.width)[:count]
+            if self.begins_behind_jump and not self.stored:
+                rows[0, 0] = self.start.time
             self.table[self.stored : self.stored + count] = rows
             if self.stored:  # the kernel compares with rows of the same call
                 change = np.abs(rows[0] - self.table[self.stored - 1])[1 : 1 + v.n_q]
