@@ -455,7 +455,7 @@ def test_a_stored_run_is_shown_and_reported_without_its_script(script, tmp_path,
     assert cli.main(["gait", stored, "--out", "stored"]) == 0
     assert cli.main(["gait", "prosthetic-leg", "--until", "6", "--out", "made"]) == 0
     made, kept = (
-        pages.read_text().split("<footer")[0].replace("prosthetic-leg", "leg")
+        pages.read_text().split('<p class="about">')[0].replace("prosthetic-leg", "leg")
         for pages in (tmp_path / "made" / "gait.html", tmp_path / "stored" / "gait.html")
     )
     assert "moment" in made and made == kept

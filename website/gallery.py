@@ -25,6 +25,18 @@ SHOWN, POSES, CURVE = 1.6, 9, 240
 """Longest stretch of a run that a picture shows [s], poses of a mechanism, points of a curve."""
 
 
+TOPICS = {
+    "Walkers and prostheses": "prosthetic-leg kneed-walker amputee-in-space compass-gait walker-in-space "
+    "chapter-walker rimless-wheel simplest-walker-lagrangian",
+    "Gait studies": "find-a-gait steeper-slope basin-picture compare-two-knees tune-a-knee-damper identify-a-shank",
+    "Linkages and pendulums": "four-bar slider-crank pendulum double-pendulum long-pendulum lagrangian-double-pendulum",
+    "Rolling, spinning and shaking": "bicycle rolling-coin billiard-ball spinning-top tippe-top tennis-racket "
+    "shaken-block",
+    "Extending mbd": "user-constraint user-integrator",
+}
+"""Names of examples by topic, in the order of the gallery."""
+
+
 @dataclass(frozen=True)
 class Example:
     """An example: its name in ``mbd run NAME`` and its file."""
@@ -86,15 +98,24 @@ def read() -> list[Example]:
 
 
 def index(known: list[Example]) -> str:
-    """The page of all examples."""
-    cards = "".join(
-        f'<a class="card" href="{one.name}.html">{one.picture}<strong>{escape(one.title)}</strong>'
-        f"<span>{escape(one.said[0])}</span></a>\n"
-        for one in known
+    """The page of all examples by topic."""
+    by_name = {one.name: one for one in known}
+    missing = set(by_name) ^ {name for names in TOPICS.values() for name in names.split()}
+    assert not missing, f"TOPICS of the gallery and the examples differ in {sorted(missing)}"
+    sections = "\n".join(
+        f'## {topic}\n\n<div class="cards">\n{"".join(_card(by_name[name]) for name in names.split())}</div>\n'
+        for topic, names in TOPICS.items()
     )
     return (
-        "# Gallery\n\nEvery example of `mbd examples`, with its animation and its text. `mbd run NAME` runs it.\n\n"
-        f'<div class="cards">\n{cards}</div>\n'
+        "# Gallery\n\nEvery example comes with its animation and its script. "
+        f"`mbd run NAME` runs it on your machine.\n\n{sections}"
+    )
+
+
+def _card(one: Example) -> str:
+    return (
+        f'<a class="card" href="{one.name}.html">{one.picture}<strong>{escape(one.title)}</strong>'
+        f"<span>{escape(one.said[0])}</span></a>\n"
     )
 
 

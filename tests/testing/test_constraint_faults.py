@@ -229,7 +229,10 @@ def test_energy_that_no_effect_tells_is_caught():
 @pytest.mark.parametrize(
     ("law", "wrong"),
     [
-        ("friction stays within its limit", lambda friction: replace(friction, limit=0.5 * friction.limit)),
+        (
+            "friction stays within its limit",
+            lambda friction: replace(friction, limit=0.5 * friction.limit, sliding=0.5 * friction.sliding),
+        ),
         ("friction opposes sliding", lambda friction: replace(friction, rate=-friction.rate)),
     ],
 )
