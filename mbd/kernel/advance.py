@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.accept_restart import accept_for_restart
 from mbd.kernel.candidate import accept_guards
-from mbd.kernel.charts import turned_end, wants_row
+from mbd.kernel.charts import divides_further, turned_end, wants_row
 from mbd.kernel.codes import (
     AT_POSE,
     CHATTER,
@@ -343,6 +343,7 @@ def take_step(K: Kernel) -> int:
     if status != 0:
         return status
     if K.step_taken != h:
+        within = within or (K.step_taken < h and K.adaptive == 0 and divides_further(K, K.step_taken))
         if K.n_cones > 0 and K.strategy == 0 and K.step_taken < h and slides_at_first(K, K.step_taken):
             within = True
             K.begun_step = K.step_taken

@@ -14,10 +14,14 @@ from mbd.kernel.hooks import call_on
 from mbd.kernel.records import Model, Motion, Reals
 from mbd.kernel.roots import sqrt
 
-__all__ = ["find_chart_end", "leave_chart", "turned_end", "turns_too_far", "wants_row", "whole_step"]
+__all__ = ["divides_further", "find_chart_end", "leave_chart", "turned_end", "turns_too_far", "wants_row", "whole_step"]
 
 QUARTER_TURN = 1.5707963267948966
 """Way of a joint at the speed with which a step begins, above which the step is divided [rad]."""
+LEAST_PART = 0.1
+"""Way below which a step that fails does so for another reason than how far it turns a joint [rad]."""
+LONGER_PART = 1.02
+"""Growth of the parts from one to the next, after a step has failed for how far it turns a joint [-]."""
 MOST_TURN = 2.356194490192345
 """Way at the speed with which it ends, above which a step is not accepted: three eighths of a turn [rad]."""
 MOST_PARTS = 1e4
@@ -37,13 +41,32 @@ def whole_step(K: Motion) -> float:
 def turned_end(K: Motion, t1: float) -> float:
     """Where a step to t1 is to end: there, or after the first of the equal parts into which it is divided."""
     h = t1 - K.time
-    parts = largest_turn(K, K.y, h) / QUARTER_TURN
+    part = QUARTER_TURN
+    if K.part_turn > 0.0:
+        part = min(part, K.part_turn)
+        K.part_turn = LONGER_PART * part if part < QUARTER_TURN else 0.0
+    parts = largest_turn(K, K.y, h) / part
     if not 1.0 < parts < MOST_PARTS:
         return t1
     count = 1.0
     while count < parts:
         count += 1.0
     return float(K.time + h / count)
+
+
+def divides_further(K: Motion, h: float) -> bool:
+    """Whether steps are divided into parts like one of h, the first that succeeds, for how far they turn a joint.
+
+    Newton's matrices of a scheme with several stages are those of one of them: where bodies turn far within a step,
+    they are not close enough to those of the others.
+    """
+    if K.vector == 1 or K.explicit == 1 or K.n_nodes == 0:
+        return False
+    way = largest_turn(K, K.y, h)
+    if way < LEAST_PART:
+        return False
+    K.part_turn = way
+    return True
 
 
 def turns_too_far(K: Motion, h: float) -> bool:

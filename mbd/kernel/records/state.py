@@ -91,6 +91,7 @@ class State(SchemeAbilities):
     misfit: float = place("clock")  # largest value of rows that depend on others at the last candidate [m, rad]
     extent: float = place("clock")  # length of the mechanism, as far as it is known: see `mbd.kernel.scales` [m]
     turned: float = place("clock")  # way of joints whose coordinates do not add since the last row [rad]
+    part_turn: float = place("clock")  # largest way of these in a step, where more has failed, 0: a quarter turn [rad]
     halvings: int = place("state")  # how often the step is halved
     halves_left: int = place("state")  # of it
     paired_step: int = place("state")  # see `mbd.kernel.singular.step_pairs`
