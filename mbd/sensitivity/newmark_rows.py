@@ -19,12 +19,14 @@ from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.newmark_kernel import ended, taken
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import Rows, RunRows, refused
-from mbd.sensitivity.schemes import Memory, SchemeSteps
+from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 
 __all__ = ["NewmarkRows"]
 
 GROWTH = 2.0
 """Size of a step over that of the last one, up to which what it extrapolates from that is known [-]."""
+ITERATED = 3e-8
+"""Distance of a row from the end of its step, solved for again, that Newton's method leaves of several steps [-]."""
 
 
 def after_size(memory: Memory, h: float, dh: Vector) -> Memory:
@@ -47,6 +49,7 @@ class NewmarkRows(SchemeSteps):
     def __init__(self, rows: RunRows, programs: Programs, scheme: NewmarkFamily) -> None:
         super().__init__(rows, programs)
         self.stabilized = bool(scheme.stabilized)
+        self.driven = bool(rows.record.settings.get("driven"))
         self.steps = NewmarkSteps(programs, scheme.numbers(), self.stabilized, rows.full)
 
     def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
@@ -67,6 +70,8 @@ class NewmarkRows(SchemeSteps):
         """A step to a row, from what the scheme remembers or from a start that the run does not store."""
         h = float(self.rows.ends[row]) - motion.t
         rate, y = self.rows.rate[row], self.rows.y[row]
+        if self.driven and mode.rows:
+            return self._balanced(motion, memory, mode, row, dh, fresh)
         if not self.steps.follows(motion, memory, h, y, rate):
             other = self._other_start(motion, memory, mode, h, row, fresh)
             if other is None:
@@ -112,6 +117,42 @@ class NewmarkRows(SchemeSteps):
             tries.append(self.steps.start(motion, mode, again))
         return next((each for each in tries if self.steps.follows(motion, each, h, y, rate)), None)
 
+    def _balanced(
+        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
+    ) -> tuple[Motion, Memory]:
+        """A step solved for again, whose end has the rates and multipliers of the balance (`schemes.newmark`)."""
+        time = float(self.rows.record.time[row])
+        guess = self._near(row)
+        tries = [memory]
+        if not fresh and not self.steps.is_brief(time - motion.t, mode):
+            tries.append(self.steps.start(motion, mode, consistent_rates(self.programs, motion, mode, memory.rates)))
+        for each in tries:
+            rows = ended(self.steps, motion, each, mode, time, guess)
+            if rows is not None:
+                end, after = self._step(motion, each, mode, rows, dh)
+                if is_at(self.rows, end, row, ITERATED):
+                    end = replace(end, q=self.rows.record.q[row].copy(), y=self.rows.y[row].copy())
+                    return end, self._with_balance(each, end, after, mode, dh)
+        return self._uneven(motion, memory, mode, row, dh)
+
+    def _near(self, row: int) -> Rates:
+        """Rates and multipliers of a row, without derivatives."""
+        return Rates(self.rows.rate[row].copy(), np.array(self.rows.record.lam[row]), *(np.zeros((0, 0)),) * 2)
+
+    def _with_balance(self, before: Memory, end: Motion, after: Memory, mode: Mode, dh: Vector) -> Memory:
+        """What the scheme remembers of a step where rates and multipliers of the balance take the place of its own."""
+        own, last, h = after.rates, before.rates, after.step
+        rates = consistent_rates(self.programs, end, mode, own)
+        share = (1.0 - self.steps.alpha_f) / (1.0 - self.steps.alpha_m)
+        aux, of_aux = after.aux + share * (rates.rate - own.rate), after.of_aux + share * (rates.of_rate - own.of_rate)
+        found = replace(after, rates=rates, aux=aux, of_aux=of_aux)
+        if after.of_slope is None:
+            return found
+        slope, lam_slope = (rates.rate - last.rate) / h, (rates.lam - last.lam) / h
+        of_slope = (rates.of_rate - last.of_rate - slope[:, np.newaxis] * dh) / h
+        of_lam_slope = (rates.of_lam - last.of_lam - lam_slope[:, np.newaxis] * dh) / h
+        return replace(found, slope=slope, lam_slope=lam_slope, of_slope=of_slope, of_lam_slope=of_lam_slope)
+
     def _uneven(self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector) -> tuple[Motion, Memory]:
         """A step whose end lost what it had of velocities across the rows, or a brief one; the scheme starts again."""
         end, rates = self.ended(motion, memory, mode, row, dh)
@@ -122,14 +163,13 @@ class NewmarkRows(SchemeSteps):
         self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
     ) -> Iterator[tuple[Motion, Rates]]:
         """Solved for, as rows at events hold rates that are consistent in the place of those of the step."""
-        steps, record = self.steps, self.rows.record
+        steps = self.steps
         brief = steps.is_brief(time - motion.t, mode)
         for way in (brief, not brief):
             if way:
                 end, after = steps.brief(motion, memory, mode, time, dh)
             else:
-                guess = Rates(self.rows.rate[row].copy(), np.array(record.lam[row]), *(np.zeros((0, 0)),) * 2)
-                rows = ended(steps, motion, memory, mode, time, guess)
+                rows = ended(steps, motion, memory, mode, time, self._near(row))
                 if rows is None:
                     continue
                 end, after = self._step(motion, memory, mode, rows, dh)

@@ -116,9 +116,9 @@ class SchemeSteps(ABC):
         )
 
 
-def is_at(rows: RunRows, motion: Motion, row: int) -> bool:
+def is_at(rows: RunRows, motion: Motion, row: int, share: float = SAME) -> bool:
     """Whether a row is where the pass is."""
     q, y = rows.record.q[row], rows.y[row]
     size = np.max(np.abs(np.concatenate([q, y])), initial=1e-3)
     off = np.max(np.abs(np.concatenate([motion.q - q, motion.y - y])), initial=0.0)
-    return bool(off <= SAME * size)
+    return bool(off <= share * size)

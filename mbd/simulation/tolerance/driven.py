@@ -22,7 +22,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Equations, Row
 from mbd.results.balance import Balance
 from mbd.results.record import Rows
-from mbd.tape.derivatives import live
+from mbd.tape.derivatives import live, substitute
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
@@ -43,20 +43,24 @@ BENT = 64
 def driving_rows(equations: Equations) -> tuple[int, ...]:
     """Numbers of the rows whose multipliers drive the motion; () where no bilateral row depends on time.
 
-    These are the rows with explicit time, and joints held at a value beside them.
+    These are the rows that move by themselves, by the time or at a speed, and joints held at a value beside them.
     """
     known = equations.memory.get("driving rows")
     if known is None:
         with equations.tape.lock:
-            timed = [k for k in equations.bilateral if _depends_on_time(equations.rows[k])]
+            timed = [k for k in equations.bilateral if _depends_on_time(equations.rows[k], equations.n_v)]
         held = [k for k in equations.bilateral if equations.rows[k].reaction == "drive"]
         known = equations.memory["driving rows"] = tuple(sorted({*timed, *held})) if timed else ()
     return known  # type: ignore[no-any-return]
 
 
-def _depends_on_time(row: Row) -> bool:
-    nodes = [row.rate] if row.is_velocity else [row.value]
-    return any(node.op == "input" and node.data[0] == "t" for node in live(nodes))
+def _depends_on_time(row: Row, n_v: int) -> bool:
+    """Whether a row moves by itself: h by the time, ``B v + b`` where b, what is left of it at rest, is not zero."""
+    if not row.is_velocity:
+        return any(node.op == "input" and node.data[0] == "t" for node in live([row.value]))
+    tape = row.rate.tape
+    at_rest = substitute([row.rate], {tape.input("v", k): 0.0 for k in range(n_v)})[0]
+    return not at_rest.is_zero
 
 
 def drives_of(run: Trajectory) -> tuple[int, ...]:
