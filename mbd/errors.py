@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "MbdWarning",
     "MemoryLimitError",
     "ModelError",
+    "OneSidedError",
     "SimulationError",
     "TraceError",
     "TrajectoryError",
@@ -65,6 +66,18 @@ class CapabilityError(ModelError):
     """
 
     run: Any = None
+
+
+class OneSidedError(CapabilityError):
+    """A run that has derivatives on one side only.
+
+    Attributes
+    ----------
+    sides : {(of, wrt): (below, above)}: both one-sided values by runs on that side alone, NaN where none can be made;
+        of a result that jumps those of its two parts
+    """
+
+    sides: Mapping[tuple[str, str], tuple[float, float]] = {}
 
 
 class SimulationError(MbdError, RuntimeError):

@@ -18,7 +18,7 @@ from mbd.results.record import EventRecord
 from mbd.sensitivity.balance import consistent_rates
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import refused
+from mbd.sensitivity.run_data import refused, sided
 
 __all__ = ["Trigger", "shift_of_end", "trigger"]
 
@@ -75,10 +75,7 @@ def trigger(
     found = found or others
     names = " and ".join(dict.fromkeys(repr(each.name) for each in found))
     if len(found) > 1:
-        raise refused(
-            f"{names} happen at one instant, t = {time:.9g} s: on each side of it they come in another order, and the "
-            "run has a derivative on one side only"
-        )
+        raise sided(f"{names} happen at one instant, t = {time:.9g} s, and come in another order on each side of it")
     if not found:
         raise refused(f"what ended the step at t = {time:.9g} s is not known")
     return found[0]

@@ -16,7 +16,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.switching_times import jumps_between
-from mbd.errors import CapabilityError
+from mbd.errors import CapabilityError, OneSidedError
 from mbd.integrators.base import Integrator
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.results.record import EventRecord, Record
@@ -24,7 +24,7 @@ from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.trajectory import Trajectory
 
-__all__ = ["HELD", "Rows", "RunRows", "refused"]
+__all__ = ["HELD", "Rows", "RunRows", "refused", "sided"]
 
 Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
 """Times, q, y, rates and multipliers of rows that follow each other."""
@@ -35,6 +35,11 @@ HELD = "mbd.sensitivities(…, controllers='held') leaves that out: what they wr
 def refused(why: str, instead: str = "") -> CapabilityError:
     """The error for a run whose derivatives are not known."""
     return CapabilityError(f"no derivatives of this run: {why}" + (f"; {instead}" if instead else ""))
+
+
+def sided(why: str, instead: str = "") -> OneSidedError:
+    """The error for a run that has derivatives on one side only; `why` says what a change decides."""
+    return OneSidedError(str(refused(f"{why}: the run has a derivative on one side only", instead)))
 
 
 @dataclass

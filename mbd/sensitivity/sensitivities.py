@@ -8,14 +8,15 @@ from typing import Any, Literal
 
 from mbd.bodies.values import among, is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of, tunable_model
-from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.errors import ModelError, OneSidedError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.results.units import unit
 from mbd.sensitivity.derivative import passed
 from mbd.sensitivity.functions import rates_of_parameters
+from mbd.sensitivity.one_sided import with_both_sides
 from mbd.sensitivity.outputs import lines_of, taken_apart, usual
 from mbd.sensitivity.result import Sensitivities
-from mbd.sensitivity.run_data import HELD, refused
+from mbd.sensitivity.run_data import HELD, RunRows, refused
 from mbd.sensitivity.sequence import amounts_of, changed_sequences
 from mbd.sensitivity.starts import restitution_names
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names, whole_names
@@ -85,9 +86,10 @@ def sensitivities(
     ModelError, UnknownNameError
         for arguments that cannot be honoured.
     CapabilityError
-        where the run has no derivative, or on one side only (several events at one instant, a contact that only
-        grazes), and for what is not differentiated: non-smooth steps, feedback of controllers. It tells name and
-        time.
+        where the run has no derivative (a contact only grazes, several events happen at one instant), and for what is
+        not differentiated: non-smooth steps, feedback of controllers. It tells name and time. Where there are
+        derivatives on one side only, as of dry friction that starts at rest and slides at once and of an event at the
+        start or as the run ends, the error has those of both sides, in its text and its `sides`.
 
     Examples
     --------
@@ -124,7 +126,16 @@ def sensitivities(
         )  # fmt: skip
 
     run = made(start, {})
-    found = derivatives_of(run, wrt, of, values, hold, own)
+    try:
+        found = derivatives_of(run, wrt, of, values, hold, own)
+    except OneSidedError as error:
+        rows, single = RunRows(run), _names_in(wrt)[0]
+        names, held = (
+            (usual(rows) if of is None else taken_apart(rows, of)),
+            _held(run, single) if hold is None else hold,
+        )
+        directions = _directions(run, wrt, values)
+        raise with_both_sides(error, model, run, directions, held, names, made, backend) from None
     if not amounts:
         return found
     single, _ = _names_in(wrt)

@@ -9,6 +9,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.equations.equations import Contact
+from mbd.errors import OneSidedError
 from mbd.results.record import EventRecord
 from mbd.sensitivity.balance import Impact, impact
 from mbd.sensitivity.impact_laws import Struck, poisson, sequential
@@ -51,12 +52,12 @@ def struck(
         except Unknown as reason:
             why = str(reason)
             if isinstance(reason, OneSided) and not any(contacts[c].restitution for c in who.closing):
-                raise refused(which + why) from None
+                raise OneSidedError(str(refused(which + why))) from None
     if law == "newton":
         try:
             _refuse_chance(programs, before, mode, who, fired)
         except OneSided as reason:
-            raise refused(which + str(reason)) from None
+            raise OneSidedError(str(refused(which + str(reason)))) from None
     bounces = {contacts[c].rows[0]: rate for c, rate in who.of_e.items()}
     end = replace(before, y=after).at(rows.mode(row), np.zeros(programs.columns.n), np.zeros(programs.columns.rows))
     for slow in (True,) if tried or why else (False, True):  # what comes to rest does so at once, by every law

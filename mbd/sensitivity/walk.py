@@ -29,10 +29,11 @@ from mbd.sensitivity.held_directions import (
 )
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
 from mbd.sensitivity.newmark_rows import NewmarkRows
+from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_start
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.radau import RadauSteps
 from mbd.sensitivity.resets import after_reset
-from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 from mbd.sensitivity.shortened import Shortened
@@ -123,6 +124,7 @@ class Walk:
         mode = self.mode(0, motion)
         found, row, last, looked = list[Instant](), 0, len(record.time) - 1, set[int]()
         motion, mode, rates, memory = self._started(motion, mode, 0)
+        refuse_sided_start(rows, self.programs, motion, mode, rates)
         fresh = True
         while row < last:
             if self.visit is not None:
@@ -130,9 +132,9 @@ class Walk:
             same = record.time[row + 1] == record.time[row]
             if same and (row + 1 in rows.events or (fresh and row + 2 in rows.events)):
                 fired = rows.events[row + 1 if row + 1 in rows.events else row + 2][0].name
-                raise refused(
+                raise sided(
                     f"{fired!r} happens at t = {record.time[row]:.9g} s right after another event or the start, "
-                    "with no time between: the run has a derivative on one side only"
+                    "with no time between"
                 )
             if same and row + 2 not in rows.events:
                 motion = replace(self._moved_with_jump(motion, row), t=float(record.time[row + 1]))
@@ -177,7 +179,9 @@ class Walk:
                 mode, motion = along_ways(self.programs, motion, plain, self._ways, ONSET)
         if self._written:
             raise refused(f"a controller wrote parameters at t = {record.time[min(self._written)]:.9g} s within a step")
-        return Passed(motion, mode, memory.rates if not fresh else rates, found)
+        rates = rates if fresh else memory.rates
+        refuse_sided_end(rows, self.programs, motion, mode, rates, [(each.fired.name, each.before) for each in found])
+        return Passed(motion, mode, rates, found)
 
     def _moved_with_jump(self, motion: Motion, row: int) -> Motion:
         """The motion behind an instant T(p) at which forces jump: ``δy⁺ = δy⁻ + (ẏ⁻ − ẏ⁺) δT`` at a fixed time."""

@@ -1,0 +1,221 @@
+"""Starts and ends at which a run has derivatives on one side only: the refusal, with the values of both sides.
+
+What begins at rest and slides at once slides the other way first where its velocity is changed against it; an event
+whose guard is zero at the start, or at the end, happens within the run on one side of it and not on the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.projection import project
+from mbd.bodies.values import is_number
+from mbd.errors import MbdError, OneSidedError
+from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows, sided
+from mbd.sensitivity.starts import directions, programs_of, start_tangent
+from mbd.state import State
+from mbd.tape.node import Node
+from mbd.trajectory import Trajectory
+
+__all__ = ["refuse_sided_end", "refuse_sided_start", "with_both_sides"]
+
+AT_ONCE = 1e-10
+"""Share of a run within which an event counts as one at its start or end [-]."""
+ROUND_OFF, GRAZE = 1e-12, 1e-7
+"""Velocity over the sum of its terms that is rest, and rate of a guard over its terms below which it grazes [-]."""
+MOVES = 1e-9
+"""Change of a guard over the sum of its terms below which a direction leaves it where it is [-]."""
+STEP, LEVELS = 1e-4, 4
+"""Change of what a run is differentiated by, over it or 1, to the runs on each side, and how many, each half as far."""
+JUMP = 1e-6
+"""Difference of a result from its limit on a side, relative to 1 or the result, above which it jumps there."""
+MOST_SHOWN = 4
+"""Values in the sentence of a refusal at most [-]."""
+
+
+class _Watched:
+    """Guards of a row: values, their changes in every direction and in time, and the sums of the terms of these."""
+
+    def __init__(self, programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> None:
+        c, self.equations, self.mode = programs.columns, programs.equations, mode
+        self.values, slopes = programs.watched(motion.at(mode, rates.rate, rates.lam))
+        Z = motion.tangent.stacked(c, rates.of_rate, rates.of_lam)
+        flow, still = np.zeros(c.count), np.zeros(c.count)
+        flow[c.x], flow[c.y], flow[c.t] = motion.y[: c.n_v], rates.rate, 1.0
+        still[c.y], still[c.t] = motion.y, 1.0
+        self.growth, self.terms, self.speeds = (
+            slopes @ flow,
+            np.abs(slopes) @ np.abs(flow),
+            np.abs(slopes) @ np.abs(still),
+        )
+        changes = np.max(np.abs(slopes @ Z), axis=1, initial=0.0)
+        self.moves = changes > MOVES * np.max(np.abs(slopes) @ np.abs(Z), axis=1, initial=0.0)
+
+    def firing(self, within: float) -> Iterator[str]:
+        """Names of the contacts and events that fire within so short a time, or would do if nothing were changed."""
+        n_c = len(self.equations.contacts)
+        for k, contact in enumerate(self.equations.contacts):
+            if not self.mode.closed[k] and self._is_watched(k) and self._crosses(k, -1, within):
+                yield contact.name
+        for e, guard in enumerate(self.equations.guards):
+            acts = guard.reset is not None or guard.terminal
+            if acts and self._crosses(2 * n_c + e, guard.direction, within):
+                yield guard.name
+
+    def _is_watched(self, k: int) -> bool:
+        condition = self.equations.contacts[k].only_while
+        if isinstance(condition, str):
+            names = [contact.name for contact in self.equations.contacts]
+            return bool(self.mode.closed[names.index(condition)])
+        last = len(self.values) - len(self.equations.contacts)
+        return not isinstance(condition, Node) or bool(self.values[last + k] > 0.0)
+
+    def _crosses(self, k: int, direction: int, within: float) -> bool:
+        growth = float(self.growth[k])
+        fast = abs(growth) > GRAZE * self.terms[k] and (direction == 0 or direction * growth > 0.0)
+        return fast and bool(self.moves[k]) and abs(self.values[k]) <= abs(growth) * within
+
+    def starting(self) -> Iterator[str]:
+        """Names of the frictions that slide although they are at rest, in directions that change their velocity."""
+        first = 2 * len(self.equations.contacts) + len(self.equations.guards)
+        for f, friction in enumerate(self.equations.frictions):
+            both = [f] if friction.partner < 0 else [f, friction.partner]
+            places = [first + each for each in both]
+            rest = all(abs(self.values[k]) <= ROUND_OFF * self.speeds[k] for k in places)
+            if rest and any(self.mode.slip[each] != 0.0 for each in both) and any(self.moves[k] for k in places):
+                yield friction.name
+
+    def stopping(self, within: float) -> Iterator[str]:
+        """Names of the frictions whose sliding ends within so short a time."""
+        first = 2 * len(self.equations.contacts) + len(self.equations.guards)
+        for f, friction in enumerate(self.equations.frictions):
+            if friction.partner < 0 and self.mode.slip[f] and self._crosses(first + f, -int(self.mode.slip[f]), within):
+                yield friction.name
+
+
+def refuse_sided_start(rows: RunRows, programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> None:
+    """Raise a `OneSidedError` where a change of the start decides what happens first.
+
+    motion, mode, rates : at the first row
+    """
+    if not _is_any(programs):
+        return
+    watched, within = _Watched(programs, motion, mode, rates), AT_ONCE * _duration(rows)
+    if names := dict.fromkeys(watched.starting()):
+        raise sided(
+            f"{_listed(names)} starts at rest and slides at once, and a change of its velocity decides which way"
+        )
+    if names := dict.fromkeys(watched.firing(within)):
+        raise sided(f"the run starts where {_listed(names)} happens, and a change decides whether it does")
+
+
+def refuse_sided_end(
+    rows: RunRows, programs: Programs, motion: Motion, mode: Mode, rates: Rates, instants: Sequence[tuple[str, Motion]]
+) -> None:  # fmt: skip
+    """Raise a `OneSidedError` where an event happens as the run ends at a given time, or would just after it.
+
+    motion, mode, rates : at the last row; instants : (name, motion before it) of the events of the run
+    """
+    until, end = rows.record.settings.get("until"), float(rows.record.time[-1])
+    within = AT_ONCE * _duration(rows)
+    if not is_number(until) or end < float(until) - within or not _is_any(programs):
+        return
+    names = [name for name, before in instants if end - before.t <= within and np.any(before.tangent.t != 0.0)]
+    if not names:
+        watched = _Watched(programs, motion, mode, rates)
+        names = [*watched.firing(within), *watched.stopping(within)]
+    if names:
+        raise sided(
+            f"{_listed(names)} happens as the run ends, at t = {end:.9g} s, and a change decides whether before it",
+            "end the run earlier or later, or with the event",
+        )
+
+
+def _is_any(programs: Programs) -> bool:
+    equations = programs.equations
+    return bool(equations.contacts or equations.guards or equations.frictions)
+
+
+def _duration(rows: RunRows) -> float:
+    return float(rows.record.time[-1] - rows.record.time[0])
+
+
+def _listed(names: Any) -> str:
+    return " and ".join(repr(name) for name in dict.fromkeys(names))
+
+
+# both sides -------------------------------------------------------------------------------------------------------
+def with_both_sides(
+    error: OneSidedError, model: Any, run: Trajectory, ways: Sequence[Any], held: Sequence[str], of: Sequence[str],
+    again: Callable[[State, Mapping[str, float]], Trajectory], backend: str,
+) -> OneSidedError:  # fmt: skip
+    """The refusal with both one-sided values of each result, where runs on that side have it.
+
+    ways, held : directions and what they leave as it is; of : names of results at the end; again : makes the run from
+    another start, with other parameters
+    """
+    rows = RunRows(run)
+    wanted = directions(rows, ways)
+    tangent = start_tangent(rows, programs_of(rows, wanted), wanted, held)
+    found: dict[tuple[str, str], tuple[float, float]] = {}
+    shown: list[str] = []
+    for k, way in enumerate(wanted):
+        if way.restitutions:
+            continue
+        size = STEP
+        if way.parameters:
+            known = dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
+            size *= max(abs(known[name]) for name in way.parameters) or 1.0
+        parts = (tangent.q[:, k], tangent.y[:, k], way.parameters or {})
+        sides = [_side(model, rows, parts, sign * size, of, again, backend) for sign in (-1.0, 1.0)]
+        for j, name in enumerate(of):
+            (below, low), (above, high) = (side[:, j] for side in sides)
+            found[name, way.name] = float(below), float(above)
+            jumps = abs(low - high) > JUMP * max(1.0, abs(low))
+            if jumps or not np.isclose(below, above, rtol=1e-6, atol=1e-9):
+                shown.append(f"d({name})/d({way.name}) is {below:.6g} below and {above:.6g} above"
+                             + (f", where it jumps from {low:.6g} to {high:.6g}" if jumps else ""))  # fmt: skip
+    more = "" if len(shown) <= MOST_SHOWN else f" and {len(shown) - MOST_SHOWN} more in the error's sides"
+    text = f"{error}; by runs on each side {', '.join(shown[:MOST_SHOWN])}{more}" if shown else str(error)
+    full = OneSidedError(text)
+    full.run, full.sides = run, found
+    return full
+
+
+def _side(
+    model: Any, rows: RunRows, way: tuple[Vector, Vector, Mapping[str, float]], size: float, of: Sequence[str],
+    again: Callable[[State, Mapping[str, float]], Trajectory], backend: str,
+) -> Matrix:  # fmt: skip
+    """(2, results) derivatives on one side, and limits there, of a cubic through runs; NaN where none can be made."""
+    of_q, of_y, parameters = way
+    state, compose = rows.record.start, rows.mechanism.equations.configuration.compose
+    n_v, values = len(of_q), dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
+    parts, results = 0.5 ** np.arange(LEVELS), []
+    for part in size * parts:
+        changed = {name: float(values[name] + part * rate) for name, rate in parameters.items()}
+        moved = replace(state, q=compose(state.q, part * of_q), v=state.v + part * of_y[:n_v],
+                        z=state.z + part * of_y[n_v:], memory=None)  # fmt: skip
+        try:
+            run = again(project(model, moved, {**state.parameters, **changed}, backend), changed)
+        except MbdError:
+            return np.full((2, len(of)), np.nan)
+        results.append(_results(run, of))
+    limit, slope = np.linalg.solve(np.vander(parts, increasing=True), np.array(results))[:2]
+    return np.array([slope / size, limit])
+
+
+def _results(run: Trajectory, of: Sequence[str]) -> Vector:
+    """Results at the end of a run; instants of events."""
+    found: Vector = np.full(len(of), np.nan)
+    for k, name in enumerate(of):
+        event = [each.time for each in run.events if name == f"{each.name}.time"]
+        if name == "time" or event or name in run:
+            found[k] = run.time[-1] if name == "time" else event[0] if event else run[name][-1]
+    return found

@@ -1,0 +1,111 @@
+"""Starts and ends with derivatives on one side only are refused with both values; elsewhere both sides agree."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import mbd
+
+RATE, PLACE = "x.displacement.rate", "x.displacement"
+
+
+def block(k: float, friction: float, wall: bool = False, e: float = 0.0) -> mbd.Model:
+    """A block of 1 kg on a spring with dry friction, before a wall at x = 0."""
+    model = mbd.Model("block")
+    body = mbd.PointMass("m", 1.0)
+    loss = mbd.Coulomb(friction) if friction else None
+    model.connect(mbd.Prismatic("x", model.ground.origin, body.origin, axis="x", stiffness=k, loss=loss))
+    if wall:
+        model.constrain(mbd.Unilateral("wall", mbd.measure(lambda x: x, PLACE, unit="m"), restitution=e))
+    return model
+
+
+def start(model: mbd.Model, x: float, v: float) -> mbd.State:
+    return mbd.assemble(model, position={PLACE: x}, velocity={PLACE: v})
+
+
+def sides_of(model, x, v, by, of, until, scheme=None):
+    with pytest.raises(mbd.errors.OneSidedError, match="on one side only") as caught:
+        mbd.sensitivities(
+            model, start(model, x, v), scheme or mbd.RungeKutta853(), 0.01, until=until, wrt=[by], of=[of]
+        )
+    return caught.value.sides[of, by]
+
+
+def test_what_slides_from_rest_has_derivatives_by_its_velocity_on_one_side_only():
+    """Against the way that it slides it stops first: (k x − F)/(k x + F); by its place it has a derivative."""
+    random = np.random.default_rng(9)
+    for scheme in (mbd.RungeKutta853(), mbd.HHT()):
+        k, x, friction = random.uniform(20.0, 40.0), random.uniform(0.4, 0.6), random.uniform(1.0, 3.0)
+        model = block(k, friction)
+        below, above = sides_of(model, x, 0.0, RATE, RATE, 0.2, scheme)
+        assert math.isclose(above / below, (k * x - friction) / (k * x + friction), rel_tol=2e-3)
+        found = mbd.sensitivities(model, start(model, x, 0.0), scheme, 0.01, until=0.2, wrt=[PLACE], of=[RATE])
+        assert math.isclose(found[RATE, PLACE], -math.sqrt(k) * math.sin(math.sqrt(k) * 0.2), rel_tol=2e-3)
+
+
+def test_a_run_that_ends_as_a_body_strikes_has_two_derivatives_and_one_that_ends_beside_it_has_one():
+    """v = −√k x₀ sin √k t before the wall, from which it comes back with −e v."""
+    random = np.random.default_rng(10)
+    k, e = random.uniform(20.0, 40.0), random.uniform(0.2, 0.9)
+    model, strike = block(k, 0.0, wall=True, e=e), 0.5 * math.pi / math.sqrt(k)
+    root = math.sqrt(k)
+    for until in (strike, strike * (1.0 - 1e-12), strike * (1.0 + 1e-12)):
+        with pytest.raises(mbd.errors.OneSidedError, match="'wall' happens as the run ends") as caught:
+            mbd.sensitivities(model, start(model, 0.5, 0.1), mbd.RungeKutta853(), 0.01,
+                              until=until + math.atan(0.1 / root / 0.5) / root, wrt=[RATE], of=[RATE])  # fmt: skip
+        assert len(caught.value.sides) == 1
+    for until in (0.9 * strike, 1.1 * strike):
+        found = mbd.sensitivities(model, start(model, 0.5, 0.1), mbd.RungeKutta853(), 0.01, until=until, wrt=[RATE],
+                                  of=[RATE])  # fmt: skip
+        assert np.isfinite(found[RATE, RATE])
+
+
+def test_a_start_on_an_event_that_changes_something_is_refused_and_one_that_leaves_it_is_not():
+    model = block(30.0, 0.0)
+    model.constrain(mbd.Event("turn", mbd.measure(lambda v: v, RATE, unit="m"), direction=-1, reset={RATE: -1.0}))
+    below, above = sides_of(model, 0.5, 0.0, RATE, RATE, 0.1)
+    assert np.isfinite(below) and np.isfinite(above)
+    found = mbd.sensitivities(
+        model, start(model, -0.5, 0.0), mbd.RungeKutta853(), 0.01, until=0.1, wrt=[RATE], of=[RATE]
+    )
+    assert math.isclose(found[RATE, RATE], math.cos(math.sqrt(30.0) * 0.1), rel_tol=1e-9)
+
+
+def test_a_derivative_is_that_of_both_sides_or_it_is_refused():
+    """Random blocks, from rest or not, to an instant of an event or another one."""
+    random, judged, refused = np.random.default_rng(11), 0, 0
+    for _ in range(12):
+        k, friction, e = (
+            random.uniform(10.0, 50.0),
+            random.choice([0.0, random.uniform(0.5, 3.0)]),
+            random.uniform(0, 1),
+        )
+        model = block(float(k), float(friction), wall=bool(random.integers(2)), e=float(e))
+        x, v = random.uniform(0.2, 0.6), random.choice([0.0, random.uniform(-1.0, 1.0)])
+        until, by = random.uniform(0.1, 1.0), str(random.choice([RATE, PLACE]))
+        run = mbd.simulate(model, start(model, x, v), mbd.RungeKutta853(), dt=0.01, until=until)
+        if run.events and random.integers(2):
+            until = run.events[-1].time
+
+        def rate(change, model=model, x=x, v=v, by=by, until=until):
+            moved = start(model, x + change * (by == PLACE), v + change * (by == RATE))
+            return float(mbd.simulate(model, moved, mbd.RungeKutta853(), dt=0.01, until=until).final[RATE])
+
+        h = 1e-6
+        below, above = (rate(0.0) - rate(-h)) / h, (rate(h) - rate(0.0)) / h
+        agree = abs(above - below) < 1e-3 * max(1.0, abs(above), abs(below))
+        try:
+            found = mbd.sensitivities(
+                model, start(model, x, v), mbd.RungeKutta853(), 0.01, until=until, wrt=[by], of=[RATE]
+            )
+        except mbd.CapabilityError:
+            assert not agree or below == above == 0.0  # at rest whatever happened before
+            refused += 1
+            continue
+        judged += 1
+        assert agree and abs(found[RATE, by] - 0.5 * (above + below)) < 1e-4 * max(1.0, abs(above))
+    assert judged > 2 and refused > 2
