@@ -179,9 +179,16 @@ class Configuration:
         found, values = list[str](), np.asarray(q, dtype=float).tolist()
         for joint, first, _ in self.charts:
             own = values[first : first + len(joint.labels)]
-            near = [float(each) for each in joint.normalise(own)]
+            names = ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
+            try:
+                near = [float(each) for each in joint.normalise(own)]
+            except ZeroDivisionError:  # all parts of a quaternion are zero, or so small that their squares are
+                given = ", ".join(f"{x:.9g}" for x in own[joint.adding :])
+                found.append(
+                    f"{names} = {given}, which is no orientation: a quaternion has length 1, such as (1, 0, 0, 0)"
+                )
+                continue
             if not all(abs(a - b) <= tolerance for a, b in zip(near, own, strict=True)):
-                names = ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
                 given, shown = (", ".join(f"{x:.9g}" for x in each[joint.adding :]) for each in (own, near))
                 found.append(f"{names} = {given}, which no placement of {joint.known_as} has; the nearest are {shown}")
         return found

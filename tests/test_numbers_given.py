@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,3 +53,19 @@ def test_a_page_is_not_named_as_something_else(tmp_path, name, said):
     with pytest.raises(mbd.TrajectoryError, match=f"a page is an HTML file, .* got '{name}'.*{said}"):
         run.page(tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("parts", [(0.0, 0.0, 0.0, 0.0), (1e-200, 0.0, 0.0, 0.0)])
+def test_a_quaternion_of_length_zero_is_no_orientation(parts):
+    model, leg = mbd.Model("leg"), mbd.RigidBody("leg", 1.0, (1.0, 2.0, 2.5))
+    model.connect(mbd.Spherical("hip", model.ground.origin, leg.origin))
+    start = mbd.assemble(model, backend="python")
+    wrong = replace(start, q=np.array(parts))
+    for act in (
+        lambda: mbd.simulate(model, wrong, dt=0.1, until=0.1, backend="python"),
+        lambda: mbd.project(model, wrong, backend="python"),
+        lambda: mbd.linearize(model, wrong, backend="python"),
+        lambda: mbd.assemble(model, dict(zip(start.names, parts, strict=True)), backend="python"),
+    ):
+        with pytest.raises(mbd.ModelError, match="which is no orientation: a quaternion has length 1"):
+            act()

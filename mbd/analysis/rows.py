@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mbd.results.archive import named_file, write_whole
-from mbd.results.tables import library
+from mbd.results.tables import library, text_cell
 
 __all__ = ["Rows"]
 
@@ -33,7 +33,7 @@ class Rows(ABC):
             with partial.open("w", newline="", encoding="utf-8") as file:
                 writer = csv.DictWriter(file, list(rows[0]) if rows else [])
                 writer.writeheader()
-                writer.writerows(rows)
+                writer.writerows({title: text_cell(value) for title, value in row.items()} for row in rows)
 
         write_whole(target, fill)
         return target

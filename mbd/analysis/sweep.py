@@ -24,6 +24,7 @@ from mbd.notebook import table
 from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
 from mbd.results.names import scalars
+from mbd.results.tables import text_cell
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
@@ -116,8 +117,8 @@ class Sweep:
         def fill(partial: Path) -> None:
             with partial.open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file)
-                writer.writerow(self.columns)
-                writer.writerows(zip(*self.columns.values(), strict=True))
+                writer.writerow(map(text_cell, self.columns))
+                writer.writerows(map(text_cell, row) for row in zip(*self.columns.values(), strict=True))
 
         write_whole(path, fill)
         return path

@@ -18,7 +18,10 @@ from mbd.results.units import unit
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["columns_of", "dataframe", "dataset", "library"]
+__all__ = ["columns_of", "dataframe", "dataset", "library", "text_cell"]
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""With what a formula of a spreadsheet begins."""
 
 SIDES: dict[str, Side] = {"after": "right", "before": "left"}
 
@@ -153,3 +156,12 @@ def _every(time: Vector, dt: float) -> Vector:
         )
     count = int(np.floor(steps * (1.0 + 1e-12) + 1e-9))
     return np.asarray(np.minimum(time[0] + dt * np.arange(count + 1), time[-1]))
+
+
+def text_cell(value: Any) -> Any:
+    """A cell of a CSV file: text that a spreadsheet would take for a formula begins with an apostrophe.
+
+    >>> text_cell("=1+1"), text_cell("left knee"), text_cell(-1.0)
+    ("'=1+1", 'left knee', -1.0)
+    """
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value

@@ -10,9 +10,12 @@ import pytest
 import mbd
 from mbd import cli
 from mbd.analysis.gait_report.curves import forces_at
+from mbd.analysis.gait_report.extremes import largest
+from mbd.analysis.gait_report.measures import Measure
+from mbd.analysis.gait_report.strides import sides_of
 from mbd.analysis.gait_report.symmetry import symmetry_of
 from mbd.errors import ModelError, TrajectoryError, UnknownNameError
-from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
+from tests.simulation.mechanisms import falling, kneed_walker, kneed_walker_start
 
 
 @cache
@@ -164,6 +167,69 @@ def test_mass_divides_loads():
 @pytest.mark.parametrize(("name", "value"), [("Robinson", 40.0), ("ratio", 2.0 / 3.0), ("STA", 0.2)])
 def test_symmetry_is_as_defined(name, value):
     assert symmetry_of(name)[1](0.6, 0.4) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_index_of_robinson_is_never_negative_nor_beyond_200(seed):
+    s, p = np.random.default_rng(seed).normal(size=2)
+    for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        here = (signs[0] * abs(s), signs[1] * abs(p))
+        assert 0.0 <= symmetry_of("Robinson")[1](*here) <= 200.0
+        assert abs(symmetry_of("STA")[1](*here)) <= 1.0 and np.sign(symmetry_of("STA")[1](*here)) == np.sign(
+            here[0] - here[1]
+        )
+
+
+def test_where_braking_and_driving_cancel_there_is_no_index():
+    first, gross = report().walks[0], {"left": 10.0, "right": 10.0}
+    for mean, dash in (({"left": 1e-3, "right": -2e-3}, True), ({"left": 0.3, "right": -0.2}, False)):
+        measure = Measure("forward impulse", "N s", mean, mean, gross)
+        assert np.isnan(report().asymmetry(first, measure)) == dash
+    (forward,) = (each for each in first.measures if each.quantity == "forward impulse")
+    assert all(forward.gross[side] >= abs(forward.mean[side]) > 0.0 for side in ("left", "right"))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_largest_value_is_found_between_samples_and_at_jumps(seed):
+    rng = np.random.default_rng(seed)
+    breaks, place, width = np.sort(rng.uniform(0.0, 1.0, 4)), rng.uniform(0.2, 0.8), rng.uniform(3e-3, 0.1)
+    heights = rng.uniform(0.0, 0.5, 5)
+
+    def values(times, at):
+        part = np.searchsorted(breaks, times, side="right" if at == "after" else "left")
+        return heights[part] * np.exp(-3.0 * times) + np.exp(-(((times - place) / width) ** 2))
+
+    dense = np.concatenate([np.linspace(0.0, 1.0, 400_001), place + width * np.linspace(-0.1, 0.1, 40_001)])
+    expected = max(values(dense, "after").max(), values(breaks, "after").max(), values(breaks, "before").max())
+    assert largest(values, 0.0, 1.0, breaks) == pytest.approx(expected, rel=1e-7)
+
+
+def test_a_peak_is_that_of_the_run_at_all_times():
+    stride = sides_of(walk(), ("left", "right"), 1)[0].strides[-1]
+    side = sides_of(walk(), ("left", "right"), 1)[0]
+    rows = walk().time[(walk().time >= stride.begin) & (walk().time <= stride.end)]
+    forces = [forces_at(walk(), side, rows[1:-1], at)["normal force"].max() for at in ("before", "after")]
+    forces.append(forces_at(walk(), side, rows[:1], "after")["normal force"][0])
+    assert mbd.gait_report(walk(), strides=1)["peak normal force"]["left"] >= max(forces) * (1.0 - 1e-9)
+
+
+@pytest.mark.parametrize("name", ["left\nright", "\x1b[2J", "a\x00"])
+def test_names_of_reports_move_no_cursor(name):
+    with pytest.raises(ModelError, match="names of gait_report: .* holds no control characters"):
+        mbd.gait_report(walk(), names=[name])
+
+
+def test_no_cell_of_a_table_is_a_formula(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    mbd.gait_report(walk(), names=["=1+1"], strides=1).to_csv(tmp_path / "gait.csv")
+    for file in ("gait.csv", "gait-energy.csv"):
+        assert set(pandas.read_csv(tmp_path / file).run) == {"'=1+1"}
+    assert pandas.read_csv(tmp_path / "gait-curves.csv").columns[1].startswith("'=1+1")
+    model, _ = falling()
+    start = mbd.assemble(model, backend="python")
+    swept = mbd.sweep(model, {"dt": [0.1]}, start, {"@SUM": lambda run: -1.0}, until=0.1, backend="python")
+    lines = swept.to_csv(tmp_path / "sweep.csv").read_text().splitlines()
+    assert lines[0] == "dt,'@SUM,success,message" and lines[1].startswith("0.1,-1.0,True")
 
 
 def test_runs_stand_beside_each_other_and_gaits_for_runs():

@@ -11,6 +11,7 @@ import numpy as np
 from mbd.analysis.gait_report.moments import Moments
 from mbd.analysis.gait_report.strides import Side, Stride, base_name, of_side
 from mbd.arrays import Matrix, Vector
+from mbd.results.interpolation import Side as When
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -121,9 +122,12 @@ def grips_of(run: Trajectory, side: Side) -> list[str]:
     return [name for name in grips if of_side(name, side.name)]
 
 
-def forces_at(run: Trajectory, side: Side, times: Vector) -> dict[str, Vector]:
-    """Normal and forward force of the ground on a foot, whose grip may be a `Rolling` of its side [N]."""
-    named = run.at(times)
+def forces_at(run: Trajectory, side: Side, times: Vector, at: When = "right") -> dict[str, Vector]:
+    """Normal and forward force of the ground on a foot, whose grip may be a `Rolling` of its side [N].
+
+    at : 'after' or 'before' what happens at the times
+    """
+    named = run.at(times, side=at)
     normal, forward = np.zeros(len(times)), np.zeros(len(times))
     for name in side.contacts:
         normal = normal + np.nan_to_num(named[f"{name}.force"])

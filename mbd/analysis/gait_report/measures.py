@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.analysis.gait_report.curves import forces_at, grips_of
+from mbd.analysis.gait_report.extremes import largest
 from mbd.analysis.gait_report.strides import Side, Stride, of_side
+from mbd.arrays import Vector
+from mbd.results.interpolation import OneSide
 
 if TYPE_CHECKING:
     from mbd.results.impulses import Impulse
@@ -24,8 +27,8 @@ BOTH = "both"
 MIDDLE = (0.25, 0.85)
 """Shares of swing between which clearance is sought: near both ends every foot is close to the ground."""
 
-FINE = 1001
-"""Samples of a stride for peaks."""
+CANCELS = 1e-3
+"""Part of what braking and driving come to, below which their sum is none: they cancel [-]."""
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 PANELS = 250
@@ -40,12 +43,20 @@ Values = dict[tuple[str, str], float]
 
 @dataclass(frozen=True)
 class Measure:
-    """A number of a gait: quantity, unit, and by side the mean over the strides and its standard deviation."""
+    """A number of a gait: quantity, unit, and by side the mean over the strides and its standard deviation.
+
+    gross : what the parts of a sum come to without their signs, by side: of a forward impulse braking and driving
+    """
 
     quantity: str
     unit: str
     mean: dict[str, float]
     spread: dict[str, float]
+    gross: dict[str, float] = field(default_factory=dict)
+
+    def cancels(self, sides: Sequence[str]) -> bool:
+        """Whether the numbers of these sides are but what is left where their parts cancel."""
+        return sum(abs(self.mean[side]) for side in sides) <= CANCELS * sum(self.gross.get(side, 0.0) for side in sides)
 
 
 @dataclass(frozen=True)
@@ -61,23 +72,28 @@ class Spent:
 def measures_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> list[Measure]:
     """Spatio-temporal numbers and loads, each by side."""
     found: dict[str, list[Values]] = {}
+    found_gross: dict[str, float] = {}
     impulses = run.impulses
     for side in sides:
         others = [each for each in sides if each is not side]
-        found[side.name] = [_of_stride(run, side, others, stride, mass, impulses) for stride in side.strides]
+        strides = [_of_stride(run, side, others, stride, mass, impulses) for stride in side.strides]
+        found[side.name] = [values for values, _ in strides]
+        found_gross[side.name] = float(np.mean([gross for _, gross in strides]))
     measures = []
     for quantity, unit in next(iter(found.values()))[0]:
         columns = {side: np.array([each[quantity, unit] for each in rows]) for side, rows in found.items()}
         known = {side: column[np.isfinite(column)] for side, column in columns.items()}
         mean = {side: float(np.mean(column)) if len(column) else float("nan") for side, column in known.items()}
         spread = {side: float(np.std(column)) if len(column) else float("nan") for side, column in known.items()}
-        measures.append(Measure(quantity, unit, mean, spread))
+        gross = {side: found_gross[side] for side in found if quantity == "forward impulse"}
+        measures.append(Measure(quantity, unit, mean, spread, gross))
     return measures
 
 
 def _of_stride(
     run: Trajectory, side: Side, others: Sequence[Side], stride: Stride, mass: float | None, impulses: Sequence[Impulse]
-) -> Values:
+) -> tuple[Values, float]:
+    """The numbers of a stride, and what its forward impulse comes to without signs."""
     period, (step_time, step_length) = stride.duration, stride.step
     stance = (stride.off - stride.begin) / period * 100.0
     together = [
@@ -86,15 +102,20 @@ def _of_stride(
         for other in others
         for c, d in _within(other, stride)
     ]
-    times = stride.begin + np.linspace(0.0, 1.0 - 1e-9, FINE) * period
-    force = forces_at(run, side, times)["normal force"]
+    events = [event.time for event in run.events]
+    peak = largest(
+        lambda times, at: forces_at(run, side, times, at)["normal force"],
+        stride.begin, stride.end, events,
+    )  # fmt: skip
     if stride.begin > run.time[0]:
         struck, impacts = _impacts(run, side, stride, impulses)
     else:  # of a foot that stands at the start the strike is not known
         struck, impacts = float("nan"), np.full(2, np.nan)
-    normal, forward = _impulse(run, side, stride) + impacts
+    normal, forward, gross = _impulse(run, side, stride)
+    normal, forward = normal + impacts[0], forward + impacts[1]
+    gross += abs(impacts[1]) if np.isfinite(impacts[1]) else 0.0
     per, scale = ("", 1.0) if mass is None else ("/kg", 1.0 / mass)
-    return {
+    values = {
         ("step length", "m"): step_length,
         ("step time", "s"): step_time,
         ("stride length", "m"): stride.length,
@@ -108,8 +129,9 @@ def _of_stride(
         ("normal impulse", f"N s{per}"): scale * normal,
         ("forward impulse", f"N s{per}"): scale * forward,
         ("strike impulse", f"N s{per}"): scale * struck,
-        ("peak normal force", f"N{per}"): scale * float(np.max(force)),
+        ("peak normal force", f"N{per}"): scale * peak,
     }
+    return values, scale * gross
 
 
 def _impacts(
@@ -128,13 +150,17 @@ def _impacts(
 
 
 def _impulse(run: Trajectory, side: Side, stride: Stride) -> NDArray[np.float64]:
-    """∫ of the normal and the forward force without impacts (2,) [N s], from one event to the next: these may jump."""
+    """∫ of the normal force, of the forward force and of its size (3,) [N s], without impacts.
+
+    It is taken from one event to the next, at which forces may jump.
+    """
     events = [event.time for event in run.events if stride.begin < event.time < stride.end]
     knots = np.unique([*np.linspace(stride.begin, stride.end, PANELS + 1), *events])
     half = np.diff(knots)[:, None] / 2.0
     times = knots[:-1, None] + half * (1.0 + POINTS)
     forces = forces_at(run, side, times.ravel())
     columns = [forces[name].reshape(times.shape) for name in ("normal force", "forward force")]
+    columns.append(np.abs(columns[1]))
     return np.array([float(np.sum(half * WEIGHTS * force)) for force in columns])
 
 
@@ -148,9 +174,13 @@ def _clearance(run: Trajectory, side: Side, stride: Stride) -> float:
     """The smallest gap of the foot in the middle of swing [m]; NaN without a swing."""
     if not np.isfinite(stride.off):
         return float("nan")
-    times = stride.off + np.linspace(*MIDDLE, 61) * (stride.end - stride.off)
-    named = run.at(times)
-    return float(min(np.min(named[f"{name}.gap"]) for name in side.contacts))
+    begin, end = (stride.off + share * (stride.end - stride.off) for share in MIDDLE)
+
+    def sunk(times: Vector, at: OneSide) -> Vector:
+        named = run.at(times, side=at)
+        return -np.min([named[f"{name}.gap"] for name in side.contacts], axis=0)
+
+    return -largest(sunk, begin, end, [event.time for event in run.events])
 
 
 def energy_of(run: Trajectory, sides: Sequence[Side]) -> list[Spent]:

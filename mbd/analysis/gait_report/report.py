@@ -13,11 +13,12 @@ from mbd.analysis.gait_report.curves import PERCENT, Curve, curves_of
 from mbd.analysis.gait_report.measures import BOTH, Measure, Spent, energy_of, measures_of
 from mbd.analysis.gait_report.strides import Side, sides_of
 from mbd.analysis.gait_report.symmetry import symmetry_of
-from mbd.bodies.values import names_of, number
+from mbd.bodies.values import names_of, number, printable
 from mbd.errors import ModelError
 from mbd.notebook import table
 from mbd.results.archive import named_file, write_whole
 from mbd.results.opensim import write_storage
+from mbd.results.tables import text_cell
 from mbd.trajectory import Trajectory
 
 __all__ = ["GaitReport", "Walk", "gait_report"]
@@ -64,7 +65,9 @@ class GaitReport:
         return self.walks[0][quantity]
 
     def asymmetry(self, walk: Walk, measure: Measure) -> float:
-        """The symmetry of a number by the definition chosen; NaN where a side has none."""
+        """The symmetry of a number by the definition chosen; NaN where a side has none, or where its parts cancel."""
+        if measure.cancels([side.name for side in walk.sides[:2]]):
+            return float("nan")
         first, second = (measure.mean[side.name] for side in walk.sides[:2])
         with np.errstate(all="ignore"):
             value = symmetry_of(self.symmetry)[1](np.float64(first), np.float64(second))
@@ -169,6 +172,8 @@ class GaitReport:
             frame = self.to_dataframe(what)
             if what == "curves":
                 frame.columns = [": ".join(column[:2]) + f" {column[2]} {column[3]} [{column[4]}]" for column in frame]
+            frame.columns = [text_cell(column) for column in frame]
+            frame = frame.apply(lambda column: column.map(text_cell))
             write_whole(place, lambda partial, f=frame, w=what: f.to_csv(partial, index=w == "curves"))  # type: ignore[misc]
         return target
 
@@ -216,8 +221,8 @@ def gait_report(
     run, others : trajectories of `simulate`, or gaits with a `walk` or a `run`, such as of `limit_cycle`
     names : of the runs in tables, by default those of their models
     sides : words of both sides, the sound one first where one is not
-    symmetry : 'Robinson' ``2 |x_s − x_p|/(x_s + x_p) · 100 %``, 'ratio' ``x_p/x_s`` or 'STA' ``(x_s − x_p)/(x_s +
-        x_p)``, s the first side
+    symmetry : 'Robinson' ``2 |x_s − x_p|/(|x_s| + |x_p|) · 100 %``, 'ratio' ``x_p/x_s`` or 'STA' ``(x_s −
+        x_p)/(|x_s| + |x_p|)``, s the first side; a dash where braking and driving cancel
     mass : of the body, by which loads, moments and powers are divided [kg]; None: they are as they are
     strides : how many of each side count, the last ones; None: all that are whole
 
@@ -243,7 +248,7 @@ def gait_report(
     if strides is not None and (not isinstance(strides, int) or isinstance(strides, bool) or strides < 1):
         raise ModelError(f"strides of gait_report is a number of strides ≥ 1, got {strides!r}")
     walks = [_walked(each) for each in (run, *others)]
-    titles = _titles([each.name for each in walks] if names is None else list(names_of(names, "names of gait_report")))
+    titles = _titles([each.name for each in walks] if names is None else _given(names))
     if len(titles) != len(walks):
         raise ModelError(f"names of gait_report are one for each run; got {len(titles)} names and {len(walks)} runs")
     reports = [_walk(each, title, words, size, strides) for each, title in zip(walks, titles, strict=True)]
@@ -259,6 +264,11 @@ def _walked(value: Any) -> Trajectory:
     if not isinstance(run, Trajectory):
         raise ModelError(f"gait_report takes runs of mbd.simulate, or gaits that have a run; got {value!r}")
     return run
+
+
+def _given(names: Any) -> list[str]:
+    """Names of runs that can be shown anywhere."""
+    return [printable(name, "names of gait_report:") for name in names_of(names, "names of gait_report")]
 
 
 def _titles(names: Sequence[str]) -> list[str]:

@@ -12,15 +12,16 @@ __all__ = ["DEFINITIONS", "symmetry_of"]
 Definition = tuple[str, Callable[[float, float], float]]
 
 DEFINITIONS: dict[str, Definition] = {
-    "Robinson": ("%", lambda s, p: 200.0 * abs(s - p) / (s + p)),
+    "Robinson": ("%", lambda s, p: 200.0 * abs(s - p) / (abs(s) + abs(p))),
     "ratio": ("-", lambda s, p: p / s),
-    "STA": ("-", lambda s, p: (s - p) / (s + p)),
+    "STA": ("-", lambda s, p: (s - p) / (abs(s) + abs(p))),
 }
 """Unit and value of each definition, from the values x_s, x_p of the first and the second side.
 
-Robinson: ``2 |x_s − x_p|/(x_s + x_p) · 100 %``, 0 where they are alike (R. O. Robinson, W. Herzog & B. M. Nigg, Use of
+Robinson: ``2 |x_s − x_p|/(|x_s| + |x_p|) · 100 %``, 0 where they are alike, 200 where one is zero or of the other
+sign; of positive numbers the index as published (R. O. Robinson, W. Herzog & B. M. Nigg, Use of
 force platform variables to quantify the effects of chiropractic manipulation on gait symmetry, J. Manipulative Physiol.
-Ther. 10 (1987) 172); ratio: ``x_p/x_s``, 1 where they are alike; STA: ``(x_s − x_p)/(x_s + x_p)``, with a sign.
+Ther. 10 (1987) 172); ratio: ``x_p/x_s``, 1 where they are alike; STA: ``(x_s − x_p)/(|x_s| + |x_p|)``, with a sign.
 """
 
 

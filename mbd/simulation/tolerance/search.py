@@ -173,7 +173,11 @@ class Search:
 
     def _observed(self, near: Sequence[Trial]) -> float:
         """κ from the errors of two runs that a third has told, if they are far enough apart."""
-        if len(near) < 2 or near[1].allowed < APART * near[0].allowed or not np.isfinite(near[1].error):
+        if (
+            len(near) < 2
+            or near[1].allowed < APART * near[0].allowed
+            or not np.isfinite([near[0].error, near[1].error]).all()
+        ):
             return self.power
         if min(near[0].error, near[1].error) <= 10.0 * ROUND_OFF:
             return self.power
