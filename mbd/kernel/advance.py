@@ -33,6 +33,7 @@ from mbd.kernel.contact_modes import room_to_log
 from mbd.kernel.contact_step import relax_pace
 from mbd.kernel.crowding import crowds
 from mbd.kernel.events import handle_event, land
+from mbd.kernel.guard_sides import settle_sides, striking_contact
 from mbd.kernel.guard_substeps import parts_to_take
 from mbd.kernel.guards import is_quiet, judge, update_armed, update_sides
 from mbd.kernel.hooks import scheme_accept
@@ -110,6 +111,8 @@ def begin(K: Kernel) -> int:
         if status != 0:
             return status
         K.restart_due = 0
+        if K.n_guards > 0:
+            settle_sides(K)
         if visible or K.n_logged > first:
             store_row(K)
         if is_awaited(K, first):
@@ -248,7 +251,7 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
             return status
     if K.event_kind < 0:
         return TURNS_AWAY if K.strategy == 0 and slides_on(K) else 0
-    if K.strategy == 1 and closes_below_surface(K):  # the contact comes first
+    if K.strategy == 1 and (striking_contact(K) >= 0 or closes_below_surface(K)):  # the contact comes first
         return try_step(K, h, t1)
     return AT_POSE if refuses(K, K.event_after) else -1
 

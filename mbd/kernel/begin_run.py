@@ -123,6 +123,7 @@ def set_side(K: Switching, e: int) -> None:
     if abs(value) <= doubt:
         value = rate if abs(rate) * K.step > doubt else 0.0
     K.side[e] = 0.0
+    K.passing[e] = 0
     if value > 0.0:
         K.side[e] = 1.0
     elif value < 0.0:

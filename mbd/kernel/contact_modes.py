@@ -24,11 +24,11 @@ NO_IMPULSE, OWN_IMPULSE, ALL_IMPULSES = 0, 1, 2
 def room_to_log(K: Sizes) -> int:
     """Lines of the event log that one step with its event and two restarts may fill.
 
-    A restart logs each contact and each friction at most once. An event logs one guard, a step over a singular
-    configuration each at most once; an impact each contact at most three times: released by one that strikes, closed,
-    and opened again.
+    A restart logs each contact and each friction at most once. An event logs each guard at most once, as a step over a
+    singular configuration does; an impact each contact at most three times: released by one that strikes, closed, and
+    opened again.
     """
-    return int(5 * K.n_contacts + 2 * K.n_frictions + K.n_guards + 8)
+    return int(5 * K.n_contacts + 2 * K.n_frictions + 2 * K.n_guards + 8)
 
 
 def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -> None:

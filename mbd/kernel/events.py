@@ -19,7 +19,8 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact_modes import NO_IMPULSE, log_event
 from mbd.kernel.crowding import count_impact
-from mbd.kernel.guards import update_sides
+from mbd.kernel.guard_sides import find_crossings, find_passed, is_at_event, keep_at_zero, log_crossings
+from mbd.kernel.guards import update_side
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Guards, Kernel, Switching
@@ -95,12 +96,12 @@ def note_state(K: Guards, number: int) -> None:
     carry(K.y, K.seen, o, K.n, True)
 
 
-def update_other_sides(K: Switching, fired: int) -> None:
-    """Users' guards that have gone back before this event may fire again; the one that has fired (≥ 0) is at zero."""
-    side = K.side[fired] if fired >= 0 else 0.0
-    update_sides(K)
-    if fired >= 0:
-        K.side[fired] = side
+def update_other_sides(K: Switching) -> None:
+    """Users' guards that have gone back before this event may fire again; those that are zero at it stay as is."""
+    fired = K.event_index if K.event_kind == CROSS or K.event_kind == CROSS_BACK else -1
+    for e in range(K.n_guards):
+        if e != fired and not is_at_event(K, e):
+            update_side(K, e)
 
 
 def handle_event(K: Kernel) -> int:
@@ -115,7 +116,8 @@ def handle_event(K: Kernel) -> int:
     if same_instant(K):
         return CHATTER
     if K.n_guards > 0:
-        update_other_sides(K, index if kind == CROSS or kind == CROSS_BACK else -1)
+        update_other_sides(K)
+        find_crossings(K)
     if kind == WATCH:
         K.restart_due = 2
         return switch(K) - 1
@@ -141,6 +143,8 @@ def handle_event(K: Kernel) -> int:
     store_row(K)  # also where no accelerations are consistent: the velocities after the event are known
     if status != 0:
         return status
+    if K.n_guards > 0:
+        log_crossings(K)
     for c in range(K.n_contacts):
         if K.kept_flags[c] == 1 and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.at_gap_rate + c] < -1e-6:
             K.sinking[c] = min(K.sinking[c], K.time)
@@ -157,8 +161,10 @@ def land(K: Kernel, h: float, t1: float) -> int:
     t = K.time
     events = K.n_events
     keep(K)
+    find_passed(K)
     status = strike(K, h, t1)
     if status == 0:
+        keep_at_zero(K, h)
         store_row(K)
         status = rebound(K)
     if status == 0:
@@ -171,12 +177,14 @@ def land(K: Kernel, h: float, t1: float) -> int:
         K.n_logged = first
         K.n_stored = stored
         K.n_events = events
+        K.passing[: K.n_guards] = 0
         put_back(K, t)
         K.restart_due = 2
         return -1
     if status != 0:
         return status
     store_row(K)
+    log_crossings(K)
     K.n_repeats = 0
     K.halvings = 0
     return EVENT if is_awaited(K, first) else -1

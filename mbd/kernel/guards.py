@@ -51,7 +51,7 @@ from mbd.kernel.roots import sqrt
 
 __all__ = [
     "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "update_armed",
-    "update_sides", "watch",
+    "update_side", "update_sides", "watch",
 ]  # fmt: skip
 
 
@@ -63,6 +63,8 @@ CLOSE_BY = 1e-3
 """Part of what a guard changes by in a step, at its first rate, above zero where the turn is looked at itself [-]."""
 LOST = 1e-10
 """Part of its terms by which a gap may fall though its rate is none or positive at both ends of a step [-]."""
+CLEARLY = 16.0
+"""Round-offs of a guard by which it has gone back; a contact at its surface may leave it off zero by some of them [-]."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
@@ -122,22 +124,29 @@ def update_armed(K: Guards) -> None:
 
 
 def update_sides(K: Switching) -> None:
+    """The sides of users' guards at the accepted state."""
+    for e in range(K.n_guards):
+        update_side(K, e)
+
+
+def update_side(K: Switching, e: int) -> None:
     """A guard that fires in one direction only is ready again once it has gone back.
 
-    One that started at rest on its surface (side 0) is on the side to which it has moved.
+    One that rested on its surface (side 0), at the start or after an event, is on the side to which it has moved.
     """
-    for e in range(K.n_guards):
-        value = K.guards0[K.at_user + e]
-        if K.side[e] == 0.0 and value != 0.0 and abs(value) > guard_round_off(K, e, K.time, K.q, K.y):
-            K.side[e] = 1.0 if value > 0.0 else -1.0
-        if goes_back(K, e, value, K.time, K.q, K.y):
-            K.side[e] = float(-K.direction[e])
+    value = K.guards0[K.at_user + e]
+    if K.side[e] == 0.0 and value != 0.0 and abs(value) > guard_round_off(K, e, K.time, K.q, K.y):
+        K.side[e] = 1.0 if value > 0.0 else -1.0
+    if goes_back(K, e, value, K.time, K.q, K.y):
+        K.side[e] = float(-K.direction[e])
 
 
 def goes_back(K: Switching, e: int, value: float, t: float, q: Reals, y: Reals) -> bool:
     """Whether a guard that fires in one direction only is clearly on the side again from which it fires."""
     back = -K.direction[e]
-    return bool(back * K.side[e] < 0.0 and back * value > 0.0 and abs(value) > guard_round_off(K, e, t, q, y))
+    if not (back * K.side[e] < 0.0 and back * value > 0.0):
+        return False
+    return bool(abs(value) > CLEARLY * guard_round_off(K, e, t, q, y))
 
 
 def consider(K: Events, kind: int, index: int, estimate: float, low: float) -> None:

@@ -21,6 +21,7 @@ from mbd.kernel.codes import (
     WATCH,
 )
 from mbd.kernel.guard_round_off import guard_round_off
+from mbd.kernel.guard_sides import striking_contact
 from mbd.kernel.guards import along_slip, gap_scale, gap_tolerance, guard_value, is_watched, judge
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Events, Guards, Kernel, Switching
@@ -123,6 +124,10 @@ def locate(K: Kernel, h: float) -> int:
         together = found_kind >= 0 and found > (1.0 - SAME) * end  # as the one it was looked for before
         if together or not another_before(K, kind, index, found):
             take_event(K, kind, index, found)
+            if (kind == CROSS or kind == CROSS_BACK) and K.strategy == 0:  # of one instant, the contact comes first
+                c = striking_contact(K)
+                if c >= 0 and K.active[c] == 0:
+                    take_event(K, CLOSE, c, found)
             return 0
         end = found
         found_kind = kind

@@ -215,6 +215,39 @@ def test_bounces_by_reset_that_crowd_together_are_never_missed(dt):
     assert len(trajectory.events) < 100
 
 
+@pytest.mark.parametrize("backend", ["llvm", "python"])
+@pytest.mark.parametrize(
+    "reset", [{"phase.displacement": 1.0}, {"phase.rate": lambda named: named["slide.displacement"]}]
+)
+@pytest.mark.parametrize("direction", [-1, 0, 1])
+def test_a_reset_that_leaves_its_own_guard_at_zero_happens_once(direction, reset, backend):
+    for seed, scheme in enumerate(WATCHED if backend == "llvm" else WATCHED[:1]):
+        rng = np.random.default_rng(seed)
+        turn = mbd.Event("turn", mbd.measure(lambda v: 0.1 * v, "slide.rate"), direction=direction, reset=reset)
+        model = oscillator(turn)
+        other = mbd.PointMass("other", mass=1.0)
+        model.connect(mbd.Prismatic("phase", model.ground.origin, other.origin))
+        phase = rng.uniform(0.1, 0.4)  # of a period of 1 s, in which the point moves backward at first
+        place, speed = np.cos(2 * np.pi * phase), -2 * np.pi * np.sin(2 * np.pi * phase)
+        start = {"slide.displacement": place, "phase.displacement": 0.0}
+        found = run(model, start, {"slide.rate": speed}, integrator=scheme, dt=4e-3, until=2.2 - phase, backend=backend)
+        turns = {-1: [1.0, 2.0], 0: [0.5, 1.0, 1.5, 2.0], 1: [0.5, 1.5]}[direction]
+        np.testing.assert_allclose([event.time for event in found.events], np.array(turns) - phase, atol=2e-3)
+
+
+@pytest.mark.parametrize("back", [0.2, -1e-3, -1e-6])
+def test_a_reset_moves_its_guard_away_from_zero_in_any_unit(back):
+    times = []
+    for size in (1.0, 1e-9, 1e-50, 1e6):
+        reset = {"slide.displacement": back * size}
+        model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement"), reset=reset))
+        events = run(model, {"slide.displacement": size}, integrator=mbd.RungeKutta853(), dt=1e-2, until=0.6).events
+        times.append([event.time for event in events])
+    assert 1 <= len(times[0]) < 30
+    for each in times[1:]:
+        np.testing.assert_allclose(each, times[0], rtol=1e-12)
+
+
 def test_a_reset_to_a_number_sets_it():
     model = pendulum()
     model.constrain(mbd.Event("bottom", mbd.measure("hinge.angle"), direction=-1, reset={"hinge.rate": -1.0}))

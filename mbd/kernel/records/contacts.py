@@ -66,6 +66,8 @@ class Events(SchemeAbilities):
     guards0: Reals = reals(lambda s: s.n_watched, kept=True)  # at the accepted state
     guards1: Reals = reals(lambda s: s.n_watched)  # at the candidate
     side: Reals = reals(lambda s: s.n_guards, kept=True)  # sign of each user guard since it last crossed
+    passing: Integers = integers(lambda s: s.n_guards, kept=True)  # 1: crosses at this instant, its side is not known
+    met: Reals = reals(lambda s: 2 * s.n_guards, kept=True)  # values and rates of these before the event did anything
     direction: Integers = integers()
     notify: Integers = integers(lambda s: s.n_contacts + s.n_guards + s.n_frictions)
     crossed: Reals = reals(lambda s: s.n_guards)  # from the start of the step to an event without a restart, or < 0

@@ -333,11 +333,14 @@ def explicit_error(K: Memory, h: float) -> None:
 
 
 def part_of(five: float, three: float) -> float:
-    """``e₅ / √(e₅² + e₃²/100)`` of sizes however large: a step into a steep wall has some whose squares overflow."""
+    """``e₅ / √(e₅² + e₃²/100)`` of sizes whose squares overflow, as in a step into a steep wall, or underflow.
+
+    Straight sliding in space has sideways errors of some 1e-200.
+    """
     large = max(five, three)
     if large == 0.0:
         return 0.0
-    if large > 1e150:
+    if not 1e-150 < large < 1e150:
         five /= large
         three /= large
     return five / sqrt(five * five + 0.01 * three * three)

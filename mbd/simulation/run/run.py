@@ -18,7 +18,7 @@ from mbd.simulation.diagnostics.fastest import stability
 from mbd.simulation.diagnostics.reach import out_of_reach
 from mbd.simulation.diagnostics.singular import at_singular_configuration
 from mbd.simulation.diagnostics.turning import first_reversed, overturned
-from mbd.simulation.run.begin import begin, check_rank, guard_values, notify, set_side
+from mbd.simulation.run.begin import begin, check_rank, notify
 from mbd.simulation.run.control import apply_reset, arrive, begin_controllers, call_controllers
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.ends import advance, call, close
@@ -236,27 +236,15 @@ class Run(RunData):
 
     def _react(self, happened: Sequence[EventRecord]) -> str:
         """Resets, controllers and endings of the events just logged; the name of the event that ends the run."""
-        guards = {guard.name: e for e, guard in enumerate(self.manager.guards)}
+        guards = {guard.name: guard for guard in self.manager.guards}
         ended = ""
         for event in happened:
             if event.kind not in ("closed", "event"):
                 continue
-            guard = self.manager.guards[guards[event.name]] if event.kind == "event" else None
+            guard = guards[event.name] if event.kind == "event" else None
             if guard is not None and guard.reset is not None:
-                self._reset(guards[event.name])
+                apply_reset(self, guard)
             call_controllers(self, event.name)
             if event.name == self.stop or (guard is not None and guard.terminal):
                 ended = event.name
         return ended
-
-    def _reset(self, e: int) -> None:
-        """Apply the reset of a user's guard at zero; one that turns its motion around will cross from the same side."""
-        place = self.kernel.at_user + e
-        before = guard_values(self)
-        apply_reset(self, self.manager.guards[e])
-        guards, rate = guard_values(self), place + self.kernel.n_guards
-        stays = guards[place] == before[place]  # 'linear' location leaves it near zero, on either side
-        if abs(guards[place]) > 1e-9 and not stays:
-            set_side(self, e, guards)
-        elif before[rate] * guards[rate] <= 0.0:
-            self.kernel.side[e] *= -1.0
