@@ -18,7 +18,7 @@ from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, LOG_EVENT, STICK
 from mbd.kernel.contact_modes import NO_IMPULSE, log_event
 from mbd.kernel.guard_round_off import guard_round_off
 from mbd.kernel.guards import gap_tolerance, is_watched
-from mbd.kernel.records import Guards, Switching
+from mbd.kernel.records import Events, Guards, Switching
 
 __all__ = [
     "find_crossings",
@@ -55,7 +55,7 @@ def find_crossings(K: Switching) -> None:
                 mark(K, e)
 
 
-def mark(K: Guards, e: int) -> None:
+def mark(K: Events, e: int) -> None:
     """Guard e crosses now; its value and rate are kept for `settle_sides`."""
     K.passing[e] = 1
     K.met[e] = K.guards0[K.at_user + e]
@@ -90,7 +90,7 @@ def striking_contact(K: Guards) -> int:
     return -1
 
 
-def find_passed(K: Guards) -> None:
+def find_passed(K: Events) -> None:
     """Mark the guards that are beyond zero at the end of a non-smooth step whose end lies below a contact's surface."""
     for e in range(K.n_guards):
         K.passing[e] = 0

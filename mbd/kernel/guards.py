@@ -64,7 +64,7 @@ CLOSE_BY = 1e-3
 LOST = 1e-10
 """Part of its terms by which a gap may fall though its rate is none or positive at both ends of a step [-]."""
 CLEARLY = 16.0
-"""Round-offs of a guard by which it has gone back; a contact at its surface may leave it off zero by some of them [-]."""
+"""Round-offs of a guard by which it has gone back; a contact at its surface may leave it off by some of them [-]."""
 APART = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 

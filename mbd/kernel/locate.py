@@ -25,7 +25,7 @@ from mbd.kernel.guard_sides import striking_contact
 from mbd.kernel.guards import along_slip, gap_scale, gap_tolerance, guard_value, is_watched, judge
 from mbd.kernel.hermite import first_guess
 from mbd.kernel.records import Events, Guards, Kernel, Switching
-from mbd.kernel.refine import refine
+from mbd.kernel.refine import enough, refine
 from mbd.kernel.trial_step import try_step
 
 __all__ = ["locate"]
@@ -235,12 +235,11 @@ def guard_rate(K: Guards, kind: int, index: int) -> float:
     return 0.0
 
 
-def find_way(K: Kernel, kind: int, index: int, high: float) -> float:
+def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> float:
     """Distance at which what began just now (sliding, parting, a pull) is seen by steps shorter than one that does not.
 
-    0 if none sees it; − status if a step fails.
+    It is seen where the guard is above `tiny`. 0 if none sees it; − status if a step fails.
     """
-    tiny = gap_tolerance(K, index) if kind == CLOSE else 0.0
     low = high
     for _ in range(MOST_LOOKS):
         low *= 0.5
@@ -278,8 +277,12 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
     else:
         event_at_start(K)
     f_low = guard_value(K, kind, index, t + low)
-    if f_low <= 0.0 and (kind == STICK or kind == CLOSE or kind == PRESS):
-        low = find_way(K, kind, index, high)
+    near = gap_tolerance(K, index) if kind == CLOSE else 0.0
+    if kind == PRESS or kind == OPEN_FORCE:  # its last event left its force at round-off, which is no root
+        near = enough(K, kind, index, f_low, f_high)
+    begun = f_low <= 0.0 and (kind == STICK or kind == CLOSE or kind == PRESS)
+    if begun or (0.0 < f_low <= near and kind != CLOSE):
+        low = find_way(K, kind, index, high, near)
         if low < 0.0:
             return int(-low)
         if low == 0.0:

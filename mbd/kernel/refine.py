@@ -7,7 +7,7 @@ from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, OPEN_GAP, WATCH
 from mbd.kernel.guards import gap_tolerance, guard_value
 from mbd.kernel.records import ContactRows, Kernel
 
-__all__ = ["refine"]
+__all__ = ["enough", "refine"]
 
 NO_MOVE = 1e300
 """What `interpolated` gives where its move is not to be trusted."""

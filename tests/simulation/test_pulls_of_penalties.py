@@ -53,3 +53,35 @@ def test_fuzzed_feet_do_not_pull_just_before_they_open(number):
     run = run_of(made)
     faults = judge(run, made.model, made.parameters).faults
     assert not faults, list(map(str, faults))
+
+
+def backlash(seed):
+    """A rotor that rattles in the dead band of a load, by meshes that release as they would pull, in any unit."""
+    rng = np.random.default_rng(seed)
+    unit = 10.0 ** rng.uniform(-3.0, 3.0)
+    damping, stiffness = unit * 10.0 ** rng.uniform(-0.6, 0.0), unit * 10.0 ** rng.uniform(3.0, 3.7)
+    model = mbd.Model("backlash", gravity=(0, 0, 0))
+    rotor = mbd.RigidBody("rotor", 0.1 * unit, (0.001 * unit,) * 3)
+    load = mbd.RigidBody("load", 0.1 * unit, (0.05 * unit,) * 3)
+    gap = mbd.Revolute("gap", load.origin, rotor.origin)
+    model.connect(mbd.Revolute("out", model.ground.origin, load.origin, loss=mbd.Viscous(0.02 * unit)), gap)
+    law = {"stiffness": stiffness, "damping": damping, "release": "pull"}
+    model.constrain(mbd.Penalty("lower", mbd.extension(gap, -0.02), **law))
+    model.constrain(mbd.Penalty("upper", mbd.flexion(gap, -0.02), **law))
+    motor = mbd.Applied("motor", rotor.origin, torque=lambda t: (0.0, 0.0, 0.3 * unit * mbd.sin(20 * t)))
+    model.apply(motor)
+    return model
+
+
+@pytest.mark.parametrize("tol", [1e-5, 1e-7, 1e-8])
+def test_meshes_that_release_as_they_would_pull_rattle_as_often_with_any_step(tol):
+    for seed in range(5):
+        model = backlash(seed)
+        start = mbd.assemble(model)
+        runs = [
+            mbd.simulate(model, start, scheme, until=0.3, **step)
+            for scheme, step in ((mbd.RungeKutta853(), {"tol": tol}), (mbd.RungeKutta853(), {"dt": 1e-4}))
+        ]
+        names = [[(event.name, event.kind) for event in run.events] for run in runs]
+        assert names[0] == names[1] and len(names[0]) > 3, seed
+        assert runs[0]["out.angle"][-1] == pytest.approx(runs[1]["out.angle"][-1], abs=20.0 * tol)
