@@ -368,8 +368,8 @@ def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
         return float(-K.guards1[index])
     if kind == OPEN_FORCE:
         return float(K.guards1[K.at_force + index])
-    if kind == PRESS:
-        return float(-K.guards1[K.at_force + index])
+    if kind == PRESS:  # below the surface, to which it may come back within the step
+        return float(max(K.guards1[index], -K.guards1[K.at_force + index]))
     if kind == WATCH:
         condition = float(K.guards1[K.at_condition + index])
         return -condition if condition != 0.0 else 1e-300  # watched only above zero

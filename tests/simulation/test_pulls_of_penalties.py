@@ -75,7 +75,7 @@ def backlash(seed):
 
 @pytest.mark.parametrize("tol", [1e-5, 1e-7, 1e-8])
 def test_meshes_that_release_as_they_would_pull_rattle_as_often_with_any_step(tol):
-    for seed in range(5):
+    for seed in range(4):
         model = backlash(seed)
         start = mbd.assemble(model)
         runs = [
@@ -84,4 +84,6 @@ def test_meshes_that_release_as_they_would_pull_rattle_as_often_with_any_step(to
         ]
         names = [[(event.name, event.kind) for event in run.events] for run in runs]
         assert names[0] == names[1] and len(names[0]) > 3, seed
+        times = [[event.time for event in run.events] for run in runs]
+        np.testing.assert_allclose(*times, atol=2.0 * tol)
         assert runs[0]["out.angle"][-1] == pytest.approx(runs[1]["out.angle"][-1], abs=20.0 * tol)
