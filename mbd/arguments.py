@@ -53,7 +53,9 @@ def _sentence(
     parameters = list(inspect.signature(function).parameters.values())[own:]
     known = {each.name: each for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)}
     placed = [each.name for each in known.values() if each.kind is not each.KEYWORD_ONLY][: len(given) - own]
-    faults = [f"{name} has no argument {wrong!r}{_meant(wrong, known)}" for wrong in named if wrong not in known]
+    anything = any(each.kind is each.VAR_KEYWORD for each in parameters)
+    unknown = [] if anything else [wrong for wrong in named if wrong not in known]
+    faults = [f"{name} has no argument {wrong!r}{_meant(wrong, known)}" for wrong in unknown]
     faults += [f"{name} got {each!r} twice" for each in placed if each in named]
     needed = [
         repr(each.name)
@@ -71,7 +73,25 @@ def _sentence(
     return f"{'; '.join(faults) or own_words}; it takes {name}({listed})"
 
 
+MEANT = {
+    "dt": ("step", "h", "timestep", "time_step", "step_size", "stepsize", "max_step", "delta_t", "deltat"),
+    "until": ("t_end", "tend", "end", "end_time", "t_final", "tf", "tmax", "t_max", "T", "t_span", "duration", "stop"),
+    "integrator": ("method", "solver", "scheme"),
+    "tol": ("rtol", "atol", "tolerance", "eps", "accuracy"),
+    "start": ("x0", "y0", "q0", "initial", "initial_state", "state"),
+    "parameters": ("params", "args", "values"),
+    "position": ("q", "q0", "positions", "coordinates"),
+    "velocity": ("v", "qd", "v0", "velocities", "rates"),
+    "torque": ("moment", "tau"),
+    "damping": ("c", "damper"), "stiffness": ("k",), "mass": ("m",),
+}  # fmt: skip
+"""Words of other programs for an argument."""
+
+
 def _meant(wrong: str, known: Mapping[str, Any]) -> str:
+    for right, others in MEANT.items():
+        if wrong in others and right in known:
+            return f"; did you mean {right!r}?"
     close = difflib.get_close_matches(wrong, known, n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else ""
 

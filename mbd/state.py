@@ -133,7 +133,19 @@ class State:
         own = [*self.names, *self.velocity_names]
         wholes = {each[:-2] for each in own if each.endswith(".x") and f"{each[:-2]}.y" in own}
         wholes = {each for each in wholes if "." in each}
-        raise UnknownNameError(nearest(name, [*own, *wholes], "coordinate or rate", "The state has", beside))
+        raise UnknownNameError(
+            nearest(name, [*own, *wholes], "coordinate or rate", "The state has", beside) + self._alone()
+        )
+
+    def _alone(self) -> str:
+        """Why a state has coordinates and rates alone; nothing of one that knows its model."""
+        known = _MODELS.get(self)
+        if known is not None and known() is not None:
+            return ""
+        why = "it was made by hand, copied or read from a file" if known is None else (
+            "the model was not kept; let the function that makes both return it too, as in 'return model, state'"
+        )  # fmt: skip
+        return f". Results such as places of bodies follow from the model, which this state does not know: {why}"
 
     def _result(self, name: str) -> tuple[Any, Sequence[str]]:
         """What a run would tell of it, and names of results; nothing of a state that knows no model."""

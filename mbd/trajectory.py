@@ -313,6 +313,15 @@ class Trajectory:
 
         return dataframe(self, names, at, side)
 
+    def to_csv(
+        self, path: str | Path, names: Sequence[str] | None = None, at: ArrayLike | None = None,
+        side: OneSide | None = None,
+    ) -> Path:  # fmt: skip
+        """Write `to_dataframe` as a file of comma-separated values."""
+        from mbd.results.tables import csv_file
+
+        return csv_file(self, path, names, at, side)
+
     def to_xarray(
         self, names: Sequence[str] | None = None, at: ArrayLike | None = None, side: OneSide | None = None
     ) -> Any:

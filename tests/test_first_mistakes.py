@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -287,3 +289,97 @@ def test_a_state_of_cut_joints_has_their_angles():
     model.connect(mbd.Revolute("hip", model.ground.origin, mbd.Link("leg", 1.0, 1.0, 0.5, 0.1).start))
     start = mbd.assemble(model, {"hip.angle": 0.3}, {"hip.rate": 2.0}, backend="python")
     assert (start["hip.angle"], start["hip.rate"]) == (pytest.approx(0.3), pytest.approx(2.0))
+
+
+# what the first notebooks have ---------------------------------------------------------------------------------------
+def damped(law: Any) -> mbd.Model:
+    model, pin = pendulum()
+    model.apply(mbd.Motor("drag", pin, law, arguments=("pin.rate",)))
+    return model
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda v: -np.sign(v), lambda v: -0.3 * v - 2.0 * mbd.sign(v), lambda v: mbd.where(v > 0, -1.0, 1.0),
+        lambda v: -mbd.sign(v) * (1.0 + v * v),
+    ],
+)  # fmt: skip
+def test_friction_by_the_sign_of_a_velocity_is_doubted_when_it_is_built(law):
+    with pytest.warns(mbd.MbdWarning, match=r"force of 'drag' jumps with the sign of a velocity.*mbd.Coulomb"):
+        mbd.assemble(damped(law), backend="python")
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda v: -0.3 * v, lambda v: -mbd.tanh(v / 0.01), lambda v: -abs(v) * v, lambda v: -mbd.sign(v) * v**2,
+        lambda v: mbd.where(v > 0, -2.0 * v, -v),
+    ],
+)  # fmt: skip
+def test_losses_that_do_not_jump_are_not_doubted(law, recwarn):
+    mbd.assemble(damped(law), backend="python")
+    assert not recwarn.list
+
+
+def kept_alone() -> mbd.State:
+    """A start whose model is not kept."""
+    model, _ = pendulum()
+    return mbd.assemble(model, {"pin.angle": 0.1}, backend="python")
+
+
+def test_a_state_whose_model_is_gone_says_so():
+    start = kept_alone()
+    gc.collect()
+    with pytest.raises(
+        mbd.UnknownNameError, match="no coordinate or rate named 'rod.end'.*the model was not kept; let"
+    ):
+        start["rod.end"]
+    model, _ = pendulum()
+    with pytest.raises(mbd.UnknownNameError, match="it was made by hand, copied or read from a file"):
+        replace(mbd.assemble(model, backend="python"))["rod.end"]
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda m, s: mbd.simulate(m, s, step=1e-3, until=1.0), "no argument 'step'; did you mean 'dt'"),
+        (lambda m, s: mbd.simulate(m, s, dt=1e-3, t_end=1.0), "no argument 't_end'; did you mean 'until'"),
+        (lambda m, s: mbd.simulate(m, s, dt=1e-3, until=1.0, method="RK45"), "did you mean 'integrator'"),
+        (lambda m, s: mbd.sweep(m, {"rod.mass": [1.0]}, s, [], mbd.HHT(), dt=1e-3, until=0.1),
+         "sweep takes 4 arguments without a keyword, 5 came"),
+        (lambda m, s: mbd.sweep(m, {"rod.mass": [1.0]}, s, mbd.HHT(), dt=1e-3, until=0.1),
+         "results must be a list .* not HHT.*; give a scheme as integrator=…"),
+        (lambda m, s: mbd.Rolling("grip", m.ground.origin, 0.1, ground=lambda x: x), "mbd.sphere_touchdown"),
+    ],
+)  # fmt: skip
+def test_words_of_other_programs_are_answered(call, said):
+    model, _ = pendulum()
+    with pytest.raises((TypeError, mbd.ModelError), match=said):
+        call(model, mbd.assemble(model, backend="python"))
+
+
+def test_a_cell_that_was_run_twice_is_answered_with_the_cure():
+    model, _ = pendulum()
+    rod = mbd.Link("rod", length=1.0, **mbd.rod(1.0, length=1.0).link)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    cure = r"where the cell of a notebook was run twice, let it begin with model = mbd.Model"
+    assert [bool(re.search(cure, fault)) for fault in model.check()] == [True, True]
+
+
+def test_a_knee_beyond_its_stop_is_turned_not_raised():
+    model, pin = pendulum()
+    model.constrain(mbd.Unilateral("stop", mbd.flexion(pin)))
+    with pytest.raises(mbd.AssemblyError, match="'stop' starts 0.3 rad beyond its stop; turn the joint the other way"):
+        mbd.assemble(model, {"pin.angle": 0.3}, backend="python")
+
+
+def test_an_event_that_ends_a_run_is_no_success(tmp_path):
+    model, _ = pendulum()
+    model.constrain(mbd.Event("fall", mbd.measure(lambda a: a, "pin.angle"), terminal=True))
+    run = mbd.simulate(model, mbd.assemble(model, {"pin.angle": 0.1}, backend="python"), dt=0.01, until=2.0,
+                       backend="python")  # fmt: skip
+    assert "success" not in str(run) and re.search(r"outcome +ended by 'fall' at t = ", str(run))
+    pytest.importorskip("pandas")
+    lines = run.to_csv(tmp_path / "run", ["pin.angle"]).read_text().splitlines()
+    assert lines[0].split(",")[1] == "pin.angle" and len(lines) == 1 + len(run.time)

@@ -45,7 +45,7 @@ def test_values_and_rates_of_derivatives_are_finite(where, value):
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("x.gif", "name it 'x.html'; it moves"), ("x.PNG", "pictures are those"), ("x.csv", r"to_dataframe\(\)")],
+    [("x.gif", "name it 'x.html'; it moves"), ("x.PNG", "pictures are those"), ("x.csv", r"run.to_csv")],
 )
 def test_a_page_is_not_named_as_something_else(tmp_path, name, said):
     model, _ = falling()

@@ -20,6 +20,7 @@ from mbd.analysis.sweep_runs import SETTINGS, Results, Row, Runs, cell, rows_of
 from mbd.bodies.values import flag, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.integrators import Integrator
 from mbd.notebook import table
 from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
@@ -279,7 +280,10 @@ def _checked(
         faults.append(f"executor must be one of concurrent.futures, such as ThreadPoolExecutor(), not {executor!r}")
     names = isinstance(results, Mapping | Sequence) and not isinstance(results, str | bytes)
     if not names or not all(isinstance(name, str) for name in results):
-        faults.append(f"results must be a list of names of quantities, or functions by title, not {shown(results)}")
+        scheme = "; give a scheme as integrator=…" if isinstance(results, Integrator) else ""
+        faults.append(
+            f"results must be a list of names of quantities, or functions by title, not {shown(results)}{scheme}"
+        )
         results = ()
     if isinstance(results, Mapping) and not all(map(callable, results.values())):
         faults.append(f"results by title must be functions, such as lambda run: run.time[-1], not {shown(results)}")

@@ -298,7 +298,7 @@ def _below(work: Posture, opened: set[str]) -> list[str]:
         off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
         if values[c] < -BELOW and not work.flags[c] and contact.name not in opened and not off:
             inside = (
-                f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} inside its surface; raise the mechanism, "
+                f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} {_beyond(contact.unit)}, "
                 f"name it in closed=[…] to set it on the surface, or in open=[…] to ignore it until it has risen"
             )
             against = (
@@ -307,6 +307,13 @@ def _below(work: Posture, opened: set[str]) -> list[str]:
             )
             faults.append(against if contact.is_velocity else inside)
     return faults
+
+
+def _beyond(unit: str) -> str:
+    """What to try with a gap that is negative: a distance from a surface, or an angle from a stop."""
+    if unit == "rad":
+        return "beyond its stop; turn the joint the other way (check the sign of the angle and of its stop)"
+    return "inside its surface; raise the mechanism"
 
 
 def _armed(work: Posture, opened: set[str]) -> frozenset[str]:

@@ -79,7 +79,12 @@ class Rolling(VelocityConstraint):
         frame_of(self.center, f"center of Rolling '{self.name}'")
         object.__setattr__(self, "radius", number(self.radius, f"radius of '{self.name}'"))
         if not isinstance(self.ground, Plane):
-            raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}")
+            uneven = (
+                "; on ground that is a function or another ball roll by a contact: "
+                f"mbd.Unilateral({self.name!r}, mbd.sphere_touchdown(center, radius, ground)) with friction=None, or "
+                "mbd.rolling_touchdown in the plane"
+            )
+            raise ModelError(f"ground of Rolling '{self.name}' is a mbd.Plane, got {self.ground!r}{uneven}")
         if self.only_while is not None and not isinstance(self.only_while, str):
             raise ModelError(f"only_while of Rolling '{self.name}' is the name of a contact, got {self.only_while!r}")
         object.__setattr__(self, "ball", flag(self.ball, f"ball of Rolling '{self.name}'"))

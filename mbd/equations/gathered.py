@@ -1,4 +1,4 @@
-"""Faults of words, gathered while a model is derived, so that all of them are told at once."""
+"""Faults of words, gathered while a model is derived, so that one error reports all of them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _named(error: ModelError | TraceError, owner: str) -> ModelError | TraceErro
     faults = error.faults if isinstance(error, ModelError) else (str(error),)
     if not owner or all(f"'{owner}" in fault for fault in faults):
         return error
-    told = [fault if f"'{owner}" in fault else f"'{owner}': {fault}" for fault in faults]
-    found = type(error)(told if isinstance(error, ModelError) else told[0])  # type: ignore[arg-type]
+    named = [fault if f"'{owner}" in fault else f"'{owner}': {fault}" for fault in faults]
+    found = type(error)(named if isinstance(error, ModelError) else named[0])  # type: ignore[arg-type]
     found.__cause__ = error
     return found

@@ -29,7 +29,7 @@ COUNTS = {
 def facts(run: Trajectory) -> list[tuple[str, str]]:
     """(title, value) pairs: what was run, how it ended, how well it did, what it cost."""
     time = run.time
-    found = [("outcome", ("success" if run.success else "failure") + (f": {run.message}" if run.message else ""))]
+    found = [("outcome", outcome(run))]
     if len(time):
         found.append(("time", f"{time[0]:g} s to {time[-1]:g} s in {len(time)} stored rows"))
     settings = [f"{run.settings[key]}" for key in ("integrator",) if key in run.settings]
@@ -52,6 +52,16 @@ def facts(run: Trajectory) -> list[tuple[str, str]]:
         found.append(("cost", cost(run)))
     found += [("note", str(note)) for note in run.stats.get("notes", ())]
     return found
+
+
+def outcome(run: Trajectory) -> str:
+    """How a run ended: 'success: reached t = 1 s', 'ended by 'fall' at t = 0.8 s', 'failure: …'.
+
+    An event that was asked for ends a run as it was meant to, but a fall is no success.
+    """
+    if run.success and run.message.startswith("ended by"):
+        return run.message
+    return ("success" if run.success else "failure") + (f": {run.message}" if run.message else "")
 
 
 def cost(run: Trajectory) -> str:

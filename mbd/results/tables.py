@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
 from mbd.errors import TrajectoryError
+from mbd.results.archive import named_file, write_whole
 from mbd.results.interpolation import OneSide, Side
 from mbd.results.long_names import long_name
 from mbd.results.units import unit
@@ -18,7 +20,7 @@ from mbd.results.units import unit
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["columns_of", "dataframe", "dataset", "library", "text_cell"]
+__all__ = ["columns_of", "csv_file", "dataframe", "dataset", "library", "text_cell"]
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With what a formula of a spreadsheet begins."""
@@ -57,6 +59,15 @@ def dataframe(
     frame.attrs["units"] = {"time": "s", **{name: text for name, text in units.items() if text}}
     frame.attrs["long_names"] = {name: long_name(name) for name in columns}
     return frame
+
+
+def csv_file(
+    run: Trajectory, path: str | Path, names: Sequence[str] | None, at: ArrayLike | None, side: OneSide | None
+) -> Path:
+    """See `Trajectory.to_csv`."""
+    target, frame = named_file(path, ".csv"), dataframe(run, names, at, side)
+    write_whole(target, frame.to_csv)
+    return target
 
 
 def columns_of(

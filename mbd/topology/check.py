@@ -126,12 +126,16 @@ def _unknown(model: Description, name: str, known: Iterable[str]) -> str:
     return nearest(name, known, "quantity")
 
 
+AGAIN = "; where the cell of a notebook was run twice, let it begin with model = mbd.Model(…)"
+"""The cure of words that are added to a model again."""
+
+
 # names ----------------------------------------------------------------------------------------------------------
 def name_faults(model: Description) -> list[str]:
     """Two things of one name."""
     bodies = _bodies_by_name(model)
     found = [
-        f"{len(several)} different bodies are named '{name}'; rename them, or use one object"
+        f"{len(several)} different bodies are named '{name}'; rename them, or use one object{AGAIN}"
         for name, several in bodies.items()
         if len(several) > 1
     ]
@@ -149,8 +153,10 @@ def name_faults(model: Description) -> list[str]:
         if counts.total() > 1:
             several_kinds = ", ".join(f"{count} × {kind}" for kind, count in counts.items())
             other = "'ground' is the body that does not move; " if name == model.ground.name else ""
+            again = AGAIN if max(counts.values()) > 1 else ""
             found.append(
                 f"the name '{name}' is used {counts.total()} times ({several_kinds}); {other}give each its own name"
+                f"{again}"
             )
     places: dict[str, Frame] = {}
     for frame in model.points():

@@ -18,7 +18,7 @@ PICTURE = "; pictures are those of run.plot(path=…) and run.final.plot('start.
 OTHERS = {
     **dict.fromkeys((".png", ".svg", ".pdf", ".jpg", ".jpeg"), PICTURE),
     **dict.fromkeys((".gif", ".mp4", ".webm", ".mov", ".avi"), "; it moves, and a recording of the screen is a video"),
-    **dict.fromkeys((".csv", ".xlsx"), "; run.to_dataframe().to_csv(…) writes a table"),
+    **dict.fromkeys((".csv", ".xlsx"), "; run.to_csv(…) writes a table"),
     ".npz": "; run.save(…) writes the run",
 }
 """What is meant by names of files that are no pages, by their suffix."""

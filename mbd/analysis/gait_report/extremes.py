@@ -17,7 +17,7 @@ FINE = 1001
 FEWEST = 9
 """Samples of a part between two events at least, and of each refinement [-]."""
 REFINEMENTS = 4
-"""How often the neighbourhood of the largest sample is sampled anew, each time four times as finely [-]."""
+"""How often the neighbourhood of the largest sample is sampled again, each time four times as finely [-]."""
 
 
 def largest(values: Callable[[Vector, OneSide], Vector], begin: float, end: float, breaks: Sequence[float]) -> float:

@@ -135,7 +135,8 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
             notes += _overshot(run, columns, contact)
         notes += short
         if run.kernel.row_bounds[1 + number] > 0.0:
-            notes += _pulled(record, number, contact)
+            held = _pulled(record, number, contact)
+            notes, doubts = notes + held, doubts + held
         doubts += blind
     return notes, doubts
 
