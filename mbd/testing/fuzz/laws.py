@@ -216,10 +216,13 @@ def drives(found: Faults, bodies: Bodies, run: Any) -> None:
 
 
 def _second(function: Any, t: Array) -> tuple[Array, Array]:
-    """d²f/dt² by central differences, and where two of them agree, so that nothing jumps there."""
-    fine, coarse = ((function(t + d) - 2.0 * function(t) + function(t - d)) / d**2 + 0.0 * t for d in (5e-5, 1e-4))
-    scale = np.max(np.abs(function(t)), initial=1.0)
-    return np.asarray(coarse), np.abs(fine - coarse) <= 1e-3 * np.max(np.abs(coarse), initial=0.0) + 1e-6 * scale
+    """d²f/dt² by central differences, and where those on both sides agree, so that nothing jumps there."""
+    d = 1e-4
+    before, there, after = (
+        (function(s + d) - 2.0 * function(s) + function(s - d)) / d**2 + 0.0 * t for s in (t - 2.0 * d, t, t + 2.0 * d)
+    )
+    size, scale = np.max(np.abs(there), initial=0.0), np.max(np.abs(function(t)), initial=1.0)
+    return np.asarray(there), np.abs(after - before) <= 0.02 * size + 1e-6 * scale
 
 
 def _slip(word: mbd.Rolling, bodies: Bodies) -> Array:

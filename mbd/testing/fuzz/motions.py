@@ -43,13 +43,18 @@ def _table(rng: random.Random, start: float, size: float, w: float) -> mbd.Sampl
     """A smooth motion as samples at a rate of a laboratory."""
     rate, length = rng.choice([50.0, 100.0, 200.0]), rng.uniform(0.3, 1.5)
     t = np.arange(0.0, length, 1.0 / rate)
-    return mbd.Samples(t, start + size * np.sin(w * t))
+    return mbd.Samples(t, start + size * np.sin(w * t), **_curve(rng))
 
 
 def _short_table(rng: random.Random, start: float, size: float, end: float) -> mbd.Samples:
     """Few samples at uneven times, held behind the last."""
     t = np.cumsum([0.0, *(end * rng.uniform(0.2, 1.0) for _ in range(rng.randint(2, 6)))])
-    return mbd.Samples(t, [start, *(start + size * rng.uniform(-1, 1) for _ in t[1:])])
+    return mbd.Samples(t, [start, *(start + size * rng.uniform(-1, 1) for _ in t[1:])], **_curve(rng))
+
+
+def _curve(rng: random.Random) -> dict[str, Any]:
+    """The curve through samples: at rest at their ends, mostly, where it is a spline."""
+    return rng.choice([{}, {"kind": "spline", "ends": "clamped"}, {"kind": "spline", "ends": "clamped"}])
 
 
 def _cycle(rng: random.Random, start: float, size: float) -> mbd.Samples:

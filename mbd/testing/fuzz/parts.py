@@ -101,7 +101,7 @@ def add_loads(rng: random.Random, model: mbd.Model, spatial: bool) -> None:
     w, size = rng.uniform(1.0, 6.0), rng.uniform(0.5, 3.0)
     turning = last.origin if size > 1.5 and not isinstance(last, mbd.PointMass) else None
     single = [joint for joint in model.joints if len(joint.labels) == 1]
-    samples = mbd.Samples([0.0, 0.11, 0.2, 0.45], [0.5, -1.0, 2.0, 0.3], kind=rng.choice(["cubic", "linear"]))
+    samples = mbd.Samples([0.0, 0.11, 0.2, 0.45], [0.5, -1.0, 2.0, 0.3], kind=rng.choice(["monotone", "linear"]))
     makers: list[Callable[[], Any]] = [
         lambda: mbd.Spring("spring", anchor, point(last), rng.uniform(3.0, 40.0), length=rng.uniform(0.3, 2.0)),
         lambda: mbd.Damper("damper", anchor, point(last), mbd.Viscous(rng.uniform(0.2, 1.5)) + mbd.Quadratic(0.2)),

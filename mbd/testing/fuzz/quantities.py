@@ -33,7 +33,7 @@ def value_of(value: Any, arguments: Any, bodies: Bodies, owner: str, field: str)
     if f"{owner}.{field}" in parameters:
         return parameters[f"{owner}.{field}"]
     if isinstance(value, mbd.Samples):
-        return _signal(value, bodies.told.time)
+        return _signal(value, bodies.told.instants, "spline" if field in ("value", "bias") else "monotone")
     if callable(value):
         return value(*[_argument(label, given, bodies, owner) for label, given in arguments])
     if isinstance(value, int | float):
@@ -47,7 +47,7 @@ def triple(value: Any, arguments: Any, bodies: Bodies, owner: str, field: str) -
     if isinstance(value, tuple):
         parts = [value_of(v, arguments, bodies, owner, f"{field}.{a}") for v, a in zip(value, "xyz", strict=True)]
     elif isinstance(value, mbd.Samples):
-        parts = [_signal(part, bodies.told.time) for part in value.components]
+        parts = [_signal(part, bodies.told.instants) for part in value.components]
     else:
         found = value_of(value, arguments, bodies, owner, field)
         parts = list(found) if isinstance(found, tuple | list) else [0.0, 0.0, found]
@@ -55,15 +55,19 @@ def triple(value: Any, arguments: Any, bodies: Bodies, owner: str, field: str) -
     return np.stack([np.broadcast_to(np.asarray(part, dtype=float), (n,)) for part in parts], axis=1)
 
 
-def _signal(samples: mbd.Samples, time: Array) -> Array:
-    """The signal between its samples, constant beyond them or repeated."""
-    first, last = samples.time[0], samples.time[-1]
-    inside = first + np.mod(time - first, last - first) if samples.periodic else np.clip(time, first, last)
-    if samples.kind == "linear":
-        return np.asarray(np.interp(inside, samples.time, samples.values))
-    from scipy.interpolate import PchipInterpolator
+def _signal(samples: mbd.Samples, time: Array, kind: str = "monotone") -> Array:
+    """The signal between its samples, constant beyond them or repeated; `kind` is the curve where none was given."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator
 
-    t, values = np.asarray(samples.time), np.asarray(samples.values)
+    t, values, kind = np.asarray(samples.time), np.asarray(samples.values), samples.kind or kind
+    first, last = t[0], t[-1]
+    inside = first + np.mod(time - first, last - first) if samples.periodic else np.clip(time, first, last)
+    if kind == "linear":
+        return np.asarray(np.interp(inside, t, values))
+    if kind == "spline":
+        return np.asarray(CubicSpline(t, values, bc_type="periodic" if samples.periodic else samples.ends)(inside))
+    if kind != "monotone":
+        raise NotImplementedError(f"samples of kind {kind!r}")
     if samples.periodic:  # slopes at the seam are those of a long table
         t = np.concatenate([t[:-1] - (last - first), t, t[1:] + (last - first)])
         values = np.concatenate([values[:-1], values, values[1:]])
@@ -87,7 +91,7 @@ def named(name: str, bodies: Bodies) -> Array:
     """A named quantity: the time, or what the run reports under the name."""
     told = bodies.told
     if name == "t":
-        return told.time
+        return told.instants
     if name in told:
         return told[name]
     stem, _, last = name.rpartition(".")
@@ -144,7 +148,7 @@ def gap_of(measure: Any, bodies: Bodies) -> Gap:
 
 def _on_surface(measure: Touchdown, bodies: Bodies) -> Gap:
     """(y − H)/√(1 + H_x² + H_z²) and its derivatives by complex steps."""
-    p, t = bodies.place(measure.point), bodies.told.time
+    p, t = bodies.place(measure.point), bodies.told.instants
     surface: Any = measure.ground
     names = surface.arguments
 

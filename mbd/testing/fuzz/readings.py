@@ -15,6 +15,9 @@ from mbd.topology.plan import plan
 
 __all__ = ["Readings", "names_for", "readings"]
 
+BEFORE = 1e-12
+"""How much earlier than a jump its left side is read, over the time and a second [-]."""
+
 
 @dataclass(frozen=True)
 class Readings:
@@ -26,6 +29,7 @@ class Readings:
     parameters : values of the parameters, one number or (n,) each
     tree : names of the joints of the tree and of their coordinates, from which bodies are placed; not those of cut
         joints, whose rates and accelerations agree with theirs to the order of the scheme only
+    ends : (n,) whether a row is the first of two of one time, or False
     """
 
     time: Array
@@ -33,6 +37,12 @@ class Readings:
     closed: Mapping[str, Any]
     parameters: Mapping[str, Any]
     tree: frozenset[str]
+    ends: Any = False
+
+    @property
+    def instants(self) -> Array:
+        """Times at which functions of time have their values: before a jump, at the first of two rows of one time."""
+        return np.asarray(self.time - np.where(self.ends, BEFORE * (1.0 + self.time), 0.0))
 
     def __len__(self) -> int:
         return len(self.time)
@@ -69,6 +79,7 @@ class Readings:
             {name: value[chosen] for name, value in self.closed.items()},
             parameters,
             self.tree,
+            self.ends[chosen] if np.ndim(self.ends) else self.ends,
         )
 
 
@@ -123,7 +134,8 @@ def readings(run: mbd.Trajectory, model: mbd.Model, given: Mapping[str, float], 
     contacts = [contact.name for contact in model.contacts]
     closed = {name: record.closed[source, k].astype(bool) for k, name in enumerate(contacts)}
     changed = _changed(run, parameters, source)
-    return Readings(time, values, closed, changed, tree)
+    ends = np.append(np.diff(time) == 0.0, False) if times is None and len(time) else False
+    return Readings(time, values, closed, changed, tree, ends)
 
 
 def _changed(run: mbd.Trajectory, parameters: Mapping[str, float], source: Any) -> dict[str, Any]:

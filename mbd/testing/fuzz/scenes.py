@@ -128,7 +128,7 @@ def _driven(rng: random.Random, made: Scene) -> Scene:
         options.pop("tol", None)
         steps = 10.0 ** (rng.uniform(0.7, 1.7) if explicit else rng.uniform(1.3, 2.7))
         options |= {"dt": min(until / steps, LONGEST), "until": until}
-    if options.get("contact") == "nonsmooth" and "tol" in options:
+    if options.get("contact") == "nonsmooth" and ("tol" in options or form.kind == "stribeck"):
         options["contact"] = "events"
     check = rng.choice(["", "cut", "between", "schemes", "schemes", "step there", "restart", "one ulp"])
     if "tol" in options:
