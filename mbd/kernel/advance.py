@@ -37,7 +37,7 @@ from mbd.kernel.guard_sides import settle_sides, striking_contact
 from mbd.kernel.guard_substeps import parts_to_take
 from mbd.kernel.guards import is_quiet, judge, update_armed, update_sides
 from mbd.kernel.hooks import scheme_accept
-from mbd.kernel.locate import locate
+from mbd.kernel.locate import find_jump, locate
 from mbd.kernel.nonsmooth import closes_below_surface, must_release
 from mbd.kernel.nonsmooth_cones import hold_for_step
 from mbd.kernel.observe import is_awaited, store_row
@@ -273,7 +273,8 @@ def end_unlocated(K: Kernel, h: float, t1: float) -> int:
     if must_release(K, t1) > 0:
         return CHATTER if K.n_repeats > K.max_switches else -1
     if closes_below_surface(K):
-        return land(K, h, t1)
+        status = find_jump(K, h, t1)
+        return land(K, h, t1) if status == 0 else status
     K.n_repeats = 0
     return 0
 

@@ -28,12 +28,14 @@ from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.refine import enough, refine
 from mbd.kernel.trial_step import try_step
 
-__all__ = ["locate"]
+__all__ = ["find_jump", "locate"]
 
 MOST_LOOKS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
 JUMP = 1e-6
 """Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
+UNEXPLAINED = 0.5
+"""What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
 EARLIER, LATER = -2, -1
@@ -153,16 +155,40 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
     status = bracket(K, kind, index, low, end)
     if status != 0:
         return status
-    if K.event_kind == CLOSE and K.event_after > 0.0 and K.kind[index] == 0 and K.linear == 0:
-        if K.row_unit[K.normal[index]] == 1 and abs(K.guards1[index]) > JUMP * gap_scale(K, index):
-            K.failure_index = index
-            return JUMPED  # an angle that is nowhere zero, as a twist at half a turn
+    if K.event_kind == CLOSE and K.event_after > 0.0 and K.kind[index] == 0 and K.linear == 0 and jumps(K, index):
+        return JUMPED
     if (
         K.event_kind >= 0 and K.event_after > 0.0 and kind == CLOSE and left_alone(K, index)
     ):  # not watched any more there
         K.active[index] = 1
         K.event_kind = -1
     return 0 if K.event_kind >= 0 else try_step(K, end, K.time + end)
+
+
+def jumps(K: Switching, c: int) -> bool:
+    """Whether the angle of contact c is nowhere zero as it closes, as a twist at half a turn: K.failure_index."""
+    if K.row_unit[K.normal[c]] != 1 or abs(K.guards1[c]) <= JUMP * gap_scale(K, c):
+        return False
+    K.failure_index = c
+    return True
+
+
+def find_jump(K: Kernel, h: float, t1: float) -> int:
+    """JUMPED where an angle whose contact closes in a step that is not located (K.closing) jumps past zero within it.
+
+    It is looked for where the rates at both ends of the step do not explain how far the angle went.
+    """
+    for c in range(K.n_contacts):
+        if K.closing[c] == 1 and K.row_unit[K.normal[c]] == 1 and K.guards0[c] > 0.0:
+            mean = 0.5 * (K.guards0[K.at_gap_rate + c] + K.guards1[K.at_gap_rate + c])
+            if abs(K.guards1[c] - K.guards0[c] - h * mean) > UNEXPLAINED:
+                status = bracket(K, CLOSE, c, 0.0, h)
+                if status == 0 and K.event_after > 0.0 and jumps(K, c):
+                    return JUMPED
+                status = try_step(K, h, t1)
+                if status != 0:
+                    return status
+    return 0
 
 
 def another_before(K: Switching, kind: int, index: int, found: float) -> bool:

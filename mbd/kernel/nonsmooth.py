@@ -20,8 +20,8 @@ from mbd.kernel.complementarity import complementarity
 from mbd.kernel.contact_modes import NO_IMPULSE, STILL, log_event
 from mbd.kernel.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.nonsmooth_cones import hold_together, release_both, turned_in_plane
-from mbd.kernel.records import Balance, ContactForces, ContactRows, Guards, Switching
-from mbd.kernel.restart import consistent, displace, evaluate, is_held, largest_force
+from mbd.kernel.records import Balance, ContactForces, ContactRows, Contacts, Guards, Reals, Switching
+from mbd.kernel.restart import consistent, displace, evaluate, is_held, largest_force, take_consistent
 from mbd.kernel.switching import close_by_impact, mark_touching
 
 __all__ = ["keep", "closes_below_surface", "must_release", "put_back", "rebound", "strike"]
@@ -45,8 +45,11 @@ def must_release(K: Switching, t1: float) -> int:
     count = 0
     if K.n_cones > 0 and hold_together(K, t1, force):
         return 0
+    doubtful = largest_tension(K, K.lam1) > PULL * force  # multipliers of a step may oscillate: consistent ones decide
+    known = doubtful and consistent(K, t1, K.q1, K.y1) == 0
     for c in range(K.n_contacts):
-        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and pulls(K, c, PULL * force, t1):
+        pull = K.impulse[K.normal[c]] if known else K.lam1[K.normal[c]]
+        if doubtful and may_release(K, c) and pull > PULL * force:
             K.closed[c] = 0
             K.armed[c] = 1
             count += 1
@@ -77,12 +80,18 @@ def must_release(K: Switching, t1: float) -> int:
     return count
 
 
-def pulls(K: Balance, c: int, least: float, t1: float) -> bool:
-    """Whether a contact pulled at the candidate, by consistent multipliers: those of a step may oscillate."""
-    row = K.normal[c]
-    if K.lam1[row] <= least:
-        return False
-    return bool(consistent(K, t1, K.q1, K.y1) != 0 or K.impulse[row] > least)
+def may_release(K: Contacts, c: int) -> bool:
+    """Whether contact c is closed and opens on pull."""
+    return bool(K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0)
+
+
+def largest_tension(K: Contacts, lam: Reals) -> float:
+    """The most with which a contact that opens on pull does so by these multipliers; 0 where none does."""
+    largest = 0.0
+    for c in range(K.n_contacts):
+        if may_release(K, c):
+            largest = max(largest, lam[K.normal[c]])
+    return largest
 
 
 def closes_below_surface(K: Guards) -> bool:
@@ -181,16 +190,15 @@ def touches(K: ContactRows) -> bool:
 
 
 def strike(K: Switching, h: float, t1: float) -> int:
-    """The candidate becomes the accepted state, lifted out of the surfaces."""
+    """The candidate becomes the accepted state, lifted out of the surfaces; multipliers of its row do not pull."""
     K.before[: K.n_contacts] = K.guards0[K.at_gap_rate : K.at_gap_rate + K.n_contacts]
     accept_candidate(K, t1)
-    status = project_gaps(K)
-    if status != 0:
-        return status
     for k in range(K.n_rows):
         K.past[k] = h * K.lam[k]
     K.past_time = h
-    return 0
+    if largest_tension(K, K.lam) > 0.0 and consistent(K, t1, K.q, K.y) == 0:
+        take_consistent(K)
+    return project_gaps(K)
 
 
 def rebound(K: Switching) -> int:

@@ -162,3 +162,40 @@ def test_switches_that_come_back_are_found_before_there_are_too_many(length):
     assert instants([*[(0, -1.0 - k) for k in range(5)], *cycle * 40]) < 100 - 20
     assert instants([(k % 2, 0.5**k) for k in range(100)]) is None  # impacts that become slower come to an end
     assert instants([(k % 2, 0.5**k) for k in range(200)]) == 100
+
+
+def stopped_chain(rng):
+    """Three bodies on ball joints, each within a cone and two stops of twist, thrown about."""
+    model, last, speeds = mbd.Model("chain"), None, {}
+    last = model.ground.origin
+    for k in range(3):
+        body = mbd.RigidBody(f"body {k}", rng.uniform(0.5, 4.0), tuple(rng.uniform(0.03, 0.05, 3)))
+        ball = mbd.Spherical(f"ball {k}", last, body.point(0.0, rng.uniform(0.2, 0.5), 0.0))
+        model.connect(ball)
+        limits = rng.uniform(0.3, 0.9, 3)
+        stops = {
+            "cone": mbd.cone(ball, limits[0]),
+            "more": mbd.twist(ball, limits[1]),
+            "less": mbd.twist(ball, -limits[2]),
+        }
+        for name, measure in stops.items():
+            model.constrain(mbd.Unilateral(f"{name} {k}", measure, restitution=rng.choice([0.0, 0.5])))
+        speeds |= {
+            f"ball {k}.angular_velocity.{axis}": speed
+            for axis, speed in zip("xyz", 4.0 * rng.normal(size=3), strict=True)
+        }
+        last = body.point(0.0, -rng.uniform(0.1, 0.4), 0.0)
+    return model, mbd.assemble(model, velocity=speeds)
+
+
+@pytest.mark.parametrize("seeds", [(9, 12, 15), pytest.param(range(60), marks=pytest.mark.slow)])
+def test_no_stop_of_a_chain_pulls_in_non_smooth_steps_however_long(seeds):
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        model, start = stopped_chain(rng)
+        dt = rng.uniform(0.004, 0.02)
+        run = mbd.simulate(
+            model, start, SCHEMES[seed % 6], dt=dt, until=1.0, contact="nonsmooth", on_failure="return",
+        )  # fmt: skip
+        forces = np.array([run[f"{each.name}.force"] for each in model.constraints])
+        assert np.min(forces) >= -1e-9 * np.max(forces), seed
