@@ -81,7 +81,7 @@ SPOILED = {
     "j3b": "crank angle", "j5": "period", "j6": "contact duration", "j7": "wall at d(1 - 0.001)", "j8": "Zeno time",
     "j9": "corner impulses", "j9b": "velocity after", "j10": "first lift-off time", "j11": "minimum-norm leg forces",
     "j11b": "three contacts", "j13": "A for the two", "j14": "tension", "j15": "smallest closure error",
-    "j16": "x and v", "j18": "hip torque",
+    "j16": "x and v", "j18": "hip torque", "j19": "knee torque", "j20": "angle",
 }  # fmt: skip
 """One reference of each case that is spoiled by a thousandth; those of long runs are left out."""
 

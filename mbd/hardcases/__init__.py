@@ -30,6 +30,7 @@ from mbd.hardcases import (
     singular_poses,
     sleighs,
     starts,
+    tables_and_jumps,
     tiny_steps,
     user_force,
     walls,
@@ -42,7 +43,7 @@ __all__ = ["CASES"]
 MODULES = (
     absent_effects, balls, blocks, clearances, cradles, driven_leg, four_bars, frictions, governor, grazes, hills,
     knees, light_links, long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations,
-    shakers, singular_poses, sleighs, starts, tiny_steps, user_force, walls, wheel,
+    shakers, singular_poses, sleighs, starts, tables_and_jumps, tiny_steps, user_force, walls, wheel,
 )  # fmt: skip
 
 

@@ -110,7 +110,8 @@ class StoredStates:
         time, record = self.record.time, self.record
         if not isinstance(self.equations, Equations) or not switches_of(self.equations):
             return None
-        first = np.flatnonzero(np.append(time[1:] == time[:-1], True))  # a run ends before a jump at its end
+        again = np.concatenate([[False], time[1:] == time[:-1], [True]])  # a run ends before a jump at its end
+        first = np.flatnonzero(again[1:] & ~again[:-1])  # an event at the instant stores more rows, behind the jump
         step = float(time[-1] - time[0]) / len(time)
         found, near = time.copy(), 1e-12 * max(abs(float(time[0])), abs(float(time[-1])))
         for vector in (record.parameters, *(values for _, values in record.parameter_changes)):

@@ -116,6 +116,19 @@ def test_results_beside_a_jump_are_those_of_their_side():
     assert run["hinge.acceleration"][row + 1] - run["hinge.acceleration"][row] == pytest.approx(TORQUE / INERTIA)
 
 
+@pytest.mark.parametrize("scheme", ["HHT", "Radau", "RK853"])
+@pytest.mark.parametrize("guard", [lambda t: t - 0.3, lambda t: mbd.where(t < 0.3, -1.0, 1.0), lambda t: t - 0.31])
+def test_an_event_at_a_jump_happens_once_behind_it(guard, scheme):
+    model, start = pendulum(FORMS["before"][0], ("instant", 0.3))
+    model.constrain(mbd.Event("bell", mbd.measure(guard, "t")))
+    run = mbd.simulate(model, start, SCHEMES[scheme], dt=0.01, until=0.6)
+    (bell,) = run.events
+    assert bell.time == pytest.approx(0.3 if guard(0.305) > 0.0 else 0.31)
+    forces = run["motor.torque"]
+    assert forces[0] == 0.0 and np.count_nonzero(np.diff(forces)) == 1
+    assert run["hinge.angle"][-1] == pytest.approx(exact([0.3], False, 0.6), abs=1e-3)
+
+
 def test_a_run_that_ends_at_a_jump_ends_before_it_and_goes_on_behind():
     model, start = pendulum(FORMS["before"][0], ("instant", 0.3))
     first = mbd.simulate(model, start, mbd.RadauIIA(), dt=0.01, until=0.3)
