@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.accept_restart import accept_for_restart
+from mbd.kernel.accept_restart import accept_for_restart, project_velocity
 from mbd.kernel.candidate import accept_guards
 from mbd.kernel.charts import divides_further, turned_end, wants_row
 from mbd.kernel.codes import (
@@ -27,6 +27,7 @@ from mbd.kernel.cone_steps import (
     shorter_turn,
     slides_at_first,
     slides_on,
+    slides_until_event,
 )
 from mbd.kernel.cones import follow_motion, pull_of_both
 from mbd.kernel.contact_modes import room_to_log
@@ -42,7 +43,7 @@ from mbd.kernel.nonsmooth import closes_below_surface, must_release
 from mbd.kernel.nonsmooth_cones import hold_for_step
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Events, Guards, Kernel, Mechanism, Switching
-from mbd.kernel.restart import consistent, largest_force, take_consistent
+from mbd.kernel.restart import active_rows, consistent, largest_force, take_consistent
 from mbd.kernel.singular.events import find_passed_events, log_passed_events, may_pass_events, refuses
 from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
@@ -155,7 +156,7 @@ def conclude(
             K.n_shortened += 1 if K.paired_step == ALONE else 0
             K.n_sized += 1 if K.paired_step == ALONE else 0
             K.paired_step = 0
-    uneven = K.stabilized == 0 and K.n_active > 0 and h < (1.0 - 1e-6) * K.step
+    uneven = K.stabilized == 0 and K.n_active > 0 and (h < (1.0 - 1e-6) * K.step or not holds)
     uneven = uneven or pulls
     K.restarted_here = 0
     if cut and K.stabilized == 0 and refuses(K, h):
@@ -191,9 +192,12 @@ def conclude(
 def calm(K: Switching) -> bool:
     """Where a contact seems to pull at the end of a step: start the scheme again before it, once; True if so.
 
-    Accelerations and multipliers are made consistent there, which ends their oscillation; the step is taken again.
+    Velocities, accelerations and multipliers are made consistent there, which ends their oscillation; the step is taken
+    again. What index 3 leaves of the velocity of a friction that sticks would be a slip to the restart.
     """
     if K.restarted_here == 1 or K.near_singular > 0:
+        return False
+    if K.stabilized == 0 and project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True) != 0:
         return False
     if consistent(K, K.time, K.q, K.y) != 0:
         return False
@@ -251,6 +255,8 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
             return status
     if K.event_kind < 0:
         return TURNS_AWAY if K.strategy == 0 and slides_on(K) else 0
+    if K.n_cones > 0 and K.strategy == 0 and K.event_kind != STICK and slides_until_event(K):
+        return TURNS_AWAY
     if K.strategy == 1 and (striking_contact(K) >= 0 or closes_below_surface(K)):  # the contact comes first
         return try_step(K, h, t1)
     return AT_POSE if refuses(K, K.event_after) else -1
@@ -330,10 +336,11 @@ def take_step(K: Kernel) -> int:
         released = False
         for _ in range(MOST_SHORTER):
             if status == 0:
-                if released or not slides_on(K):
+                if not slides_on(K):
                     break
+                if not released:  # what was to rest in the whole step may slide on in half of it: let go at the same h
+                    h = min(0.5 * h, K.step_taken)
                 released = True
-                h = min(0.5 * h, K.step_taken)
             elif is_shortened(K, status) and slides_at_first(K, SHORTER * h):
                 h *= SHORTER
                 K.begun_step = h

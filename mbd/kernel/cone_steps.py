@@ -24,6 +24,7 @@ from mbd.kernel.trial_step import try_step
 
 __all__ = [
     "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "shorter_turn", "slides_at_first", "slides_on",
+    "slides_until_event",
 ]  # fmt: skip
 
 PART = 0.5
@@ -121,6 +122,22 @@ def slides_on(K: Guards) -> bool:
             y = K.guards1[K.at_slip + p]
             forward = K.slip[f] * x + K.slip[p] * y
             if forward > 0.0 and abs(K.slip[f] * y - K.slip[p] * x) > LINE * forward:
+                K.hold[f] = K.hold[p] = 0.0
+                found = True
+    return found
+
+
+def slides_until_event(K: Guards) -> bool:
+    """Whether what was held to come to rest slides on at an event before its rest: its direction is let go.
+
+    Not where steps can no longer follow how it turns.
+    """
+    found = False
+    for f in range(K.n_frictions):
+        if keeps_direction(K, f) and may_follow(K, f):
+            p = K.partner[f]
+            forward = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + p])
+            if forward > 0.0 and abs(across(K, f)) > LINE * forward:
                 K.hold[f] = K.hold[p] = 0.0
                 found = True
     return found

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from mbd.kernel.codes import NEW_MODE
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
-from mbd.kernel.cone_loads import keep_in_cones
 from mbd.kernel.cones import let_directions_go
 from mbd.kernel.contact_modes import resolve_contact_modes
 from mbd.kernel.contact_step import find_pace
@@ -14,7 +13,15 @@ from mbd.kernel.hooks import scheme_start
 from mbd.kernel.nonsmooth_cones import keep_within
 from mbd.kernel.records import Balance, DependentRows, Kernel
 from mbd.kernel.redundancy import find_dependent, sharing, spread
-from mbd.kernel.restart import active_rows, evaluate, refresh_scales, stepping_rows, take_consistent
+from mbd.kernel.restart import (
+    active_rows,
+    evaluate,
+    fill_block,
+    minimum_norm_multipliers,
+    refresh_scales,
+    stepping_rows,
+    take_consistent,
+)
 
 __all__ = ["find_mode", "restart", "still_dependent"]
 
@@ -45,11 +52,12 @@ def restart(K: Kernel) -> int:
     K.n_restarts += 1
     find_dependent(K, active_rows(K, K.closed))
     if K.n_dropped > 0 and not sharing(K):
-        spread(K, K.lam)
         if K.n_cones > 0 and K.strategy == 1:
+            spread(K, K.lam)
             keep_within(K)
-        elif K.n_cones > 0:
-            keep_in_cones(K, K.lam)
+        else:  # limits follow the pushes, which are others than those that the modes were found with
+            fill_block(K, K.time, K.q, K.y)
+            minimum_norm_multipliers(K, K.lam)
     K.n_active = stepping_rows(K)
     if is_ill_conditioned(K):
         status = correct_start(K)
