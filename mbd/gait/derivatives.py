@@ -20,6 +20,7 @@ from mbd.errors import GaitError, ModelError, SimulationError, UnknownNameError,
 from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.map_derivative import extrapolated, map_derivative, measured
 from mbd.gait.return_map import Arrival
+from mbd.sensitivity.starts import unknown_name
 
 __all__ = ["Derivatives", "parameter_value"]
 
@@ -91,7 +92,7 @@ def parameter_value(gait: Any, name: str) -> float:
             f"{name!r} is an exact 0 or ±1 of the model, which is part of its equations; name it in tunable=[…] of "
             "the model"
         )
-    raise UnknownNameError(nearest(name, [*known, *map_.functions], "parameter", "There are"))
+    raise UnknownNameError(unknown_name(map_.mechanism.equations, name, [*known, *map_.functions], "parameter"))
 
 
 def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:

@@ -165,7 +165,8 @@ class _Column:
             self.bound, self.step = self.step, self.step * SHRINK
             self._tried(self.best is not None)
             return
-        if self.leaps and self._leaps(0.5 * float(np.max(np.abs(np.subtract(*beside[:2])), initial=0.0)), wanted):
+        ends: Any = beside[:2]
+        if self.leaps and self._leaps(0.5 * float(np.max(np.abs(ends[0] - ends[1]), initial=0.0)), wanted):
             return
         self.leaps, self.first = 0, self.first or self.step
         pairs = zip(beside[::2], beside[1::2], strict=True)

@@ -87,7 +87,7 @@ def _pair(given: Continuation, point: BranchPoint, mode: Vector, amplitude: floa
         one, other = ends
         if given.map.faults(values) or not isinstance(one, Measured) or not isinstance(other, Measured):
             return None
-        rest = [0.5 * (one.c + other.c) - s, (one.c - other.c) / (2.0 * amplitude) + d, [mode @ d - 1.0]]
+        rest: list[Any] = [0.5 * (one.c + other.c) - s, (one.c - other.c) / (2.0 * amplitude) + d, [mode @ d - 1.0]]
         gap = np.concatenate(rest)
         left = float(max(np.max(np.abs(rest[0])), amplitude * np.max(np.abs(rest[1]))))
         if left <= FINE:

@@ -9,10 +9,11 @@ from typing import Any
 from mbd.assembly.changed_start import changed_start, start_names
 from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import MbdError, ModelError, TraceError, UnknownNameError, nearest
+from mbd.errors import MbdError, ModelError, TraceError, UnknownNameError
 from mbd.integrators import Integrator
 from mbd.optimization.points import Point, Source, failed, table_point
 from mbd.sensitivity.sensitivities import sensitivities
+from mbd.sensitivity.starts import unknown_name
 from mbd.state import State
 from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
@@ -56,7 +57,7 @@ class RunSource(Source):
         begins = start_names(mechanism)
         known = {*declared, *begins, *self.functions}
         what = "parameter, function of parameters, coordinate or rate of the start"
-        wrong = [nearest(name, known, what, "There are") for name in self.unknowns if name not in known]
+        wrong = [unknown_name(mechanism.equations, name, known, what) for name in self.unknowns if name not in known]
         if wrong:
             raise UnknownNameError(wrong)
         self.of_start = [name for name in self.unknowns if name in begins and name not in {*declared, *self.functions}]

@@ -123,6 +123,7 @@ def refuse_sided_end(
 
     motion, mode, rates : at the last row; instants : (name, motion before it) of the events of the run
     """
+    until: Any
     until, end = rows.record.settings.get("until"), float(rows.record.time[-1])
     within = AT_ONCE * _duration(rows)
     if not is_number(until) or end < float(until) - within or not _is_any(programs):

@@ -23,7 +23,7 @@ from mbd.sensitivity.strikes import captured
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names
 
 __all__ = [
-    "Direction", "directions", "programs_of", "restitution_names", "restitutions_of", "start_tangent",
+    "Direction", "directions", "programs_of", "restitution_names", "restitutions_of", "start_tangent", "unknown_name",
 ]  # fmt: skip
 
 Flags = NDArray[np.bool_]
@@ -52,6 +52,16 @@ RESTITUTION = ".restitution"
 def restitution_names(equations: Equations) -> list[str]:
     """Restitutions of contacts that close by impact."""
     return [contact.name + RESTITUTION for contact in equations.contacts if contact.kind != "penalty"]
+
+
+def unknown_name(equations: Equations, name: str, known: Collection[str], what: str) -> str:
+    """What to write instead of a name by which runs cannot be changed."""
+    if name in restitution_names(equations):
+        return (
+            f"{name!r} is a number of the model, which no run changes; give mbd.optimize a function that makes it "
+            f"anew, lambda values: mbd.sensitivities(model_of(values), …, wrt=[{name!r}])"
+        )
+    return nearest(name, known, what, "There are")
 
 
 def programs_of(rows: RunRows, wanted: Sequence[Direction]) -> Programs:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.equations.switching_times import instant_slopes
+from mbd.errors import CapabilityError
 from mbd.integrators import RadauIIA
 from mbd.integrators.family import NewmarkFamily
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
@@ -167,11 +168,9 @@ class Walk:
             else:
                 dh = self._grid - motion.tangent.t if row in self._shortened.rows else np.zeros_like(motion.tangent.t)
             if row + 1 in self._held_rows:
-                held, along = with_held_directions(self.programs, motion, mode, memory.rates)
-                motion, memory = self.steps.along(along, memory, held, row + 1, dh, fresh)
-                motion = along_ways(self.programs, motion, mode, {}, HELD)[1]
+                motion, memory = self._held_step(motion, memory, mode, row + 1, dh, fresh)
             else:
-                motion, memory = self.steps.along(motion, memory, mode, row + 1, dh, fresh)
+                motion, memory = self._plain_step(motion, memory, mode, row + 1, dh, fresh)
             row, fresh = row + 1, False
             if self._ways:
                 plain = self.mode(row, motion)
@@ -200,6 +199,32 @@ class Walk:
             )
         change = rows.rate[row] - rows.rate[row + 1]
         return motion.with_tangent(y=motion.tangent.y + np.outer(change, slopes[0] @ p))
+
+    def _held_step(
+        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
+    ) -> tuple[Motion, Memory]:
+        """A step to a row that holds the directions in which contacts slide as it begins."""
+        held, along = with_held_directions(self.programs, motion, mode, memory.rates)
+        motion, memory = self.steps.along(along, memory, held, row, dh, fresh)
+        return along_ways(self.programs, motion, mode, {}, HELD)[1], memory
+
+    def _plain_step(
+        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
+    ) -> tuple[Motion, Memory]:
+        """A step to a row; one that ends elsewhere held the directions of sliding, which explicit schemes do not store.
+
+        The multipliers of their rows are those of the velocity at the end.
+        """
+        try:
+            return self.steps.along(motion, memory, mode, row, dh, fresh)
+        except CapabilityError:
+            if not (self.programs.columns.slips and np.any(mode.slip)):
+                raise
+            try:
+                return self._held_step(motion, memory, mode, row, dh, fresh)
+            except CapabilityError:
+                pass
+            raise
 
     def _take_written(self, row: int) -> None:
         """From a row on, take the parameters that controllers wrote there, which are held as they are."""

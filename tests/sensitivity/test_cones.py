@@ -130,3 +130,24 @@ def test_random_boxes_with_corners_that_strike_slide_and_stand(seed):
         return
     most = 1e-7 if "slipped" in kinds else 1e-8
     assert found is None or np.all(found[0] <= np.maximum(most, 2.0 * found[1])), found
+
+
+@pytest.mark.parametrize("dt", [0.005, 0.008])
+def test_a_ball_that_begins_to_roll_keeps_five_sevenths_of_a_change_of_its_velocity(dt):
+    """v = v₀ − 2 u₀/7 with u = v − R ω × n, whatever held direction the step before it grips has taken."""
+    random, radius = np.random.default_rng(29), 0.03
+    model = mbd.Model("ball")
+    ball = mbd.RigidBody("ball", **mbd.sphere(0.2, radius).body)
+    model.connect(mbd.Free("roll", model.ground.origin, ball.origin))
+    model.constrain(mbd.Unilateral("cloth", mbd.sphere_touchdown(ball.origin, radius), friction=0.25))
+    for _ in range(2):
+        spin = tuple(float(each) for each in random.uniform(-40.0, 40.0, 3))
+        velocity = {"roll.x": float(random.uniform(1.0, 2.0)), "roll.angular_velocity": spin}
+        start = mbd.assemble(model, position={"roll.y": radius}, velocity=velocity, closed="cloth")
+        found = mbd.sensitivities(
+            model, start, mbd.RungeKutta853(), dt, until=1.2, wrt=["roll.x.rate", "roll.angular_velocity.z"],
+            of=["roll.x.rate"],
+        )  # fmt: skip
+        assert any(event.kind == "stuck" for event in found.run.events)
+        assert abs(found["roll.x.rate", "roll.x.rate"] - 5.0 / 7.0) < 1e-6
+        assert abs(found["roll.x.rate", "roll.angular_velocity.z"] + 2.0 / 7.0 * radius) < 1e-6

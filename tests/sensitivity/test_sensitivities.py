@@ -286,3 +286,30 @@ def test_of_the_restitution_of_a_bounce():
         assert other.matrix == pytest.approx(found.matrix, rel=1e-12, abs=1e-12)
     with pytest.raises(mbd.CapabilityError, match="floor.restitution"):
         mbd.sensitivities(model, start, wrt=wrt, check_events={"floor.restitution": 0.1}, **settings)
+
+
+def test_a_reset_by_sympy_expressions_is_differentiated():
+    """v⁺ = e v² + k at the floor, from a drop by h: dv⁺/dh = 2 g e, dv⁺/de = 2 g h, dv⁺/dk = 1."""
+    from sympy import symbols
+
+    y, (M, G, E, K) = mbd.Coordinate("y", unit="m"), symbols("M G E K")
+    model = mbd.Lagrangian("drop", [y], M * y.v**2 / 2, M * G * y.q, parameters={M: 1.0, G: 9.81, E: 0.2, K: 0.7})
+    model.constrain(mbd.Event("floor", y.q, direction=-1, reset={y.v: E * y.v**2 + K}))
+    start = mbd.assemble(model, {"y": 1.3})
+    found = mbd.sensitivities(
+        model, start, mbd.RungeKutta853(), 0.01, until="floor", wrt=["y", "E", "K"], of=["y.rate", "time"]
+    )
+    wanted = {"y": 2.0 * 9.81 * 0.2, "E": 2.0 * 9.81 * 1.3, "K": 1.0}
+    for name, value in wanted.items():
+        assert math.isclose(found["y.rate", name], value, rel_tol=1e-9), name
+
+
+def test_a_restitution_is_refused_as_an_unknown_with_what_serves():
+    model = mbd.Model("ball")
+    ball = mbd.PointMass("ball", mass=2.0)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, ball.origin, axis="y"))
+    model.constrain(mbd.Unilateral("floor", mbd.height(ball.origin), restitution=0.5))
+    start = mbd.assemble(model, {"fall.displacement": 1.0})
+    with pytest.raises(mbd.UnknownNameError, match="'floor.restitution' is a number of the model.*wrt="):
+        mbd.optimize(model, {"floor.restitution": (0.5, 0.1, 0.9)}, start=start, dt=0.01, until=0.7,
+                     maximize="fall.displacement", progress=False)  # fmt: skip

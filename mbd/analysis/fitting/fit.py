@@ -18,6 +18,7 @@ from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, 
 from mbd.integrators import Integrator
 from mbd.notebook import table
 from mbd.sensitivity.along import along
+from mbd.sensitivity.starts import unknown_name
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
@@ -246,7 +247,7 @@ class _Search:
         begins = start_names(mechanism)
         self.of_start = tuple(name for name in self.names if name not in declared and name in begins)
         what, known = "parameter, coordinate or rate of the start", {*declared, *begins}
-        wrong = [nearest(name, known, what, "There are") for name in self.names if name not in known]
+        wrong = [unknown_name(equations, name, known, what) for name in self.names if name not in known]
         if wrong:
             raise UnknownNameError(wrong)
         for name in self.data.columns:
