@@ -9,12 +9,13 @@ Poisson       compression with e = 0 to −λ̂_c; then e times that impulse, an
 sequential    one contact after the other, the fastest first, until none approaches; equally fast ones together
               (Han & Gilmore 1993, J. Mech. Design 115:412)
 Stronge       as Poisson, with one factor on all impulses of the second phase, so that it gives back e² of the work that
-              the normal impulses of the first took (Stronge 1990, Proc. R. Soc. Lond. A 431:169), never energy in all
+              the normal impulses of the first took (Stronge 1990, Proc. R. Soc. Lond. A 431:169), never energy in all:
+              taken where another law would create energy or, with restitution and friction, has no solution
 """
 
 from __future__ import annotations
 
-from mbd.kernel.codes import ENERGY_GAIN, NO_IMPACT, PULL
+from mbd.kernel.codes import CONFLICT, ENERGY_GAIN, NO_IMPACT, PULL
 from mbd.kernel.impact_solve import (
     energy_gain,
     gather,
@@ -58,12 +59,13 @@ def impact(K: Switching, slow: bool) -> int:
         status = poisson_law(K, False)
     else:
         status = sequential_law(K)
-    if status != 0:
+    unsolved = status == CONFLICT or status == NO_IMPACT
+    if status != 0 and not (unsolved and not slow and rebounds(K)):
         return status
-    if not slow and energy_gain(K) > GAIN:
+    if not slow and (unsolved or energy_gain(K) > GAIN):
         for c in range(K.n_contacts):
             if K.closing[c] > 0 and K.restitution[c] > 1.0:
-                return ENERGY_GAIN
+                return status if unsolved else ENERGY_GAIN
         K.n_energetic_impacts += 1
         start_over(K)
         status = poisson_law(K, True)
@@ -77,6 +79,14 @@ def impact(K: Switching, slow: bool) -> int:
         K.y[i] += K.jump[i]
     K.n_impacts += 1
     return 0
+
+
+def rebounds(K: Contacts) -> bool:
+    """Whether a contact closes with a restitution, without which other rows and friction may allow a solution."""
+    found = False
+    for c in range(K.n_contacts):
+        found = found or (K.kind[c] == 0 and K.closing[c] > 0 and restitution_of(K, c) > 0.0)
+    return found
 
 
 def would_hold_back(K: ContactForces) -> bool:

@@ -234,3 +234,28 @@ def test_a_stop_that_bounces_comes_to_rest_whatever_pushes_it(scheme):
         start = mbd.assemble(model, position={"pin.angle": -0.3})
         run = mbd.simulate(model, start, scheme, dt=10.0 ** rng.uniform(-4.0, -2.0), until=1.5)
         assert run["stop.force"][-1] > 0.0 and abs(run["pin.rate"][-1]) < 1e-9
+
+
+@pytest.mark.parametrize("seeds", [(11, 19, 21), pytest.param(range(40), marks=pytest.mark.slow)])
+def test_a_rough_foot_on_a_ball_joint_rebounds_whatever_its_friction(seeds):
+    """Its three rows leave two motions: with restitution neither sticking nor sliding may obey Newton's law."""
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        model = mbd.Model("swinging")
+        mass, inertia = rng.uniform(0.5, 3.0), tuple(rng.uniform(0.03, 0.05, 3))
+        body = mbd.RigidBody("body", mass, inertia, center=tuple(0.2 * rng.normal(size=3)))
+        model.connect(mbd.Spherical("ball", model.ground.origin, body.origin))
+        tip = body.point(*rng.uniform(-0.6, 0.6, 3))
+        wall = mbd.Plane(tuple(rng.normal(size=3)), offset=rng.uniform(-0.5, -0.2))
+        e = rng.choice([0.0, 0.5])
+        model.constrain(mbd.Unilateral("foot", mbd.touchdown(tip, wall), friction=1.5, restitution=e))
+        speeds = {f"ball.angular_velocity.{axis}": 5.0 * rng.normal() for axis in "xyz"}
+        for law in ("newton", "poisson", "sequential"):
+            run = mbd.simulate(
+                model, mbd.assemble(model, velocity=speeds), mbd.RadauIIA(), dt=5e-3, until=1.0, impact=law
+            )
+            for event in run.events:
+                if event.kind == "closed":
+                    assert np.linalg.norm(event.impulse[1:]) <= 1.5 * event.impulse[0] * (1.0 + 1e-9) + 1e-12
+                    assert event.energy_loss >= -1e-12 * mass
+                    assert run["foot.gap_rate"][event.row] >= -1e-9

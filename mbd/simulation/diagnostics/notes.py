@@ -76,7 +76,8 @@ COUNTED = (
     ),
     (
         "n_energetic_impacts",
-        "{count} impacts took Stronge's energetic restitution, where the {impact} law would have created energy",
+        "{count} impacts took Stronge's energetic restitution, where the {impact} law would have created energy "
+        "or has no solution",
     ),
     (
         "n_endless",
