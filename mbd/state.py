@@ -161,6 +161,10 @@ class State:
             return None, ()
         return quantity(run, name), run.names
 
+    def _ipython_key_completions_(self) -> list[str]:
+        """What ``state[…]`` answers, for the completion of notebooks."""
+        return list(dict.fromkeys([*self.names, *self.velocity_names, *self._result("")[1]]))
+
     def __repr__(self) -> str:
         lines = [f"State at t = {self.time:g} s, closed: {', '.join(sorted(self.mode.closed)) or 'none'}"]
         for values, names in ((self.q, self.names), (self.v, self.velocity_names)):

@@ -43,6 +43,6 @@ def _named(error: ModelError | TraceError, owner: str) -> ModelError | TraceErro
     if not owner or all(f"'{owner}" in fault for fault in faults):
         return error
     named = [fault if f"'{owner}" in fault else f"'{owner}': {fault}" for fault in faults]
-    found = type(error)(named if isinstance(error, ModelError) else named[0])  # type: ignore[arg-type]
+    found = type(error)(named if isinstance(error, ModelError) else named[0])
     found.__cause__ = error
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number, number
-from mbd.errors import ModelError
+from mbd.errors import ModelError, UnknownNameError
 from mbd.forces.samples import Samples
 from mbd.forces.scipy_curves import is_curve
 from mbd.joints.base import Joint
@@ -109,6 +109,19 @@ def mentioned(arguments: ArgumentSpec) -> list[Mention]:
     return [value for _, value in arguments if isinstance(value, Frame | Joint | str)]
 
 
+def _named(scope: Scope, name: str) -> Scalar | tuple[Scalar, ...]:
+    """A named quantity; the components of a vector, such as a place or an angular velocity."""
+    try:
+        return scope.named(name)
+    except UnknownNameError:
+        for axes in ("wxyz", "xyz"):
+            try:
+                return tuple(scope.named(f"{name}.{axis}") for axis in axes)
+            except UnknownNameError:
+                continue
+        raise
+
+
 def resolved(arguments: ArgumentSpec, scope: Scope, owner: str) -> list[Argument]:
     """The scalars and triples that the arguments stand for."""
     result: list[Argument] = []
@@ -119,7 +132,7 @@ def resolved(arguments: ArgumentSpec, scope: Scope, owner: str) -> list[Argument
             coordinates = scope.joint(value.name).coordinates
             result.append((label, coordinates[0] if len(coordinates) == 1 else coordinates))
         elif isinstance(value, str):
-            result.append((label, scope.time if value == "t" else scope.named(value)))
+            result.append((label, scope.time if value == "t" else _named(scope, value)))
         else:
             result.append((label, scope.parameter(owner, label, value)))
     return result

@@ -32,8 +32,8 @@ LENGTH = 24
 _LIBRARY = tuple(
     f"{Path(path).resolve()}{os.sep}"
     for path in (
-        *(sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")),
-        Path(__file__).parent.parent,
+        *map(sysconfig.get_path, ("stdlib", "platstdlib", "purelib", "platlib")),
+        str(Path(__file__).parent.parent),
     )
 )
 """Folders of Python, of installed packages and of this one."""

@@ -193,7 +193,8 @@ def _lowered(
     offered: dict[Any, Scalar] = {}
     for name, value in arguments:
         if isinstance(value, Sequence):
-            offered |= {sympy.Symbol(f"{name}.{axis}"): part for axis, part in zip("xyz", value, strict=True)}
+            axes = "xyz" if len(value) == 3 else "wxyz"
+            offered |= {sympy.Symbol(f"{name}.{axis}"): part for axis, part in zip(axes, value, strict=True)}
         else:
             offered[sympy.Symbol(name)] = value
     offered |= symbols

@@ -150,7 +150,7 @@ def name_faults(model: Description) -> list[str]:
     ):
         kinds.setdefault(name, Counter())[kind] += 1
     for name, counts in kinds.items():
-        if counts.total() > 1:
+        if counts.total() > 1 and not _apart(model, name, counts):
             several_kinds = ", ".join(f"{count} × {kind}" for kind, count in counts.items())
             other = "'ground' is the body that does not move; " if name == model.ground.name else ""
             again = AGAIN if max(counts.values()) > 1 else ""
@@ -163,6 +163,27 @@ def name_faults(model: Description) -> list[str]:
         if places.setdefault(frame.full_name, frame).parameters() != frame.parameters():
             found.append(f"two different points are named '{frame.full_name}'; give each its own name")
     return found + _marker_faults(model, kinds)
+
+
+def _apart(model: Description, name: str, counts: Counter[str]) -> bool:
+    """Whether a body and one joint or contact share a name under which no two things of theirs have one name.
+
+    What follows after the dot tells them apart: 'crank.mass' and 'crank.end' of the body, 'crank.angle' of the joint.
+    """
+    if counts["body"] != 1 or counts.total() != 2 or name == model.ground.name:
+        return False
+    others = [word for word in (*model.joints, *model.contacts) if word.name == name]
+    if len(others) != 1:
+        return False
+    body, (other,) = model.bodies[name], others
+    own = {*body.parameters(), *(f"{name}.{frame}" for frame in (*body.frames, *body.points))}
+    own |= {frame.full_name for frame in model.points() if frame.body is body}
+    known = {*other.parameters(), *(f"{name}.{result}" for result in RESULTS), f"{name}.rate"}
+    if isinstance(other, Joint):
+        known |= {*other.coordinate_names, *other.velocity_names, *orientation_names(other)}
+    return not any(
+        one == each or one.startswith(f"{each}.") or each.startswith(f"{one}.") for one in own for each in known
+    )
 
 
 def _bodies_by_name(model: Description) -> dict[str, list[Body]]:
@@ -225,6 +246,7 @@ def mention_faults(model: Description) -> list[str]:
     joints = {joint.name for joint in model.joints}
     found = [fault for each in model.observations for fault in each.faults(model.bodies, joints)]
     known = set(quantities(model))
+    known |= {name.removesuffix(".x") for name in known if name.endswith(".x") and f"{name[:-1]}z" in known}
     owners = {force.name for force in model.forces}
     words: list[Force | Constraint] = [*model.forces, *model.constraints]
     for word in words:

@@ -37,7 +37,7 @@ def largest(values: Callable[[Vector, OneSide], Vector], begin: float, end: floa
         found, times = _sampled(values, first, last, count)
         best = max(best, _around(found, times), key=lambda one: one[0])
     for _ in range(REFINEMENTS):
-        here, near = _around(*_sampled(values, *best[1], FEWEST))
+        here, near = _around(*_sampled(values, float(best[1][0]), float(best[1][1]), FEWEST))
         best = max(best[0], here), near
     return float(best[0])
 

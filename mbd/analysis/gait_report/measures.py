@@ -178,7 +178,7 @@ def _clearance(run: Trajectory, side: Side, stride: Stride) -> float:
 
     def sunk(times: Vector, at: OneSide) -> Vector:
         named = run.at(times, side=at)
-        return -np.min([named[f"{name}.gap"] for name in side.contacts], axis=0)
+        return np.asarray(-np.min([named[f"{name}.gap"] for name in side.contacts], axis=0))
 
     return -largest(sunk, begin, end, [event.time for event in run.events])
 
