@@ -90,3 +90,15 @@ def test_words_that_make_no_friction_are_refused():
     model.connect(mbd.Revolute("hinge", model.ground.origin, bar.start, loss=mbd.Stribeck(-1.0, 0.5, 0.2)))
     with pytest.raises(mbd.ModelError, match="static"):
         mbd.assemble(model, {"hinge.angle": 0.0})
+
+
+def test_an_impact_with_the_static_size_says_so():
+    model = mbd.Model("thrown")
+    ball = mbd.PointMass("ball", mass=1.0)
+    model.connect(mbd.Translation("place", model.ground.origin, ball.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(ball.origin), friction=mbd.Stribeck(0.6, 0.3, 0.1)))
+    start = mbd.assemble(model, position={"place.y": 0.1}, velocity={"place.x": 2.0})
+    run = mbd.simulate(model, start, dt=1e-3, until=0.2)
+    normal, forward = run.events[0].impulse
+    assert forward == pytest.approx(-0.6 * normal)
+    assert [note for note in run.stats["notes"] if note.startswith("impacts of 'foot' had the static size")]
