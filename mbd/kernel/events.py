@@ -24,7 +24,7 @@ from mbd.kernel.guards import update_side
 from mbd.kernel.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Guards, Kernel, Switching
-from mbd.kernel.starting import restart
+from mbd.kernel.starting import restart_after_event
 from mbd.kernel.switching import switch
 
 __all__ = ["handle_event", "land"]
@@ -139,13 +139,13 @@ def handle_event(K: Kernel) -> int:
         return status
     if K.auto == 1 and kind == CLOSE:
         count_impact(K)
-    status = restart(K)
+    status = restart_after_event(K)
     store_row(K)  # also where no accelerations are consistent: the velocities after the event are known
     if status != 0:
         return status
     if K.n_guards > 0:
         log_crossings(K)
-    for c in range(K.n_contacts):
+    for c in range(K.n_contacts if K.restart_due == 0 else 0):
         if K.kept_flags[c] == 1 and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.at_gap_rate + c] < -1e-6:
             K.sinking[c] = min(K.sinking[c], K.time)
     return EVENT if is_awaited(K, first) else -1
@@ -168,7 +168,7 @@ def land(K: Kernel, h: float, t1: float) -> int:
         store_row(K)
         status = rebound(K)
     if status == 0:
-        status = restart(K)
+        status = restart_after_event(K)
     if (status == NO_IMPACT or status == CONFLICT) and K.halvings < MOST_HALVED:
         K.halvings += 1
         K.halves_left = 2 ** (K.halvings + 1)

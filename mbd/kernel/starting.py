@@ -23,7 +23,7 @@ from mbd.kernel.restart import (
     take_consistent,
 )
 
-__all__ = ["find_mode", "restart", "still_dependent"]
+__all__ = ["find_mode", "restart", "restart_after_event", "still_dependent"]
 
 
 def find_mode(K: DependentRows) -> int:
@@ -84,6 +84,15 @@ def restart(K: Kernel) -> int:
     if K.n_cones > 0:
         let_directions_go(K)
     return 0
+
+
+def restart_after_event(K: Kernel) -> int:
+    """`restart`; where the mode has no code yet to correct rates with, it is made again before the next step."""
+    status = restart(K)
+    if status == NEW_MODE:
+        K.restart_due = 2
+        return 0
+    return status
 
 
 def correct_start(K: Balance) -> int:

@@ -78,29 +78,31 @@ def test_rows_of_random_tables_keep_the_law(seed, scheme):
     assert not broken_laws(run)
 
 
-def two_feet():
-    """A trunk on two feet of four corners each, pushed to the side; its corners share what they bear."""
-    rng = np.random.default_rng(26)
-    trunk = mbd.RigidBody("trunk", 12.0, (0.3, 0.3, 0.3))
+def two_feet(seed):
+    """A trunk on two feet of four corners each, hinged to it by springs, pushed more and more; corners share loads."""
+    rng = np.random.default_rng(seed)
+    trunk = mbd.RigidBody("trunk", rng.uniform(3.0, 15.0), (0.3, 0.3, 0.3))
     model = mbd.Model("two feet")
     model.connect(mbd.Free("f", model.ground.origin, trunk.origin))
-    closed = []
+    closed, mu = [], rng.uniform(0.3, 0.9)
     for side in range(2):
         foot = mbd.RigidBody(f"foot {side}", 1.0, (0.004, 0.006, 0.004))
-        ankle = trunk.point(rng.uniform(-0.05, 0.05), -0.5, 0.2 * side - 0.1)
+        ankle = trunk.point(rng.uniform(-0.05, 0.05), -0.5, 0.3 * side - 0.15)
         model.connect(mbd.Revolute(f"ankle {side}", ankle, foot.origin, axis=(0, 0, 1), stiffness=200.0))
         for k, (x, z) in enumerate(((0.12, 0.05), (0.12, -0.05), (-0.08, 0.05), (-0.08, -0.05))):
             closed.append(f"corner {side}{k}")
             touch = mbd.touchdown(foot.point(x, -0.1, z))
-            model.constrain(mbd.Unilateral(closed[-1], touch, friction=rng.uniform(0.5, 0.9)))
-    slow = {"f.x": 0.02 * rng.uniform(-1.0, 1.0), "f.z": 0.02}
-    model.apply(mbd.Applied("push", trunk.point(0.0, -0.3), force=(0.0, 0.0, lambda t: 150.0 * mbd.sin(20.0 * t))))
-    return model, mbd.assemble(model, {"f.y": 0.6}, slow, closed=closed, project=True)
+            model.constrain(mbd.Unilateral(closed[-1], touch, friction=mu))
+    (ahead, aside), rate = rng.uniform(20.0, 80.0, 2) * rng.choice([-1, 1], 2), rng.uniform(2.0, 12.0)
+    push = (lambda t: ahead * mbd.sin(rate * t), -5.0, lambda t: aside * mbd.sin(rate * t))
+    model.apply(mbd.Applied("push", trunk.point(0.0, -0.3), force=push))
+    return model, mbd.assemble(model, {"f.y": 0.6}, closed=closed, project=True)
 
 
-@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), INDEX3], ids=["stabilized", "index 3"])
-def test_the_first_row_after_feet_have_stuck_lies_in_all_cones(scheme):
-    model, start = two_feet()
-    run = mbd.simulate(model, start, scheme, dt=1e-3, until=0.2, contact="events")
-    assert any(event.kind == "stuck" for event in run.events)
-    assert not [each for each in broken_laws(run) if each[0] in ("cone", "pull")]
+@pytest.mark.parametrize(("seed", "until"), [(0, 0.05), (2, 0.03)])
+def test_the_rows_after_feet_have_stuck_lie_in_all_cones(seed, until):
+    """The restart was left in the middle where its mode had no code yet: friction then followed slips of round-off."""
+    model, start = two_feet(seed)
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=until, contact="events")
+    assert {"slipped"} <= {event.kind for event in run.events}
+    assert not broken_laws(run)
