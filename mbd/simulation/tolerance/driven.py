@@ -51,7 +51,7 @@ def driving_rows(equations: Equations) -> tuple[int, ...]:
             timed = [k for k in equations.bilateral if _depends_on_time(equations.rows[k], equations.n_v)]
         held = [k for k in equations.bilateral if equations.rows[k].reaction == "drive"]
         known = equations.memory["driving rows"] = tuple(sorted({*timed, *held})) if timed else ()
-    return known  # type: ignore[no-any-return]
+    return known
 
 
 def _depends_on_time(row: Row, n_v: int) -> bool:

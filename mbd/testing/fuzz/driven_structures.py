@@ -85,7 +85,7 @@ def _linkage(rng: random.Random) -> Made:
         heading = way + 0.5 * math.pi
         rocker = mbd.Link("rocker", rng.uniform(0.3, 2.0), c, 0.5 * c, 0.02)
         swung = math.atan2(knee[0] - far[0], -(knee[1] - far[1]))
-        model.connect(mbd.Revolute("base", model.ground.point(*map(float, far)), rocker.start))
+        model.connect(mbd.Revolute("base", model.ground.point(float(far[0]), float(far[1])), rocker.start))
         model.connect(mbd.Revolute("knee", rod.end, rocker.end))
         place = {"base.angle": swung, "knee.angle": swung - heading}
     position = {"main.angle": angle, "pin.angle": math.remainder(heading - angle, 2.0 * math.pi), **place}

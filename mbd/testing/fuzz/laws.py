@@ -202,8 +202,9 @@ def drives(found: Faults, bodies: Bodies, run: Any) -> None:
     h = float(np.max(np.diff(run.time), initial=0.0))
     grid = np.linspace(float(run.time[0]), float(run.time[-1]), 400)
     for word in bodies.model.bilaterals:
-        timed = isinstance(word, mbd.Bilateral) and isinstance(word.subject, Joint) and callable(word.value)
-        if not timed or word.subject.coordinate_names[0] not in told.tree:
+        if not isinstance(word, mbd.Bilateral) or not isinstance(word.subject, Joint) or not callable(word.value):
+            continue
+        if isinstance(word.value, mbd.Samples) or word.subject.coordinate_names[0] not in told.tree:
             continue
         change, sure = _second(word.value, told.time)
         bend = _second(word.value, grid)[0]

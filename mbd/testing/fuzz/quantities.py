@@ -65,7 +65,8 @@ def _signal(samples: mbd.Samples, time: Array, kind: str = "monotone") -> Array:
     if kind == "linear":
         return np.asarray(np.interp(inside, t, values))
     if kind == "spline":
-        return np.asarray(CubicSpline(t, values, bc_type="periodic" if samples.periodic else samples.ends)(inside))
+        ends: Any = "periodic" if samples.periodic else samples.ends
+        return np.asarray(CubicSpline(t, values, bc_type=ends)(inside))
     if kind != "monotone":
         raise NotImplementedError(f"samples of kind {kind!r}")
     if samples.periodic:  # slopes at the seam are those of a long table
