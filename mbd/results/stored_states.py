@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 ONSET, LEAST = 1e-7, 1e-200
 """As in `mbd.kernel.cones`: how much the direction of λ_T counts beside that of γ, and what stands for none of it."""
 
+ULPS = 8.0 * float(np.finfo(float).eps)
+"""How far from the time of the next row a step ends that is taken again up to it, over the time [-]."""
+
 __all__ = ["StoredStates", "is_smooth"]
 
 
@@ -73,12 +76,15 @@ class StoredStates:
     def all_inputs(self, rows: Rows) -> Mapping[str, NDArray[Any]]:
         """The same, with the way of two directions that slide together: a little along λ_T, as γ is zero at onsets.
 
-        The row before a jump in time has the time before it.
+        The row before a jump in time has the time before it, and so has the end of a step that is taken again up to it.
         """
         inputs = self.inputs(rows)
         if self.times_beside_jumps is not None:
-            own = rows.time == self.record.time[rows.source]
-            inputs = {**inputs, "t": np.where(own, self.times_beside_jumps[rows.source], rows.time)}
+            known, beside = self.record.time, self.times_beside_jumps
+            own, after = rows.time == known[rows.source], np.minimum(rows.source + 1, len(known) - 1)
+            ends = ~own & (np.abs(rows.time - known[after]) <= ULPS * np.abs(known[after]))
+            time = np.where(own, beside[rows.source], np.where(ends, beside[after], rows.time))
+            inputs = {**inputs, "t": time}
         if all(friction.partner < 0 for friction in self.equations.frictions):
             return inputs
         slips = inputs["slip"].astype(float)

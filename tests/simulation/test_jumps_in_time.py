@@ -194,3 +194,21 @@ def test_dense_jumps_are_stepped_over():
     model, start = pendulum(lambda t: mbd.where(mbd.mod(t, 1e-5) < 5e-6, TORQUE, 0.0))
     run = mbd.simulate(model, start, dt=1e-3, until=0.1)
     assert len(run.time) < 300
+
+
+@pytest.mark.parametrize("scheme", [mbd.RadauIIA(), mbd.RungeKutta853(), mbd.HHT(0.05), mbd.Newmark()], ids=repr)
+def test_accelerations_in_the_step_before_a_jump_are_those_before_it(scheme):
+    """The end of that step was read behind the jump, and its force was taken for an error of the rows."""
+    model = mbd.Model("jump")
+    upper, lower = mbd.Link("upper", 1.0, 0.5, 0.25, 0.02), mbd.Link("lower", 0.7, 0.4, 0.2, 0.01)
+    hip = mbd.Revolute("hip", model.ground.origin, upper.start)
+    model.connect(hip, mbd.Revolute("knee", upper.end, lower.start))
+    model.apply(mbd.Motor("motor", hip, torque=lambda t: mbd.where(t < 0.123, 2.0, -3.0)))
+    start = mbd.assemble(model, {"hip.angle": 0.5, "knee.angle": 0.8})
+    run = mbd.simulate(model, start, scheme, dt=5e-3, until=0.2)
+    exact = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-4, until=0.2)
+    times = np.linspace(0.1201, 0.1229, 9)
+    for name in ("hip.acceleration", "knee.acceleration"):
+        true = exact.at(times)[name]
+        jump = np.ptp(exact[name][np.abs(exact.time - 0.123) < 2e-4])
+        assert np.max(np.abs(run.at(times)[name] - true)) < 2e-3 * jump

@@ -36,6 +36,8 @@ LATE, MOST_PARTS = 0.9, 8
 
 Steps that are taken again err most near their ends; few long ones may hold a jerk that jumps anywhere.
 """
+MOST_PLACES = 512
+"""Places between rows at which they are compared, about [-]."""
 BESIDE = 1e-9
 """Instants this close to an event are not compared, relative to the length of the run [-]."""
 TRUSTED = 0.02
@@ -96,8 +98,8 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[
     )  # fmt: skip
     if not drives_of(run) or not drives_of(other):
         return found
-    parts = max(2, min(MOST_PARTS, 2 * MIDDLES // len(run.time)))
-    inside = [_some_middles(run, end, LATE * (k + 1) / parts) for k in range(parts)]
+    parts = max(2, min(MOST_PARTS, MOST_PLACES // len(run.time)))
+    inside = [_some_middles(run, end, LATE * (k + 1) / parts, MOST_PLACES // parts) for k in range(parts)]
     times = np.unique(np.concatenate([_rows(run, end)[:-1], *inside]))
     size, name = share(run, other, times[apart(times, shifted, beside)])
     return replace(found, size=size, name=name) if size > moved else found
@@ -125,12 +127,12 @@ def _rows(run: Trajectory, end: float) -> Vector:
     return np.append(run.time[chosen], end)
 
 
-def _some_middles(run: Trajectory, end: float, theta: float = 0.5) -> Vector:
+def _some_middles(run: Trajectory, end: float, theta: float = 0.5, most: int = MIDDLES) -> Vector:
     """Times of middles between rows until the end, or of other parts of the intervals, a bounded number of them."""
     _, between = run._model_columns.grid.middles()
     times = between.time + (theta - 0.5) * between.step
     times = times[times < end]
-    return times[:: len(times) // MIDDLES + 1]
+    return times[:: len(times) // most + 1]
 
 
 def _middles(run: Trajectory, end: float, accuracy: float) -> Vector:
