@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Vector
 from mbd.equations.equations import Equations
@@ -245,7 +246,12 @@ def table_faults(equations: Equations) -> list[str]:
 
 # when they switch ---------------------------------------------------------------------------------------------------
 def jumps_between(
-    equations: Equations, parameters: Sequence[float] | Vector, begin: float, end: float, dt: float
+    equations: Equations,
+    parameters: Sequence[float] | Vector,
+    begin: float,
+    end: float,
+    dt: float,
+    highest: int = SMOOTH,
 ) -> tuple[Jump, ...]:
     """The instants after begin and up to end at which the equations jump, in order.
 
@@ -254,13 +260,13 @@ def jumps_between(
     parameters : their values in the order of the equations; more may follow
     begin, end : of the run [s]
     dt : a step of the run [s], which what is sampled is sampled more finely than
+    highest : level above which jumps do not matter
     """
     switches = switches_of(equations)
     if not switches or not begin < end < np.inf:
         return ()
-    times = _Times(parameters, begin, end, dt)
-    found = [jump for switch in switches for jump in times.jumps(switch)]
-    return _merged(sorted(jump for jump in found if jump.right > begin and jump.left <= end))
+    times = _Times(parameters[: len(equations.parameters)], begin, end, dt)
+    return _merged(sorted(jump for switch in switches for jump in times.jumps(switch, highest)))
 
 
 class _Times:
@@ -271,24 +277,28 @@ class _Times:
         self.begin, self.end, self.dt = begin, end, dt
         self._known: dict[int, tuple[Vector, Vector]] = {}
 
-    def jumps(self, switch: Switch) -> Iterable[Jump]:
-        """Those of one switch."""
+    def jumps(self, switch: Switch, highest: int = SMOOTH) -> list[Jump]:
+        """Those of one switch, after begin and up to end."""
         times, values = self.passes(switch)
         node, levels = switch.node, switch.level(values)
-        if node.op == "table" and switch.expression.op == "input":  # a table of t itself
-            times = values
+        counts = levels <= highest
+        times, values, levels = times[counts], values[counts], levels[counts]
+        if not len(times):
+            return []
         exact = self._compared(node)
-        for time, level, margin in zip(times, levels, self._margins(switch, times), strict=True):
-            before = ROUND_OFF * max(abs(time), self.dt)
-            if exact is not None:
-                time, at_left = exact
-                behind = float(np.nextafter(time, np.inf)) if at_left else time
-            elif times is values:
-                behind = float(time)
-            else:
-                before = max(before, float(margin))
-                behind = float(time) + before
-            yield Jump(float(time) - before, behind, int(level), switch.owner)
+        if exact is not None:
+            time, at_left = exact
+            times = np.full(len(times), time)
+            rights = np.nextafter(times, np.inf) if at_left else times
+        elif node.op == "table" and switch.expression.op == "input":  # a table of t itself
+            times = rights = values
+        else:
+            margins = np.maximum(ROUND_OFF * np.maximum(np.abs(times), self.dt), self._margins(switch, times))
+            rights, times = times + margins, times - margins
+        lefts = times if rights is not times and exact is None else times - ROUND_OFF * np.maximum(abs(times), self.dt)
+        inside = (rights > self.begin) & (lefts <= self.end)
+        found = zip(lefts[inside].tolist(), rights[inside].tolist(), levels[inside].tolist(), strict=True)
+        return [Jump(*each, switch.owner) for each in found]
 
     def _compared(self, node: Node) -> tuple[float, bool] | None:
         """(T, whether T itself is on the left side) of a condition that compares t itself with T; None for others."""
@@ -350,23 +360,24 @@ class _Times:
     def _by_bisection(self, switch: Switch, starts: Vector, widths: Vector) -> tuple[Vector, Vector]:
         """Of any expression, as far as samples tell."""
         count = float(np.clip(PER_STEP * widths.sum() / self.dt, FEWEST_SAMPLES, MOST_SAMPLES))
-        times, targets = [], []
+        before, behind, targets = [], [], []
         for start, width in zip(starts, widths, strict=True):
             part = max(2, int(count * width / widths.sum()))
             grid = start + width * (np.arange(part) + 0.5) / part
-            grid = np.concatenate([[start], grid, [start + width]])[1:-1]
             values = self.at(switch.expression, grid)
-            for k in np.flatnonzero(np.isfinite(values[:-1]) & np.isfinite(values[1:]) & (values[:-1] != values[1:])):
-                low, high = sorted((values[k], values[k + 1]))
-                passed = switch.targets(low, high)
-                passed = passed[passed != values[k + 1]] if k + 2 < len(values) else passed
-                if len(passed):
-                    times.append(self._bisected(switch.expression, grid[k], grid[k + 1], passed))
-                    targets.append(passed)
-        return _together(times, targets)
+            for k in _crossings(switch.node, values):
+                passed = switch.targets(*sorted((values[k], values[k + 1])))
+                passed = passed[passed != values[k + 1]] if k + 2 < part else passed
+                before += [grid[k]] * len(passed)
+                behind += [grid[k + 1]] * len(passed)
+                targets.append(passed)
+        if not before:
+            return np.zeros(0), np.zeros(0)
+        every = np.concatenate(targets)
+        return _together([self._bisected(switch.expression, np.array(before), np.array(behind), every)], [every])
 
-    def _bisected(self, s: Node, a: float, b: float, targets: Vector) -> Vector:
-        left, right = np.full(len(targets), a), np.full(len(targets), b)
+    def _bisected(self, s: Node, left: Vector, right: Vector, targets: Vector) -> Vector:
+        """Where the expression passes each target between two times."""
         below = self.at(s, left) < targets
         for _ in range(BISECTIONS):
             middle = 0.5 * (left + right)
@@ -376,6 +387,17 @@ class _Times:
 
     def at(self, node: Node, times: Vector) -> Vector:
         return evaluate_arrays(node, {**self.inputs, ("t", 0): times})
+
+
+def _crossings(node: Node, values: Vector) -> NDArray[np.intp]:
+    """The samples between which and the next a target may be passed."""
+    low, high = values[:-1], values[1:]
+    passes = np.isfinite(low) & np.isfinite(high) & (low != high)
+    if node.op == "floor":
+        passes &= (np.floor(low) != np.floor(high)) | (np.ceil(low) != np.ceil(high))
+    elif node.op != "table":
+        passes &= np.sign(low) != np.sign(high)
+    return np.flatnonzero(passes)
 
 
 def _together(times: Sequence[Vector], targets: Sequence[Vector]) -> tuple[Vector, Vector]:

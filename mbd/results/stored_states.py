@@ -122,9 +122,8 @@ class StoredStates:
         found, near = time.copy(), 1e-12 * max(abs(float(time[0])), abs(float(time[-1])))
         for vector in (record.parameters, *(values for _, values in record.parameter_changes)):
             span = float(time[0]) - step, float(time[-1]) + step
-            jumps = jumps_between(self.equations, vector, *span, step)
-            rights = np.array([jump.right for jump in jumps if jump.level <= 0])
-            lefts = np.array([jump.left for jump in jumps if jump.level <= 0])
+            jumps = jumps_between(self.equations, vector, *span, step, highest=0)
+            rights, lefts = np.array([jump.right for jump in jumps]), np.array([jump.left for jump in jumps])
             if len(rights) and np.any((lefts <= time[0]) & (time[0] < rights)):
                 found[0] = rights[np.argmin(np.abs(rights - time[0]))]
             for row in first if len(rights) else ():

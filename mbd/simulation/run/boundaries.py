@@ -27,17 +27,15 @@ RESTARTS = 1
 """Highest level of a jump behind which a scheme starts again: what it remembers of accelerations holds before it."""
 
 
-def _ends_of_steps(jumps: Sequence[Jump], dt: float, order: int, follows_tolerance: bool) -> list[Jump]:
-    """The jumps at which steps end.
+def _ends_of_steps(jumps: Sequence[Jump], dt: float, follows_tolerance: bool) -> list[Jump]:
+    """The jumps at which steps end: not those about as dense as the steps, but for forces that jump, with `tol`.
 
-    Those that a scheme of this order notices: jumps and kinks of forces, and jumps of the derivative number k with
-    k + 1 < p, which cost an error of dt^(k + 1). Not those about as dense as the steps, but for jumps where steps
-    follow a tolerance. Judged around each of them, so that it does not depend on where a run begins or ends.
+    Judged around each of them, so that it does not depend on where a run begins or ends.
     """
     kept = []
     for limit, group in (
         (CROWD_OF_JUMPS, [jump for jump in jumps if jump.level <= 0]),
-        (CROWD, [jump for jump in jumps if 0 < jump.level <= max(1, order - 2)]),
+        (CROWD, [jump for jump in jumps if jump.level > 0]),
     ):
         if limit == CROWD_OF_JUMPS and follows_tolerance:
             kept += group
@@ -65,9 +63,9 @@ class Boundaries:
         self.place = 0
         self.near = min(NEAR * abs(end), 1e-6 * dt)
 
-    def break_at(self, jumps: Sequence[Jump], now: float, dt: float, order: int, follows_tolerance: bool) -> None:
-        """End steps at these jumps from now on, as far as a scheme of this order notices them."""
-        self.breaks = _ends_of_steps(jumps, dt, order, follows_tolerance)
+    def break_at(self, jumps: Sequence[Jump], now: float, dt: float, follows_tolerance: bool) -> None:
+        """End steps at these jumps from now on, but for those about as dense as the steps."""
+        self.breaks = _ends_of_steps(jumps, dt, follows_tolerance)
         self._find_place(now)
 
     def _find_place(self, now: float) -> None:

@@ -176,8 +176,9 @@ class RunData:
         """The instants at which the equations jump with the present parameters, and those in its neighbourhood."""
         around = WINDOW * self.dt
         span = min(self.start.time, now) - around, self.end + around
-        jumps = jumps_between(self.mechanism.equations, self.kernel.params, *span, self.dt)
-        self.boundaries.break_at(jumps, now, self.dt, self.integrator.order(), bool(self.kernel.adaptive))
+        highest = max(1, self.integrator.order() - 2)  # a jump of derivative k costs an error of dt^(k + 1)
+        jumps = jumps_between(self.mechanism.equations, self.kernel.params, *span, self.dt, highest)
+        self.boundaries.break_at(jumps, now, self.dt, bool(self.kernel.adaptive))
 
     def collect(self) -> None:
         """Take over the rows and events that the kernel has stored."""
