@@ -221,3 +221,26 @@ def test_within_a_short_last_step_accelerations_are_those_of_its_ends(part, seed
         room = 0.02 * size + np.ptp(ends)
         between = run.at(times)[name]
         assert np.all((between > np.min(ends) - room) & (between < np.max(ends) + room)), name
+
+
+def hung_by_light_links(mass, seed):
+    """A bob on a chain of hinged links of hardly any mass, held by rows: its places are coordinates of their own."""
+    rng = np.random.default_rng(seed)
+    model = mbd.Model("chain", gravity=(0.0, -9.81, 0.0))
+    length, angle, bob = rng.uniform(0.3, 1.5), rng.uniform(-1.2, 1.2), mbd.PointMass("bob", rng.uniform(0.5, 3.0))
+    link = mbd.Link("stick", mass, length, 0.5 * length, mass * length**2 / 12.0)
+    model.connect(mbd.Revolute("pivot", model.ground.origin, link.start))
+    model.connect(mbd.Translation("place", model.ground.origin, bob.origin), mbd.Revolute("pin", link.end, bob.origin))
+    place = {"place.x": length * np.sin(angle), "place.y": -length * np.cos(angle)}
+    return model, mbd.assemble(model, position={"pivot.angle": angle, **place})
+
+
+def test_between_rows_a_light_link_moves_as_one_without_mass():
+    t = np.linspace(0.0, 1.0, 301)
+    for seed in range(2):
+        angles = []
+        for mass in (0.0, 1e-9, 1e-13, 1e-15):
+            model, start = hung_by_light_links(mass, seed)
+            run = mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-8, until=1.0)
+            angles.append(run.at(t)["pivot.angle"])
+        assert np.max(np.abs(np.array(angles) - angles[0])) < 1e-7

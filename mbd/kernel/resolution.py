@@ -105,7 +105,7 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     if status == 0 and rough_enough and K.strategy == 0:
         if K.estimates == 0:
             rough = uncertainty(K, h, t1, at_D)
-        if rough > COARSE or K.estimates == 1:
+        if rough > COARSE:
             note_coarse(K, t1, rough)
     if K.n_dropped > 0:
         evaluate(K, t1, K.q1, K.y1)

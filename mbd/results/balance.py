@@ -199,7 +199,8 @@ class Balance:
         there = self.states.rows.part(chosen)
         M, _, _, B, *_ = self.terms_at(there)
         every = self._acting(every, there, B)
-        independent = _independent(B[:, every] / _weights(M))
+        # in the metric of M one light coordinate makes all rows that move it parallel; dependent rows are so in any
+        independent = max(_independent(B[:, every] / _weights(M)), _independent(B[:, every]), key=len)
         return _Held(every, [every[k] for k in independent])
 
     def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:

@@ -88,6 +88,8 @@ COUNTED = (
 """Counts of the kernel, and what to say where they are not zero."""
 
 
+UNKNOWN = 1.0
+"""Estimated error of a rate, over the rate, in a step that is not resolved, above which a run is in doubt [-]."""
 WRONG = 0.5
 """Share of the energy that a scheme has given or taken above which a run is in doubt [-]."""
 
@@ -112,10 +114,12 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes += [text.format(count=count, impact=run.settings["impact"]) for count, text in counts if count]
     if "nonsmooth_since" in run.settings:
         notes.append(f"{run.settings['contact_reason']}; since then errors of impacts are of the size of dt")
-    notes += coarse_steps(run, record)
+    unresolved = coarse_steps(run, record)
+    notes += unresolved
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])
     doubts += [run.energy.note] if run.energy.note and abs(run.energy.share) > WRONG and not doubts else []
+    doubts += unresolved if run.kernel.coarsest_change > UNKNOWN else []
     notes += [run.room.note] if run.room.note else []
     spent = float(run.kernel.error_sum)
     if spent > TELLING and not run.kernel.adaptive:
