@@ -84,9 +84,11 @@ def is_number(value: Any) -> bool:
 
 def _is_numeric(value: Any) -> bool:
     """Whether a value may be turned into a float."""
-    if isinstance(value, bool | np.bool_ | str | type) or np.iscomplexobj(value):  # float() drops imaginary parts
+    if isinstance(value, bool | np.bool_ | str | type) or not hasattr(value, "__float__"):
         return False
-    return hasattr(value, "__float__") and not getattr(value, "ndim", 0) and not getattr(value, "free_symbols", ())
+    if np.iscomplexobj(value):  # float() drops imaginary parts
+        return False
+    return not getattr(value, "ndim", 0) and not getattr(value, "free_symbols", ())
 
 
 def number(value: Any, what: str) -> float:

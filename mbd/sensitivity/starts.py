@@ -58,8 +58,8 @@ def unknown_name(equations: Equations, name: str, known: Collection[str], what: 
     """What to write instead of a name by which runs cannot be changed."""
     if name in restitution_names(equations):
         return (
-            f"{name!r} is a number of the model, which no run changes; give mbd.optimize a function that makes it "
-            f"anew, lambda values: mbd.sensitivities(model_of(values), …, wrt=[{name!r}])"
+            f"{name!r} is a number of the model, which no run changes; give mbd.optimize a function that makes it with "
+            f"the value, lambda values: mbd.sensitivities(model_of(values), …, wrt=[{name!r}])"
         )
     return nearest(name, known, what, "There are")
 
