@@ -201,6 +201,11 @@ def test_data_up_to_the_end_of_a_table_are_fitted(kind):
     hip = mbd.Revolute("hip", model.ground.origin, bar.start, loss=mbd.Viscous(0.3))
     model.connect(hip)
     model.apply(mbd.Motor("motor", hip, torque=mbd.Samples(t, np.sin(9.0 * t), kind)))
+    if kind == "hold":  # a prescribed motion whose table ends with the data
+        shank = mbd.Link("shank", mass=0.6, length=0.4, center=0.2, inertia=0.01)
+        hinge = mbd.Revolute("top", model.ground.point(1.0, 0.0), shank.start)
+        model.connect(hinge)
+        model.constrain(mbd.Bilateral("drive", hinge, value=mbd.Samples(t, np.sin(4.0 * t))))
     start = mbd.assemble(model, {"hip.angle": 0.4})
     seen = mbd.simulate(model, start, dt=0.005, until=0.6).at(t[1:])["hip.angle"]
     found = mbd.fit(model, start, {"time": t[1:], "hip.angle": seen}, {"hip loss.coefficient": 0.1}, dt=0.005)

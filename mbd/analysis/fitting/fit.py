@@ -138,7 +138,7 @@ def fit(
     events : measured instants [s], ``{"right foot.time": 0.71, "right foot.time.2": 1.44}``
     sigma : standard deviation of the errors of a column or an instant, which weighs it; by default a hundredth of its
         range. The size of the errors is estimated from the residuals
-    until : end of the runs [s]; by default shortly after the last value
+    until : end of the runs [s]; by default the time of the last value, or some time behind it where events are fitted
 
     Returns
     -------
@@ -211,7 +211,7 @@ def _end(data: Data, until: Any, dt: Any, tol: Any) -> float:
         if value is not None and (not is_number(value) or not 0.0 < value < math.inf):
             raise ModelError(f"{name} must be a positive {what}, not {shown(value)}")
     if until is None:
-        return float(data.last + max(2.0 * (dt or 0.0), 0.2 * data.last if data.events else 0.01 * data.last))
+        return float(data.last + (max(2.0 * (dt or 0.0), 0.2 * data.last) if data.events else 0.0))
     if not is_number(until) or not data.last <= until < math.inf:
         raise ModelError(f"until must be a time [s] not before the last value at {data.last:g} s, not {shown(until)}")
     return float(until)
