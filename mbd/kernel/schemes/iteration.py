@@ -6,13 +6,13 @@ from mbd.kernel.codes import EPS
 from mbd.kernel.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Model, Motion, Settings, SingularSteps, Steps
-from mbd.kernel.restart import compose, note_scales, restore_scales
+from mbd.kernel.restart import compose, note_scales
 from mbd.kernel.scales import ROUGH, add_force_floors
 from mbd.kernel.singular.step_pairs import WHOLE
 
 __all__ = [
-    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_below_floors", "is_small", "measures_nothing", "overturns",
-    "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at",
+    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_below_floors", "is_small", "overturns", "predict",
+    "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at", "weigh_by_accelerations",
 ]  # fmt: skip
 
 LOOK_TWICE = 0.01
@@ -126,24 +126,23 @@ def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
     return residual_size(K, o_r, 0, 0.0, 0.0, K.tolerance, both) <= 1.0
 
 
-def measures_nothing(K: Motion) -> bool:
-    """Whether scales of forces are round-off by `mbd.kernel.scales`; K.scale has floors in their place then.
+def weigh_by_accelerations(K: Motion) -> None:
+    """Weigh residuals by forces as large as the accelerations at the iterate ask for, until `restore_scales`.
 
-    Where nothing acted as they were noted, any residual is large beside them, and any correction seems to make it so.
-    It is for rows: forces are as large as the accelerations ask for that these have led to. `restore_scales` ends it.
+    Where little acted as scales were noted, a correction that meets the rows seems to make the balance far worse, which
+    is small beside the forces that the rows ask for. So rows and balance are weighed against each other before and
+    after it.
     """
     note_scales(K)
-    add_force_floors(K, 1.0)
-    nothing = False
-    for i in range(K.n_v):
-        floor = K.scale[i]
-        floor = max(floor, abs(K.acc[i * K.n + i] * K.block[K.o_a + i]))
-        if floor < 1e300:
-            nothing = nothing or K.known[i] < ROUGH * EPS * floor
-            K.weight[i] = 1.0 / floor
-    if not nothing:
-        restore_scales(K)
-    return nothing
+    add_force_floors(K, ROUGH * EPS)
+    for unit in range(2):
+        largest = 0.0
+        for i in range(K.n_v):
+            if K.unit[i] == unit:
+                largest = max(largest, abs(K.acc[i * K.n + i] * K.block[K.o_a + i]))
+        for i in range(K.n_v):
+            if K.unit[i] == unit and largest < 1e300:
+                K.weight[i] = 1.0 / max(K.scale[i], largest)
 
 
 def runs_away(K: Equations, m: int) -> bool:

@@ -24,12 +24,12 @@ from mbd.kernel.restart import (
 from mbd.kernel.schemes.iteration import (
     finish,
     is_below_floors,
-    measures_nothing,
     overturns,
     residual_size,
     roughly,
     runs_away,
     soundness_at,
+    weigh_by_accelerations,
 )
 from mbd.kernel.singular.newmark_step import WITHIN, misses, singular_newmark_step, steps_by_pivot, steps_to_singularity
 from mbd.kernel.singular.step_pairs import is_whole
@@ -81,7 +81,8 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         grown = error > FAR and error > 0.9 * left and not together  # shares that follow loads change it as well
-        if grown and m > 0 and measures_nothing(K):
+        if grown and m > 0:
+            weigh_by_accelerations(K)
             size = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
             grown = size > FAR and size > 0.9 * size_before(K, m, c_C, c_K, tolerance)
             restore_scales(K)

@@ -22,7 +22,7 @@ from mbd.kernel.restart import (
 from mbd.kernel.scales import ROUGH, add_force_floors
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
-from mbd.kernel.schemes.iteration import measures_nothing, roughly, runs_away
+from mbd.kernel.schemes.iteration import roughly, runs_away, weigh_by_accelerations
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import (
@@ -134,7 +134,8 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
     for iteration in range(K.max_iterations):
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
         grown = error > FAR_OFF and error > 0.9 * left and not sharing(K)  # shares that follow loads change it as well
-        if grown and m > 0 and measures_nothing(K):
+        if grown and m > 0:
+            weigh_by_accelerations(K)
             retreat_stages(K, m, 1.0)
             size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
             retreat_stages(K, m, -1.0)
