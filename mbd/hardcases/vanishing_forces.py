@@ -1,4 +1,4 @@
-"""Mechanisms in which forces vanish: one that its drive has moved and holds (j19), balanced shafts (p7)."""
+"""Mechanisms in which forces vanish: one that its drive has moved and holds (j21), balanced shafts (p7)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "cardan", "slider_crank"]
 
-J19, P7 = "j19-moved-and-held", "p7-balanced-cardan"
+J21, P7 = "j21-moved-and-held", "p7-balanced-cardan"
 STEPS = (1e-3, 2e-4)
 """Steps of the slider-crank [s]."""
 
 
 def slider_crank(gravity: float, cut: str) -> tuple[mbd.Model, mbd.State]:
     """A crank that turns by `rise` within `time`, with continuous accelerations, and is held then."""
-    case = numbers(J19)
+    case = numbers(J21)
     R, L, start = case["crank"], case["rod"], case["angle"]
     model = mbd.Model("slider-crank", gravity=(0.0, -gravity, 0.0), cut=cut)
     arm = mbd.Link("arm", case["m_crank"], R, 0.5 * R, case["m_crank"] * R**2 / 12.0)
@@ -46,8 +46,8 @@ def slider_crank(gravity: float, cut: str) -> tuple[mbd.Model, mbd.State]:
 
 def judge_held(integrator: Any) -> Outcome:
     """It rests where it was moved to, and the drive holds its weight, or nothing; no step is in doubt."""
-    case = numbers(J19)
-    torque, place = (quantity(J19, name) for name in ("torque at rest", "place of the piston"))
+    case = numbers(J21)
+    torque, place = (quantity(J21, name) for name in ("torque at rest", "place of the piston"))
     off, moved, doubts, curves = 0.0, 0.0, 0, []
     for cut in ("auto", "all"):
         for gravity in (case["g"], 0.0):
@@ -83,13 +83,13 @@ def cardan(angle: float, cut: str) -> tuple[mbd.Model, mbd.State]:
 
 
 def judge_cardan(integrator: Any) -> Outcome:
-    """``tan φ₂ cos β = tan φ₁`` and, by energy, ``φ̇₁² (I₁ + I₂ ρ²)`` as it was, with ρ = dφ₂/dφ₁."""
+    """``tan φ₂ = cos β tan φ₁`` and, by energy, ``φ̇₁² (I₁ + I₂ ρ²)`` as it was, with ρ = dφ₂/dφ₁."""
     case = numbers(P7)
     bend, (along, across, _) = case["bend"], case["I_out"]
     second = along * math.cos(bend) ** 2 + across * math.sin(bend) ** 2
 
     def inertia(angle: Any) -> Any:
-        ratio = math.cos(bend) / (1.0 - (math.sin(bend) * np.cos(angle)) ** 2)
+        ratio = math.cos(bend) / (1.0 - (math.sin(bend) * np.sin(angle)) ** 2)
         return case["I_in"][0] + second * ratio**2
 
     turned, fast, gained, curves = 0.0, 0.0, 0.0, []
@@ -98,7 +98,7 @@ def judge_cardan(integrator: Any) -> Outcome:
             model, start = cardan(angle, cut)
             run = mbd.simulate(model, start, integrator, dt=case["dt"], until=case["until"])
             first, speed = np.asarray(run["first.angle"]), np.asarray(run["first.angle.rate"])
-            wanted = np.unwrap(np.arctan2(np.sin(first), math.cos(bend) * np.cos(first)))
+            wanted = np.unwrap(np.arctan2(math.cos(bend) * np.sin(first), np.cos(first)))
             turned = max(turned, float(np.max(np.abs(np.unwrap(run["second.angle"]) - wanted))))
             exact = case["speed"] * np.sqrt(inertia(angle) / inertia(first))
             fast = max(fast, float(np.max(np.abs(speed - exact))))
@@ -113,7 +113,7 @@ def judge_cardan(integrator: Any) -> Outcome:
 
 
 CASES = (
-    HardCase(J19, "A mechanism that its drive has moved and holds is at rest; the drive holds its weight, or nothing.",
+    HardCase(J21, "A mechanism that its drive has moved and holds is at rest; the drive holds its weight, or nothing.",
              judge_held, EVERY),
     HardCase(P7, "Balanced shafts on a Cardan joint, on which no force acts, turn by its law and keep their energy.",
              judge_cardan, EVERY),
