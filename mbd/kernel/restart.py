@@ -358,7 +358,17 @@ def holds_rows(K: Motion, m: int) -> bool:
 
 
 def find_sliding_friction(K: ContactForces) -> None:
-    """Friction that slides follows the multipliers of the held rows in K.impulse."""
+    """Friction that slides follows the multipliers of the held rows in K.impulse, at the state now in K.acc.
+
+    Its tangents are those of where the contact is, as in the equations, not of the place that it held last: the block
+    has these for the anchors of both directions of a contact in space.
+    """
+    if K.n_cones > 0:
+        for f in range(K.n_frictions):
+            c = K.friction_contact[f]
+            if c >= 0 and K.partner[f] > f and K.slip[f] != 0.0:
+                for k in range(K.anchor_start[c], K.anchor_start[c + 1]):
+                    K.block[K.o_anchor + k] = K.acc[K.acc_captured + k]
     evaluate_loaded(K, K.impulse)
     for f in range(K.n_frictions):
         if K.slip[f] != 0.0:

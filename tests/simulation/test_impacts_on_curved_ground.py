@@ -196,3 +196,29 @@ def test_derivatives_through_impacts_on_curved_ground_are_those_of_runs(law, fri
         assert one == two
         columns.append((ahead - behind)[[3, 4, 5, 2]] / 2e-5)
     assert found == pytest.approx(np.column_stack(columns), abs=1e-6 * np.max(np.abs(columns)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sliding_friction_is_the_same_in_both_rows_of_the_impact_of_another(seed):
+    """Two masses that share nothing but the ground: the forces of the one that slides go on as the other strikes."""
+    rng = np.random.default_rng((seed, 77))
+    ground = hill(rng, False, False)
+    model, place, velocity = mbd.Model("two masses"), {}, {}
+    for name, friction in (("slider", 0.2), ("striker", None)):
+        body = mbd.PointMass(name, mass=1.3)
+        model.connect(mbd.Translation(f"{name} place", model.ground.origin, body.origin, axes="xyz"))
+        model.constrain(mbd.Unilateral(f"{name} foot", mbd.touchdown(body.origin, ground), friction=friction))
+        x, z = rng.uniform(-0.5, 0.5, 2)
+        above = 0.02 if name == "slider" else 0.3
+        place |= {f"{name} place.x": x, f"{name} place.y": touching(ground, x, z, 0.0)[0] + above}
+        place |= {f"{name} place.z": z}
+        velocity |= {f"{name} place.x": 1.5 * (name == "slider"), f"{name} place.z": 1.0 * (name == "slider")}
+    run = mbd.simulate(
+        model, mbd.assemble(model, position=place, velocity=velocity), mbd.HHT(0.05), dt=2e-3, until=0.3,
+        contact="events",
+    )  # fmt: skip
+    row = next(event.row for event in run.events if event.name == "striker foot" and event.kind == "closed")
+    parts = [run[f"slider foot.friction.{part}"] for part in ("forward", "sideways")]
+    assert run.time[row] == run.time[row - 1] and np.hypot(*(part[row] for part in parts)) > 0.5
+    for part in parts:
+        assert part[row - 1] == pytest.approx(part[row], abs=1e-9)
