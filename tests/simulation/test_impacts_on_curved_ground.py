@@ -222,3 +222,17 @@ def test_sliding_friction_is_the_same_in_both_rows_of_the_impact_of_another(seed
     assert run.time[row] == run.time[row - 1] and np.hypot(*(part[row] for part in parts)) > 0.5
     for part in parts:
         assert part[row - 1] == pytest.approx(part[row], abs=1e-9)
+
+
+@pytest.mark.parametrize("friction", [None, 0.6, 3.0])
+def test_a_foot_on_a_steep_hill_that_can_neither_stick_nor_leave_is_told_to_slip(friction):
+    """Held it would pull (−0.58 N), released it would sink in (−1.2 m/s²); with friction it slips and goes on."""
+    model = mbd.Model("one foot")
+    body = mbd.RigidBody("body", 1.448, 0.1082)
+    model.connect(mbd.Planar("flight", model.ground.origin, body.origin))
+    sole = mbd.touchdown(body.point(-0.2, -0.1), lambda x: 0.2873 * mbd.sin(2.107 * x))
+    model.constrain(mbd.Unilateral("foot", sole, friction=friction))
+    start = mbd.assemble(model, position={"flight.x": 1.72, "flight.y": 0.8636, "flight.angle": 0.0604})
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=5e-3, until=0.45, contact="events", on_failure="return")
+    assert run.success == (friction is not None)
+    assert run.success or "with which it slips there" in run.message

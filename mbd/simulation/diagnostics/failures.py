@@ -262,13 +262,14 @@ def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[Eve
         message = f"more than {most} switches" if many else "the same switches again and again"
         return (
             f"{message} at one instant: {_last_events(events)}; they "
-            "follow each other without motion; give a contact a release rule, friction or a penalty law, or an event "
-            "a reset that leaves zero"
+            f"follow each other without motion; {_sticking(stepper, events)}give a contact a release rule, friction or "
+            "a penalty law, or an event a reset that leaves zero"
         )
     if status == codes.NO_IMPACT:
         return (
             f"no forces or impulses let every contact push or open{_touching(stepper)}: one that sticks "
-            "whatever its force may have none; use friction=0, a release rule or a penalty contact"
+            "whatever its force may have none, where it pulls closed and would sink in open; give it friction=mu, with "
+            "which it slips there, or 0, a release rule or a penalty contact"
         )
     if status == codes.ENERGY_GAIN:
         return (
@@ -341,6 +342,20 @@ def _worst(stepper: Stepper) -> str:
         return ""
     worst = max(sizes, key=lambda name: sizes[name])
     return f", furthest from balance at {worst if worst.startswith(chr(39)) else repr(worst)}"
+
+
+def _sticking(stepper: Stepper, events: Sequence[EventRecord]) -> str:
+    """A clause on the contact that opens and closes by turns and sticks whatever its force, '' if there is none."""
+    equations = stepper.mechanism.equations
+    limited = {friction.contact for friction in stepper.manager.frictions}
+    for name in dict.fromkeys(event.name for event in events[-6:] if event.kind == "opened"):
+        contact = stepper.manager.names.index(name)
+        if len(equations.contacts[contact].rows) > 1 and contact not in limited:
+            return (
+                f"{name!r} sticks whatever its force, and may pull closed and sink in open: with friction=mu it slips "
+                "there; else "
+            )
+    return ""
 
 
 def _touching(stepper: Stepper) -> str:
