@@ -74,9 +74,9 @@ def judge_switched(integrator: Any) -> Outcome:
     model, start = switched(given)
     end, figures = published(ROD, "angle at the end"), []
 
-    def error(**how: float) -> float:
+    def error(**how: Any) -> float:
         run = mbd.simulate(model, start, integrator, until=given["until"], **how)
-        return abs(float(run["hinge.angle"][-1]) - end)
+        return float(abs(run["hinge.angle"][-1] - end))
 
     fixed = [error(dt=dt) for dt in given["dts"]]
     order = min(2.0, float(integrator.order()))
