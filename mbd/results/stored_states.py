@@ -81,9 +81,11 @@ class StoredStates:
         inputs = self.inputs(rows)
         if self.times_beside_jumps is not None:
             known, beside = self.record.time, self.times_beside_jumps
-            own, after = rows.time == known[rows.source], np.minimum(rows.source + 1, len(known) - 1)
+            after = np.minimum(rows.source + 1, len(known) - 1)
+            own = np.abs(rows.time - known[rows.source]) <= ULPS * np.abs(known[rows.source])  # or a little before it
             ends = ~own & (np.abs(rows.time - known[after]) <= ULPS * np.abs(known[after]))
-            time = np.where(own, beside[rows.source], np.where(ends, beside[after], rows.time))
+            there = np.where(rows.time < known[rows.source], rows.time, beside[rows.source])
+            time = np.where(own, np.minimum(there, beside[rows.source]), np.where(ends, beside[after], rows.time))
             inputs = {**inputs, "t": time}
         if all(friction.partner < 0 for friction in self.equations.frictions):
             return inputs
