@@ -353,7 +353,7 @@ def test_driven_scenes_are_sound(number):
 
 
 def test_the_judge_sees_accelerations_that_alternate_around_those_of_a_drive():
-    made = scene(DRIVEN + 1)
+    made = scene(DRIVEN + 41)
     run, model = run_of(made), made.model
     assert not judge(run, model, made.parameters).faults
     place = [c.name for c in run.record.equations.coordinates].index("main.angle")

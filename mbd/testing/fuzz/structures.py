@@ -328,7 +328,7 @@ SPACE = 1_000_000
 """From this number on mechanisms are of `SPATIAL_KINDS`, with joints that turn freely."""
 
 
-DRIVEN = 2_000_000
+DRIVEN = 10_000_000
 """From this number on they are of `DRIVEN_KINDS`: prescribed motions, rest, exact zeros, curved ground."""
 
 
