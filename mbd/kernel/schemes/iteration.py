@@ -126,8 +126,10 @@ def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
     return residual_size(K, o_r, 0, 0.0, 0.0, K.tolerance, both) <= 1.0
 
 
-def weigh_by_accelerations(K: Motion) -> None:
+def weigh_by_accelerations(K: Motion) -> bool:
     """Weigh residuals by forces as large as the accelerations at the iterate ask for, until `restore_scales`.
+
+    Returns whether the scales that were noted are round-off beside them.
 
     Where little acted as scales were noted, a correction that meets the rows seems to make the balance far worse, which
     is small beside the forces that the rows ask for. So rows and balance are weighed against each other before and
@@ -135,6 +137,7 @@ def weigh_by_accelerations(K: Motion) -> None:
     """
     note_scales(K)
     add_force_floors(K, ROUGH * EPS)
+    nothing = False
     for unit in range(2):
         largest = 0.0
         for i in range(K.n_v):
@@ -142,7 +145,9 @@ def weigh_by_accelerations(K: Motion) -> None:
                 largest = max(largest, abs(K.acc[i * K.n + i] * K.block[K.o_a + i]))
         for i in range(K.n_v):
             if K.unit[i] == unit and largest < 1e300:
+                nothing = nothing or K.known[i] < K.scale[i] or K.known[i] < ROUGH * EPS * largest
                 K.weight[i] = 1.0 / max(K.scale[i], largest)
+    return nothing
 
 
 def runs_away(K: Equations, m: int) -> bool:

@@ -135,12 +135,12 @@ def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
         grown = error > FAR_OFF and error > 0.9 * left and not sharing(K)  # shares that follow loads change it as well
         if grown and m > 0:
-            weigh_by_accelerations(K)
-            retreat_stages(K, m, 1.0)
-            size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
-            retreat_stages(K, m, -1.0)
-            size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) / (size + 1e-300)
-            grown = size > 0.9
+            if weigh_by_accelerations(K):
+                retreat_stages(K, m, 1.0)
+                size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
+                retreat_stages(K, m, -1.0)
+                size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) / (size + 1e-300)
+                grown = size > 0.9
             restore_scales(K)
         if retreats < MOST_RETREATS and iteration > 0 and (error < 0.0 or grown):
             retreat_stages(K, m, 0.5)  # a full Newton step jumped over a steep place
