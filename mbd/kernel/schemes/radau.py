@@ -278,7 +278,7 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
             status = STAGNATED
     if status == NOT_CONVERGED and evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
         return 0
-    if evaluate_stages(K, h, t1, m, 1.0, 0.0, 0.0, False) <= 16.0:  # rows are round-off
+    if (m > 0 or stuck) and evaluate_stages(K, h, t1, m, 1.0, 0.0, 0.0, False) <= 16.0:  # rows are round-off
         add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
         if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
             K.n_stagnations += 1
