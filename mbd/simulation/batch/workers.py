@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import fields
 from threading import Event, Lock
 
@@ -19,6 +19,8 @@ __all__ = ["Interrupted", "Workers", "processors"]
 
 AT_ONCE = 4096
 """Runs that a thread takes together at most."""
+LISTENING = 0.1
+"""Seconds between two instants at which the threads of a batch hear that somebody has interrupted it."""
 PARTS = 4
 """Parts of the runs of each thread, so that one with short runs takes over from one with long ones [-]."""
 
@@ -102,8 +104,11 @@ class Workers:
             else:
                 with ThreadPoolExecutor(count) as pool:
                     try:
-                        for task in [pool.submit(work, many) for many in self._many[:count]]:
-                            task.result()
+                        waiting_for = {pool.submit(work, many) for many in self._many[:count]}
+                        while waiting_for:  # in short waits, since a long one would not hear Ctrl-C everywhere
+                            over_now, waiting_for = wait(waiting_for, LISTENING, FIRST_COMPLETED)
+                            for task in over_now:
+                                task.result()
                     except BaseException:
                         halt.set()
                         raise
