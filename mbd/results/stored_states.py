@@ -82,10 +82,11 @@ class StoredStates:
         if self.times_beside_jumps is not None:
             known, beside = self.record.time, self.times_beside_jumps
             after = np.minimum(rows.source + 1, len(known) - 1)
-            own = np.abs(rows.time - known[rows.source]) <= ULPS * np.abs(known[rows.source])  # or a little before it
+            early = known[rows.source] - rows.time  # a little, where somebody asks for the side before the row
+            own = (early >= 0.0) & (early <= ULPS * np.abs(known[rows.source]))
             ends = ~own & (np.abs(rows.time - known[after]) <= ULPS * np.abs(known[after]))
-            there = np.where(rows.time < known[rows.source], rows.time, beside[rows.source])
-            time = np.where(own, np.minimum(there, beside[rows.source]), np.where(ends, beside[after], rows.time))
+            there = np.where(early > 0.0, np.minimum(rows.time, beside[rows.source]), beside[rows.source])
+            time = np.where(own, there, np.where(ends, beside[after], rows.time))
             inputs = {**inputs, "t": time}
         if all(friction.partner < 0 for friction in self.equations.frictions):
             return inputs
