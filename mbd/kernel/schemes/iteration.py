@@ -134,12 +134,21 @@ def weigh_by_accelerations(K: Motion) -> bool:
     Where little acted as scales were noted, a correction that meets the rows seems to make the balance far worse, which
     is small beside the forces that the rows ask for. So rows and balance are weighed against each other before and
     after it.
+
+    A body without inertia balances moments of forces alone, which have no arm where all points are at the origin: there
+    the way in the step is one.
     """
     note_scales(K)
     add_force_floors(K, ROUGH * EPS)
     nothing = False
+    force = 0.0
+    way = K.extent
+    for i in range(K.n_v):
+        if K.unit[i] == 0:
+            force = max(force, K.known[i])
+            way = max(way, abs(K.block[K.o_x + i]))
     for unit in range(2):
-        largest = 0.0
+        largest = force * way if unit == 1 else 0.0
         for i in range(K.n_v):
             if K.unit[i] == unit:
                 largest = max(largest, abs(K.acc[i * K.n + i] * K.block[K.o_a + i]))
