@@ -31,9 +31,9 @@ __all__ = ["Jump", "Switch", "instant_slopes", "jumps_between", "switches_of", "
 EPS = sys.float_info.epsilon
 ROUND_OFF = 8.0 * EPS
 """How far round-off moves an instant, relative to it and to what is compared [-]."""
-MOST_JUMPS = 1_000_000
+MAX_JUMPS = 1_000_000
 """Instants of one switch at most [-]."""
-FEWEST_SAMPLES, MOST_SAMPLES = 4096, 1_048_576
+MIN_SAMPLES, MAX_SAMPLES = 4096, 1_048_576
 """Samples in time of an expression that is not linear in it [-]."""
 PER_STEP = 4.0
 """Samples in a step of the run [-]."""
@@ -167,7 +167,7 @@ def _of_table(node: Node, phase: tuple[Node, float, float] | None, offset: int, 
 
     def repeated(low: float, high: float) -> Vector:
         first, last = np.floor((low - start) / period), np.floor((high - start) / period)
-        last = min(last, first + MOST_JUMPS / max(1, len(places)))
+        last = min(last, first + MAX_JUMPS / max(1, len(places)))
         each = places[None, :] + period * np.arange(first - 1.0, last + 1.0)[:, None]
         every = each.ravel()
         return np.asarray(every[(every >= low) & (every <= high)])
@@ -185,7 +185,7 @@ def _zero(low: float, high: float) -> Vector:
 
 def _whole(low: float, high: float) -> Vector:
     first, last = np.ceil(low), np.floor(high)
-    return np.arange(first, min(last, first + MOST_JUMPS) + 1.0)
+    return np.arange(first, min(last, first + MAX_JUMPS) + 1.0)
 
 
 def _constant(level: int) -> Callable[[Vector], Vector]:
@@ -359,7 +359,7 @@ class _Times:
 
     def _by_bisection(self, switch: Switch, starts: Vector, widths: Vector) -> tuple[Vector, Vector]:
         """Of any expression, as far as samples tell."""
-        count = float(np.clip(PER_STEP * widths.sum() / self.dt, FEWEST_SAMPLES, MOST_SAMPLES))
+        count = float(np.clip(PER_STEP * widths.sum() / self.dt, MIN_SAMPLES, MAX_SAMPLES))
         before, behind, targets = [], [], []
         for start, width in zip(starts, widths, strict=True):
             part = max(2, int(count * width / widths.sum()))
@@ -404,7 +404,7 @@ def _together(times: Sequence[Vector], targets: Sequence[Vector]) -> tuple[Vecto
     if not times:
         return np.zeros(0), np.zeros(0)
     every = np.concatenate(times)
-    order = np.argsort(every, kind="stable")[:MOST_JUMPS]
+    order = np.argsort(every, kind="stable")[:MAX_JUMPS]
     return every[order], np.concatenate(targets)[order]
 
 

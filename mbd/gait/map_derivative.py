@@ -27,7 +27,7 @@ STATE_STEP, PARAMETER_STEP = 2e-4, 2e-3
 is tried, over them or 1."""
 NEAR_ENOUGH, UNSEEN = 30.0, 1e-9
 """Factor by which what a parameter changes may differ from `STATE_STEP`, and the share of it that is no change [-]."""
-LEAP, LEAPS, WIDEST = 1e5, 12, 1e15
+MAX_RESCALING, MAX_RESCALINGS, WIDEST = 1e5, 12, 1e15
 """Factor by which its difference changes at most at once, how often, and how wide it gets, over it or 1 [-]."""
 COARSE_STEP = 1e-5
 """Difference where two runs a direction must do."""
@@ -111,8 +111,11 @@ def map_derivative(
     size = len(found.numbers)
     for column in columns:
         if column.name:
-            column.leaps, column.step = LEAPS, scale * map_.parameter_steps.get(column.name, column.step / scale)
-    for _ in range(TRIES + LEAPS):
+            column.rescalings, column.step = (
+                MAX_RESCALINGS,
+                scale * map_.parameter_steps.get(column.name, column.step / scale),
+            )
+    for _ in range(TRIES + MAX_RESCALINGS):
         pending = [column for column in columns if not column.done]
         if not pending:
             break
@@ -132,7 +135,8 @@ def map_derivative(
 class _Column:
     """The search for the derivative along one direction: its differences h, 2h, 4h and what they came to.
 
-    tries, leaps : that are left; first : h whose effect was as wanted; bound : h from which on runs have other events
+    tries, rescalings : that are left; first : h whose effect was as wanted
+    bound : h from which on runs have other events
     """
 
     move: Vector
@@ -142,7 +146,7 @@ class _Column:
     done: bool = False
     reason: str = ""
     tries: int = TRIES
-    leaps: int = 0
+    rescalings: int = 0
     first: float = 0.0
     bound: float = np.inf
 
@@ -166,9 +170,9 @@ class _Column:
             self._tried(self.best is not None)
             return
         ends: Any = beside[:2]
-        if self.leaps and self._leaps(0.5 * float(np.max(np.abs(ends[0] - ends[1]), initial=0.0)), wanted):
+        if self.rescalings and self._rescales(0.5 * float(np.max(np.abs(ends[0] - ends[1]), initial=0.0)), wanted):
             return
-        self.leaps, self.first = 0, self.first or self.step
+        self.rescalings, self.first = 0, self.first or self.step
         pairs = zip(beside[::2], beside[1::2], strict=True)
         slopes = [(ahead - behind) / (2.0**level * 2.0 * self.step)  # type: ignore[operator]
                   for level, (ahead, behind) in enumerate(pairs)]  # fmt: skip
@@ -187,19 +191,20 @@ class _Column:
 
     def _tried(self, good: bool) -> None:
         """One try less, but for those by which the size of a parameter's difference is found."""
-        if self.leaps and not good:
-            self.leaps -= 1
+        if self.rescalings and not good:
+            self.rescalings -= 1
             return
         self.tries -= 1
         self.done = good or self.tries <= 0
 
-    def _leaps(self, change: float, wanted: float) -> bool:
+    def _rescales(self, change: float, wanted: float) -> bool:
         """Whether h is to change first, since its effect is much larger or smaller than wanted."""
-        factor = LEAP if change <= UNSEEN * wanted else min(max(wanted / change, 1.0 / LEAP), LEAP)
+        factor = wanted / change if change > UNSEEN * wanted else MAX_RESCALING
+        factor = min(max(factor, 1.0 / MAX_RESCALING), MAX_RESCALING)
         step = min(self.step * factor, SHRINK * self.bound)
         if 1.0 / NEAR_ENOUGH <= step / self.step <= NEAR_ENOUGH or step > WIDEST:
             return False
-        self.step, self.leaps = step, self.leaps - 1
+        self.step, self.rescalings = step, self.rescalings - 1
         return True
 
 

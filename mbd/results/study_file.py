@@ -64,7 +64,7 @@ class StudyFile:
     def add(self, part: Mapping[str, Any]) -> None:
         """Write a part that is done; it is on the disk as this returns.
 
-        Where the disk is full, an `MbdWarning` says so, and the study goes on without the file.
+        Where the disk is full, an `MbdWarning` says so, and the study continues without the file.
         """
         if not self.writes:
             return

@@ -36,7 +36,7 @@ STEP, LEVELS = 1e-4, 4
 """Change of what a run is differentiated by, over it or 1, to the runs on each side, and how many, each half as far."""
 JUMP = 1e-6
 """Difference of a result from its limit on a side, relative to 1 or the result, above which it jumps there."""
-MOST_SHOWN = 4
+MAX_SHOWN = 4
 """Values in the sentence of a refusal at most [-]."""
 
 
@@ -183,8 +183,8 @@ def with_both_sides(
             if jumps or not np.isclose(below, above, rtol=1e-6, atol=1e-9):
                 shown.append(f"d({name})/d({way.name}) is {below:.6g} below and {above:.6g} above"
                              + (f", where it jumps from {low:.6g} to {high:.6g}" if jumps else ""))  # fmt: skip
-    more = "" if len(shown) <= MOST_SHOWN else f" and {len(shown) - MOST_SHOWN} more in the error's sides"
-    text = f"{error}; by runs on each side {', '.join(shown[:MOST_SHOWN])}{more}" if shown else str(error)
+    more = "" if len(shown) <= MAX_SHOWN else f" and {len(shown) - MAX_SHOWN} more in the error's sides"
+    text = f"{error}; by runs on each side {', '.join(shown[:MAX_SHOWN])}{more}" if shown else str(error)
     full = OneSidedError(text)
     full.run, full.sides = run, found
     return full

@@ -37,6 +37,9 @@ def test_what_lies_on_a_point_that_sets_off_follows_it(seed: int) -> None:
         moved = size * run.time**3
         np.testing.assert_allclose(run["flight.x"], moved, rtol=0, atol=1e-9 * moved[-1] + 1e-16)
         np.testing.assert_allclose(
-            run["drive.force"], (heavy + light) * 6.0 * size * run.time, rtol=0, atol=1e-9 * 120.0 * size * dt * heavy + 1e-12
+            run["drive.force"],
+            (heavy + light) * 6.0 * size * run.time,
+            rtol=0,
+            atol=1e-9 * 120.0 * size * dt * heavy + 1e-12,
         )
         assert np.all(np.abs(run["flight.z"]) <= 1e-16)

@@ -345,7 +345,7 @@ def _worst(stepper: Stepper) -> str:
 
 
 def _sticking(stepper: Stepper, events: Sequence[EventRecord]) -> str:
-    """A clause on the contact that opens and closes by turns and sticks whatever its force, '' if there is none."""
+    """A clause on the contact that opens and closes alternately and sticks whatever its force, '' if there is none."""
     equations = stepper.mechanism.equations
     limited = {friction.contact for friction in stepper.manager.frictions}
     for name in dict.fromkeys(event.name for event in events[-6:] if event.kind == "opened"):

@@ -31,12 +31,12 @@ SAMPLES = 64
 """Rows of a run at which it is compared, about [-]."""
 MIDDLES = 32
 """Middles between rows at which it is compared, about, if what it gives there is in doubt [-]."""
-LATE, MOST_PARTS = 0.9, 8
+LATE, MAX_PARTS = 0.9, 8
 """The last part of an interval at which forces of drives are compared, and how many parts there are at most [-].
 
 Steps that are taken again err most near their ends; few long ones may hold a jerk that jumps anywhere.
 """
-MOST_PLACES = 512
+MAX_PLACES = 512
 """Places between rows at which they are compared, about [-]."""
 BESIDE = 1e-9
 """Instants this close to an event are not compared, relative to the length of the run [-]."""
@@ -98,8 +98,8 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[
     )  # fmt: skip
     if not drives_of(run) or not drives_of(other):
         return found
-    parts = max(2, min(MOST_PARTS, MOST_PLACES // len(run.time)))
-    inside = [_some_middles(run, end, LATE * (k + 1) / parts, MOST_PLACES // parts) for k in range(parts)]
+    parts = max(2, min(MAX_PARTS, MAX_PLACES // len(run.time)))
+    inside = [_some_middles(run, end, LATE * (k + 1) / parts, MAX_PLACES // parts) for k in range(parts)]
     times = np.unique(np.concatenate([_rows(run, end)[:-1], *inside]))
     size, name = share(run, other, times[apart(times, shifted, beside)])
     return replace(found, size=size, name=name) if size > moved else found
