@@ -135,8 +135,8 @@ def weigh_by_accelerations(K: Motion) -> bool:
     is small beside the forces that the rows ask for. So rows and balance are weighed against each other before and
     after it.
 
-    A body without inertia balances moments of forces alone, which have no arm where all points are at the origin: there
-    the way in the step is one.
+    A coordinate without inertia balances moments of forces alone, which have no arm where all points are at the origin:
+    there the way in the step is one.
     """
     note_scales(K)
     add_force_floors(K, ROUGH * EPS)
@@ -148,14 +148,17 @@ def weigh_by_accelerations(K: Motion) -> bool:
             force = max(force, K.known[i])
             way = max(way, abs(K.block[K.o_x + i]))
     for unit in range(2):
-        largest = force * way if unit == 1 else 0.0
+        largest = 0.0
         for i in range(K.n_v):
             if K.unit[i] == unit:
                 largest = max(largest, abs(K.acc[i * K.n + i] * K.block[K.o_a + i]))
         for i in range(K.n_v):
-            if K.unit[i] == unit and largest < 1e300:
-                nothing = nothing or K.known[i] < K.scale[i] or K.known[i] < ROUGH * EPS * largest
-                K.weight[i] = 1.0 / max(K.scale[i], largest)
+            size = largest
+            if unit == 1 and K.acc[i * K.n + i] == 0.0:
+                size = max(size, force * way)
+            if K.unit[i] == unit and size < 1e300:
+                nothing = nothing or K.known[i] < K.scale[i] or K.known[i] < ROUGH * EPS * size
+                K.weight[i] = 1.0 / max(K.scale[i], size)
     return nothing
 
 
