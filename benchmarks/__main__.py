@@ -1,4 +1,4 @@
-"""``python -m benchmarks [run | compare | baseline | peers]``: see README.md here."""
+"""``python -m benchmarks [run | compare | baseline | peers | house]``: see README.md here."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from benchmarks import house
 from benchmarks.compare import comparison, regressions
 from benchmarks.figures import NOISY, table
 from benchmarks.handwritten import compiler
@@ -18,8 +19,9 @@ def main() -> int:
     """Measure and print; 1 if a comparison finds a figure more than 15 % worse."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="What mbd costs, measured.")
     parser.add_argument(
-        "what", nargs="?", default="run", choices=("run", "compare", "baseline", "peers"),
-        help="print the figures; compare them with the baseline; make them the baseline; or compare with other systems",
+        "what", nargs="?", default="run", choices=("run", "compare", "baseline", "peers", "house"),
+        help="print the figures; compare them with the baseline; make them the baseline; compare with other systems; "
+        "or count lines, constants and imports of the source",
     )  # fmt: skip
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
     parser.add_argument("--repeats", type=int, default=7, help="of every measurement, minima count (default 7)")
@@ -30,6 +32,9 @@ def main() -> int:
     options = parser.parse_args()
     if options.what == "peers":
         return _peers(parser, [word for word in options.scenes.split(",") if word], options.json)
+    if options.what == "house":
+        print(house.report(house.measure()))
+        return 0
     if options.what == "compare" and not BASELINE.exists():
         parser.error(f"there is no {BASELINE.name} to compare with; make one with 'python -m benchmarks baseline'")
     if compiler() is None:
