@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mbd import parts as parts, testing as testing
     from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
     from mbd.analysis.designs import latin_hypercube as latin_hypercube, sobol as sobol
     from mbd.analysis.effects import Effects as Effects, effects as effects

@@ -7,13 +7,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Matrix", "Vector", "read_only"]
+__all__ = ["ComplexArray", "Matrix", "Vector", "read_only"]
 
 Vector: TypeAlias = NDArray[np.float64]
 """(n,) array of float64."""
 
 Matrix: TypeAlias = NDArray[np.float64]
 """(m, n) array of float64, row-major."""
+
+ComplexArray: TypeAlias = NDArray[np.complex128]
+"""Array of complex128, of the shape that its place states."""
 
 
 def read_only(array: Any) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import ReferenceType, WeakKeyDictionary, ref
 
 import numpy as np
@@ -13,6 +13,9 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.notebook import table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["Memory", "Mode", "State", "are_names", "malformed", "of_model"]
 
@@ -174,7 +177,7 @@ class State:
             lines.append(f"  assembly moved {len(self.moved)} of these; farthest {far[0]!r} by {far[1]:.3g}")
         return "\n".join(lines)
 
-    def plot(self, path: str | Path | None = None, model: Any = None, view: Any = None) -> Any:
+    def plot(self, path: str | Path | None = None, model: Any = None, view: Any = None) -> Axes:
         """The mechanism at this state, drawn as on the page: bodies, joints, named points, the ground and its forces.
 
         The forces are those of the contacts that are closed at this state, of models without controllers; the largest

@@ -24,6 +24,8 @@ from mbd.results.record import EventRecord, Events, Record
 from mbd.state import State
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.results.failure import Failure
     from mbd.results.impulses import Impulses
     from mbd.results.ledger import Ledger
@@ -255,7 +257,7 @@ class Trajectory:
         return summary(self)
 
     # pictures and files -----------------------------------------------------------------------------------------
-    def plot(self, *names: str, path: str | Path | None = None, degrees: bool = True) -> Any:
+    def plot(self, *names: str, path: str | Path | None = None, degrees: bool = True) -> Figure:
         """Time histories, one panel per kind of quantity, with the events marked and times of contact shaded.
 
         Without names the model's coordinates. Axes of angles are in degrees, or in radians with ``degrees=False``;

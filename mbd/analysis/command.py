@@ -7,7 +7,10 @@ from argparse import Namespace
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Found", "Script", "passed_on", "write"]
 
@@ -29,7 +32,7 @@ class Found(Protocol):
 
     def to_csv(self, path: str | Path) -> Path: ...
 
-    def plot(self, path: str | Path | None = None) -> Any: ...
+    def plot(self, path: str | Path | None = None) -> Figure: ...
 
     def page(self, path: str | Path) -> Path: ...
 

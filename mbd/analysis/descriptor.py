@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from mbd.analysis.independent import row_sizes
 from mbd.analysis.instant import Instant
 from mbd.analysis.linear_motion import Prescribed, multiplier_map
-from mbd.arrays import Matrix
+from mbd.arrays import ComplexArray, Matrix
 from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError
@@ -46,13 +46,14 @@ class DescriptorForm:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
 
-    def transfer(self, s: Any) -> Any:
+    def transfer(self, s: Any) -> ComplexArray:
         """``C (s E − A)⁻¹ B + D`` at complex numbers s [1/s]; (…, o, k) for s of shape (…)."""
         points = np.asarray(s, dtype=complex)[..., None, None]
         try:
-            return self.C @ np.linalg.solve(points * self.E - self.A, self.B.astype(complex)) + self.D
+            inside = np.linalg.solve(points * self.E - self.A, self.B.astype(complex))
         except np.linalg.LinAlgError:
             raise ModelError("the transfer function is infinite at one of these points, which is a pole") from None
+        return (self.C @ inside + self.D).astype(complex)
 
     def __repr__(self) -> str:
         size = f"{len(self.variables)} variables, {len(self.inputs)} inputs, {len(self.outputs)} outputs"

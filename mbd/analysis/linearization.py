@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,9 +14,12 @@ from mbd.analysis.instant import Instant
 from mbd.analysis.linear_motion import Prescribed
 from mbd.analysis.ports import Input, Output, port_terms
 from mbd.analysis.state_space import StateSpace
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import ComplexArray, Matrix, Vector
 from mbd.configuration import Configuration
 from mbd.notes import doubt
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Linearization", "NaturalMode"]
 
@@ -216,11 +219,11 @@ class Linearization:
         """`StateSpace.to_control`."""
         return self._of_changes().to_control()
 
-    def transfer(self, s: Any) -> Any:
+    def transfer(self, s: Any) -> ComplexArray:
         """`StateSpace.transfer`."""
         return self.state_space.transfer(s)
 
-    def frequency_response(self, frequencies: Any) -> Any:
+    def frequency_response(self, frequencies: Any) -> ComplexArray:
         """`StateSpace.frequency_response`."""
         return self.state_space.frequency_response(frequencies)
 
@@ -252,7 +255,7 @@ class Linearization:
             )
         return self.state_space
 
-    def plot_modes(self, path: str | Path | None = None, most: int = 6) -> Any:
+    def plot_modes(self, path: str | Path | None = None, most: int = 6) -> Figure:
         """Mode shapes as bars, one panel for each of the `most` slowest motions that move a coordinate; the figure."""
         from mbd.view.modes import modes
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from mbd.analysis.spectrum import Spectrum, argument_faults, spectrum
 from mbd.arrays import Vector
 from mbd.errors import CapabilityError, ModelError
 from mbd.integrators.base import Integrator
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Criteria", "Spectrum", "criteria", "plot", "spectrum"]
 
@@ -86,7 +89,7 @@ class Criteria:
         """Relative period elongation at each of `turns`; NaN beyond π."""
         return np.array([each.elongation for each in self.spectra])
 
-    def plot(self, *others: Criteria, path: str | Path | None = None) -> Any:
+    def plot(self, *others: Criteria, path: str | Path | None = None) -> Figure:
         """Spectral radius, algorithmic damping and period elongation over ω dt, with those of others; the figure."""
         return plot(self, *others, path=path)
 
@@ -142,7 +145,7 @@ def criteria(integrator: Integrator, damping: float = 0.0, turns: Sequence[float
     )  # fmt: skip
 
 
-def plot(*found: Criteria, path: str | Path | None = None) -> Any:
+def plot(*found: Criteria, path: str | Path | None = None) -> Figure:
     """Spectral radius, algorithmic damping and period elongation of several integrators over ω dt; the figure."""
     from mbd.view.spectra import spectra
 

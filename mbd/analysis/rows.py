@@ -5,10 +5,13 @@ from __future__ import annotations
 import csv
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mbd.results.archive import named_file, write_whole
 from mbd.results.tables import library, text_cell
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 __all__ = ["Rows"]
 
@@ -20,7 +23,7 @@ class Rows(ABC):
     def rows(self) -> list[dict[str, Any]]:
         """One flat dictionary for each thing measured, all with the same keys."""
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table of the rows."""
         return library("pandas", "data", "result.to_dataframe()").DataFrame(self.rows())
 

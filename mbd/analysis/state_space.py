@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix
+from mbd.arrays import ComplexArray, Matrix
 from mbd.bodies.values import is_number
 from mbd.errors import ModelError
 from mbd.notebook import table
@@ -46,7 +46,7 @@ class StateSpace:
     dt: float | None = None
 
     @property
-    def poles(self) -> Any:
+    def poles(self) -> ComplexArray:
         """(N,) eigenvalues of A: s [1/s], or z of sampled equations."""
         return np.linalg.eigvals(self.A).astype(complex)
 
@@ -98,7 +98,7 @@ class StateSpace:
         C, D = np.hsplit(inner, [len(self.states)])
         return self._like(self.A - self.B @ K @ C, self.B - self.B @ K @ D, C, D, self.dt)
 
-    def transfer(self, s: Any) -> Any:
+    def transfer(self, s: Any) -> ComplexArray:
         """``C (s − A)⁻¹ B + D`` at complex numbers s [1/s], z of sampled equations; (…, o, k) for s of shape (…)."""
         points = np.asarray(s, dtype=complex)
         eye = np.eye(len(self.states))
@@ -106,9 +106,9 @@ class StateSpace:
             inside = np.linalg.solve(points[..., None, None] * eye - self.A, self.B.astype(complex))
         except np.linalg.LinAlgError:
             raise ModelError("the transfer function is infinite at one of these points, which is a pole") from None
-        return self.C @ inside + self.D
+        return (self.C @ inside + self.D).astype(complex)
 
-    def frequency_response(self, frequencies: Any) -> Any:
+    def frequency_response(self, frequencies: Any) -> ComplexArray:
         """The transfer function at s = iω, or z = exp(iω dt), for ω [rad/s]; (…, o, k)."""
         w = np.asarray(frequencies, dtype=float)
         return self.transfer(1j * w if self.dt is None else np.exp(1j * w * self.dt))

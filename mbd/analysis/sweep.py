@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import chain, product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,10 @@ from mbd.results.names import scalars
 from mbd.results.tables import text_cell
 from mbd.simulation.simulate import simulate
 from mbd.state import State
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 __all__ = ["Sweep", "sweep"]
 
@@ -75,13 +79,13 @@ class Sweep:
             raise UnknownNameError(nearest(title, columns, "column", "The sweep has"))
         return np.array(columns[title])
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table with a line for each run."""
         from mbd.results.tables import library
 
         return library("pandas", "data", "Sweep.to_dataframe()").DataFrame(self.columns)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An xarray Dataset with a dimension for everything that was varied by itself.
 
         Names that changed together share the dimension 'a, b', along which each is a coordinate. What is no number,
@@ -103,7 +107,8 @@ class Sweep:
             for title, column in columns.items()
             if title not in self.names
         }
-        return xarray.Dataset(variables, coords=coordinates)
+        dataset: Dataset = xarray.Dataset(variables, coords=coordinates)
+        return dataset
 
     def _attributes(self, title: str) -> dict[str, str]:
         """What xarray notes of a column."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,12 @@ from mbd.gait.margins import Margin, Margins, least_margins, margin_points, watc
 from mbd.gait.special_points import KINDS, SpecialPoint, special_points
 from mbd.gait.switching import doubled
 from mbd.notebook import table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 __all__ = ["Branch", "branch"]
 
@@ -136,7 +142,7 @@ class Branch:
         values = self.given.with_value(point.value)
         return replace(self.start, state=point.state, chart=point.chart, parameters=values)
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table with a line for each point."""
         from mbd.results.tables import library
 
@@ -157,7 +163,7 @@ class Branch:
         notes = "; ".join([self.stopped, *map(repr, self.special)])
         return table(f"gaits of {self.name}", list(columns), rows, notes)
 
-    def plot(self, path: Any = None, quantity: str = "speed") -> Any:
+    def plot(self, path: str | Path | None = None, quantity: str = "speed") -> Figure:
         """A quantity of `columns` over the parameter: stable gaits solid, others dashed, special points marked."""
         from mbd.view.gaits import branch as drawn
 

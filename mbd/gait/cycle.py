@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import ComplexArray, Vector
 from mbd.bodies.values import named_number_faults
 from mbd.errors import GaitError, ModelError
 from mbd.gait.derivatives import Derivatives
@@ -25,6 +25,10 @@ from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
     from mbd.trajectory import Trajectory
 
 __all__ = ["LimitCycle"]
@@ -170,7 +174,7 @@ class LimitCycle:
 
     # stability ----------------------------------------------------------------------------------------------------
     @property
-    def multipliers(self) -> Any:
+    def multipliers(self) -> ComplexArray:
         """Floquet multipliers (k,), complex, by falling modulus; trivial ones stand in `trivial`."""
         return self.stability_of.values
 
@@ -270,7 +274,7 @@ class LimitCycle:
         rows += [(f"energy from {cause}", f"{value:.5g} J") for cause, value in self.energy.items() if self.success]
         return table(f"gait of {self.name}", ("", "value"), rows)
 
-    def plot(self, path: Any = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """The cycle in the phase plane of each angle, and the multipliers beside the unit circle; the figure."""
         from mbd.view.gaits import cycle
 

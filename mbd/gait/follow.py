@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,12 @@ from mbd.gait.limits import changed_events, limit_between
 from mbd.gait.margins import least_margins, watched_feet
 from mbd.gait.special_points import TESTS, SpecialPoint, polished
 from mbd.notebook import table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 __all__ = ["PointCurve", "follow"]
 
@@ -72,7 +78,7 @@ class PointCurve:
             "error": [point.error for point in self.points],
         }
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table with a line for each point."""
         from mbd.results.tables import library
 
@@ -89,7 +95,7 @@ class PointCurve:
         rows = [[f"{value:.9g}" for value in line] for line in zip(*columns.values(), strict=True)]
         return table(f"{self.kind} of {self.name}", list(columns), rows, self.stopped)
 
-    def plot(self, path: Any = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """The first parameter over the second."""
         from mbd.view.gaits import point_curve
 

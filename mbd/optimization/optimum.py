@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mbd.errors import UnknownNameError, nearest
 from mbd.notebook import table
 from mbd.optimization.problem import Trial
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 __all__ = ["Active", "Optimum"]
 
@@ -79,7 +82,7 @@ class Optimum:
             raise UnknownNameError(nearest(name, known, "number of the optimum", "It has"))
         return float(known[name])
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table of all trials: unknowns, objective, violation, outcome."""
         from mbd.results.tables import library
 

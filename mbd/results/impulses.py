@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from mbd.notebook import table
 from mbd.results.facts import Facts
 from mbd.results.record import EventRecord
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 __all__ = ["Impulse", "Impulses", "impulses_of"]
 
@@ -45,7 +48,7 @@ class Impulse:
 class Impulses(list[Impulse]):
     """Impulses in order of time; each impulse of a run once."""
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table, a line for each impulse."""
         from mbd.results.tables import library
 

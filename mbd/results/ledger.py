@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from mbd.arrays import Vector, read_only
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.notebook import table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 __all__ = ["KINDS", "SPENT", "Ledger", "Part"]
 
@@ -143,7 +149,7 @@ class Ledger:
             raise UnknownNameError(nearest(name, columns, "part of the energy", "The ledger has"))
         return columns[name]
 
-    def to_dataframe(self, by: Literal["element", "kind"] = "element") -> Any:
+    def to_dataframe(self, by: Literal["element", "kind"] = "element") -> DataFrame:
         """A pandas table [J]: `time` as index; kinetic, potential, total; each part, or each kind; numerical."""
         if by not in ("element", "kind"):
             raise ModelError(f"to_dataframe(by=…) takes 'element' or 'kind', not {by!r}")
@@ -195,7 +201,7 @@ class Ledger:
         notes = "; ".join(f"{part.name!r} is withheld: {part.withheld}" for part in self.parts if part.withheld)
         return table("energy", ("part", "start [J]", "end [J]", "change [J]", "cause"), rows, notes)
 
-    def plot(self, path: Any = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """The energies over time, and where they went; returns the matplotlib figure, saved if a path is given."""
         from mbd.view.plots import energy
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.notebook import table
 from mbd.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 __all__ = ["Sensitivities"]
 
@@ -83,7 +86,7 @@ class Sensitivities:
             by[_place(name, self.wrt, "column")] = amount
         return {name: float(value) for name, value in zip(self.of, self.matrix @ by, strict=True)}
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table with a line for each result and a column for each quantity that it is differentiated by."""
         from mbd.results.tables import library
 

@@ -10,6 +10,8 @@ from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, FAINT, INK, NEUTRAL, PALE, PAPER, as_label, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.analysis.accuracy import Accuracy, Point
 
 __all__ = ["clear", "frontier", "height", "work_precision"]
@@ -32,7 +34,7 @@ def height(point: Point) -> float:
     return math.inf if point.at_most is None else point.at_most
 
 
-def work_precision(found: Accuracy, path: str | Path | None = None) -> Any:
+def work_precision(found: Accuracy, path: str | Path | None = None) -> Figure:
     """Error over processor time, both logarithmic: a line for each scheme, dashed through tolerances.
 
     Grey lines go through equal steps. The broad pale line is the least time for each error, whichever the scheme.

@@ -11,6 +11,8 @@ from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, FAINT, INK, NEUTRAL, PALE, as_label, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.gait.basin.result import Basin
 
 __all__ = ["basin"]
@@ -25,7 +27,7 @@ WALKS = (CYCLE[0], CYCLE[2], CYCLE[1], CYCLE[7])
 """Colors of walks, one for each attractor."""
 
 
-def basin(found: Basin, path: str | Path | None = None) -> Any:
+def basin(found: Basin, path: str | Path | None = None) -> Figure:
     """Outcomes over one or two axes; the legend says how many starts came to each."""
     words, counts = found._words().reshape(found.shape), found.counts
     shades = {what: _shade(what, found.attractors) for what in counts}

@@ -11,6 +11,8 @@ from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, INK, PAPER, as_label, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.analysis.effects import Contribution, Effects
 
 __all__ = ["bars"]
@@ -21,7 +23,7 @@ TALL = 0.32
 """Height of a bar's row [inch]."""
 
 
-def bars(found: Effects, path: str | Path | None = None) -> Any:
+def bars(found: Effects, path: str | Path | None = None) -> Figure:
     """Three panels with a row for each effect: its share of the energy, the change without it, its operations.
 
     Changes are logarithmic, the tolerance a dashed line; bars of effects that may be left out together are green. A

@@ -13,12 +13,14 @@ from mbd.view.plots import drawing, scale
 from mbd.view.style import CYCLE, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.analysis.fitting.fit import Fit
 
 __all__ = ["fitted"]
 
 
-def fitted(fit: Fit, path: str | Path | None = None) -> Any:
+def fitted(fit: Fit, path: str | Path | None = None) -> Figure:
     """A row for each column of the data: measured dots on the computed curve, and the residuals below 0 and above.
 
     Residuals are shown in the unit of the column, with the band of twice their size over all data. Instants of events

@@ -14,6 +14,8 @@ from mbd.view.style import CYCLE, NEUTRAL, SIDES, as_label, tone
 from mbd.view.template import filled, written
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.analysis.gait_report.curves import Curve
     from mbd.analysis.gait_report.report import GaitReport, Walk
 
@@ -32,7 +34,7 @@ DASHES = ("-", "--", ":", "-.")
 """Lines of the runs."""
 
 
-def picture(report: GaitReport, path: str | Path | None = None) -> Any:
+def picture(report: GaitReport, path: str | Path | None = None) -> Figure:
     """Angles, moments and powers of the joints, forces of the ground, and where energy goes; sides by color, runs by
     dash.
 

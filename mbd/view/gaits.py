@@ -15,6 +15,8 @@ from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.gait.branch import Branch
     from mbd.gait.cycle import LimitCycle
     from mbd.gait.follow import PointCurve
@@ -39,7 +41,7 @@ FAR = 3.0
 """Modulus beyond which a multiplier is drawn at the edge of the picture [-]."""
 
 
-def cycle(gait: LimitCycle, path: str | Path | None = None) -> Any:
+def cycle(gait: LimitCycle, path: str | Path | None = None) -> Figure:
     """Each angle's rate against the angle over one period, in degrees, jumps dotted; the multipliers.
 
     Of orientations the parts of the rotation vector, and of the angular velocity in the same axes of the child.
@@ -99,7 +101,7 @@ def _multipliers(axes: Any, gait: LimitCycle) -> None:
     axes.set_title(f"multipliers: {gait.stability}", color=tone(INK))
 
 
-def branch(found: Branch, quantity: str, path: str | Path | None = None) -> Any:
+def branch(found: Branch, quantity: str, path: str | Path | None = None) -> Figure:
     """A quantity over the parameter: stable gaits solid, unstable ones dashed, special points marked by kind."""
     values, heights, stable = found[found.parameter], found[quantity], np.array([each.stable for each in found.curve])
     with drawing(path, 6.4, 4.0) as figure:
@@ -122,7 +124,7 @@ def branch(found: Branch, quantity: str, path: str | Path | None = None) -> Any:
     return figure
 
 
-def point_curve(found: PointCurve, path: str | Path | None = None) -> Any:
+def point_curve(found: PointCurve, path: str | Path | None = None) -> Figure:
     """The parameter of the branch at special points over the second parameter."""
     first, second = found.parameters
     with drawing(path, 6.4, 4.0) as figure:

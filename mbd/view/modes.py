@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.analysis.linearization import Linearization, NaturalMode
 
 __all__ = ["modes"]
@@ -20,7 +22,7 @@ IN_PHASE = 0.02
 """Imaginary part of a shape below which all coordinates are drawn as moving in phase [-]."""
 
 
-def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) -> Any:
+def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) -> Figure:
     """One panel a motion: how far each coordinate moves with the largest, at that instant and a quarter later."""
     chosen = [mode for mode in linear.modes if any(mode.shape.values())][:most]
     if not chosen:

@@ -24,6 +24,8 @@ from mbd.view.curves import curves, extremes
 from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, color, rules, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.trajectory import Trajectory
 
 __all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait", "portrayed"]
@@ -52,7 +54,7 @@ def scale(kind: str, degrees: bool) -> tuple[str, float]:
 
 
 @contextmanager
-def drawing(path: str | Path | None, width: float, height: float) -> Iterator[Any]:
+def drawing(path: str | Path | None, width: float, height: float) -> Iterator[Figure]:
     """A figure in the package's style, laid out and saved at the end."""
     matplotlib = library("matplotlib", "plot", "plotting")
     look = rules()
@@ -62,11 +64,11 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[An
 
         from mbd.view.windows import OnceShown
 
-        figure: Any = pyplot.figure(FigureClass=OnceShown, facecolor=look["figure.facecolor"], **size)
+        figure: Figure = pyplot.figure(FigureClass=OnceShown, facecolor=look["figure.facecolor"], **size)
     else:
-        from matplotlib.figure import Figure
+        from matplotlib import figure as figures
 
-        figure = Figure(facecolor=look["figure.facecolor"], **size)
+        figure = figures.Figure(facecolor=look["figure.facecolor"], **size)
     with matplotlib.rc_context(look):
         yield figure
         if path is not None:
@@ -79,7 +81,7 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[An
                 write_whole(target, lambda partial: figure.savefig(partial, format=kind))
 
 
-def histories(run: Trajectory, *names: str, path: str | Path | None = None, degrees: bool = True) -> Any:
+def histories(run: Trajectory, *names: str, path: str | Path | None = None, degrees: bool = True) -> Figure:
     """Quantities over time, one panel per unit, events as thin lines, contacts as bars below and as shades.
 
     A vector's name draws its three components. Without names: the coordinates of the model. Angles are drawn in
@@ -190,7 +192,7 @@ def stretches(time: Any, closed: Any) -> list[tuple[float, float]]:
     return [(float(time[a]), float(time[b - 1])) for a, b in zip(change[::2], change[1::2], strict=True)]
 
 
-def contacts(run: Trajectory, path: str | Path | None = None) -> Any:
+def contacts(run: Trajectory, path: str | Path | None = None) -> Figure:
     """Which contacts are closed when."""
     with drawing(path, 7.4, 0.9 + 0.28 * max(len(run.facts.contacts), 1)) as figure:
         axes = figure.subplots()
@@ -200,7 +202,7 @@ def contacts(run: Trajectory, path: str | Path | None = None) -> Any:
     return figure
 
 
-def energy(ledger: Ledger, path: str | Path | None = None) -> Any:
+def energy(ledger: Ledger, path: str | Path | None = None) -> Figure:
     """Kinetic and potential energy stacked with what was lost, below the ceiling of what was put in; and the remainder.
 
     ``T + (V − V_min) + Σ lost = E(0) − V_min + Σ put in + numerical``: where the stack leaves the line, the integrator
@@ -257,7 +259,7 @@ def portrayed(run: Trajectory) -> tuple[str, ...]:
     return tuple(name for name, kind in known.items() if kind == "rad") or tuple(known)
 
 
-def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None = None, degrees: bool = True) -> Any:
+def phase_portrait(run: Trajectory, *coordinates: str, path: str | Path | None = None, degrees: bool = True) -> Figure:
     """Rate against coordinate, angles in degrees or in radians; jumps at switches are dotted, the start is a dot.
 
     Without names: those of `portrayed`.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from mbd.view.scene import Scene, scene, upright
 from mbd.view.scenery import Wheel
 from mbd.view.style import INK, NEUTRAL, as_label, color, tone
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 __all__ = ["drawn", "instant"]
 
 SOIL = "#B9C0C9"
@@ -32,7 +35,7 @@ ROOM = 0.62
 """Half of the side of the picture, over the larger side of the mechanism [-]."""
 
 
-def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = None) -> Any:
+def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = None) -> Axes:
     """The picture of a state; see `State.plot`."""
     rows = camera(*angles_of(view))
     run = instant(model, state)
@@ -42,7 +45,7 @@ def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = 
     rows = rows if picture.spatial else np.eye(3)
     places = picture.positions[0] @ rows[:2].T
     with drawing(path, 5.6, 5.6) as figure:
-        axes = figure.subplots()
+        axes: Axes = figure.subplots()
         if picture.spatial:
             _, _, size = _frame(axes, draw_in_space(axes, picture, rows))
         else:

@@ -13,6 +13,8 @@ from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, NEUTRAL, tone
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.analysis.numerical import Criteria
 
 __all__ = ["spectra"]
@@ -27,7 +29,7 @@ HIGHEST = 1.35
 """Spectral radius up to which the axis goes [-]."""
 
 
-def spectra(found: Sequence[Criteria], path: str | Path | None = None) -> Any:
+def spectra(found: Sequence[Criteria], path: str | Path | None = None) -> Figure:
     """Over ω dt on a logarithmic axis: spectral radius, algorithmic damping ratio and period elongation.
 
     The last two up to π, on logarithmic axes too, where the slope is the order; negative ones, growth and shorter

@@ -15,6 +15,8 @@ from mbd.analysis.rows import Rows
 from mbd.notebook import paragraphs, table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.analysis.accuracy.truth import Truth
 
 __all__ = ["HEADS", "Accuracy", "cells", "remark"]
@@ -123,7 +125,7 @@ class Accuracy(Rows):
         return found
 
     # pictures -------------------------------------------------------------------------------------------------------
-    def plot(self, path: str | Path | None = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """Work and precision: error over processor time, a line for each scheme, dashed through its tolerances.
 
         Returns the matplotlib figure, also saved when a path is given.

@@ -15,6 +15,8 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.notebook import folded, paragraphs, table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mbd.trajectory import Trajectory
 
 __all__ = ["HEADS", "Effects", "cells"]
@@ -132,7 +134,7 @@ class Effects(Rows):
             found.append(row | {f"change of {name}": change.outputs.get(name) for name in self.outputs})
         return found
 
-    def plot(self, path: str | Path | None = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """Bars: share of the energy, change without it, operations and time.
 
         Returns the matplotlib figure, also saved when a path is given.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,11 @@ from mbd.sensitivity.starts import unknown_name
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
 
 __all__ = ["Fit", "bounds", "fit"]
 
@@ -80,7 +85,7 @@ class Fit:
         found = [(names[i], names[j], float(self.correlation[i, j])) for i, j in pairs]
         return [pair for pair in found if abs(pair[2]) > above]
 
-    def plot(self, path: Any = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """Residuals over time, each in its own panel, beside measured and computed values; the figure."""
         from mbd.view.fits import fitted
 

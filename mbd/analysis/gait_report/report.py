@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,10 @@ from mbd.results.archive import named_file, write_whole
 from mbd.results.opensim import write_storage
 from mbd.results.tables import text_cell
 from mbd.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 __all__ = ["GaitReport", "Walk", "gait_report"]
 
@@ -131,7 +135,7 @@ class GaitReport:
         spent = ("energy of a stride [J]", *(walk.name for walk in self.walks))
         return table("gait", self.heads, self.rows()) + table("energy", spent, self.energy_rows())
 
-    def to_dataframe(self, what: str = "numbers") -> Any:
+    def to_dataframe(self, what: str = "numbers") -> DataFrame:
         """A pandas table.
 
         Parameters
@@ -187,7 +191,7 @@ class GaitReport:
         degrees = any(each.unit == "°" for walk in self.walks for each in walk.curves)
         return write_storage(path, "gait", PERCENT, columns, degrees, ["time is the percent of the stride"])
 
-    def plot(self, path: str | Path | None = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """Curves of joints and ground over the stride and energies, as gait laboratories draw them."""
         from mbd.view import gait_report as view
 

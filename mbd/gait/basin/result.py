@@ -21,6 +21,10 @@ from mbd.notebook import table
 from mbd.state import State
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
+
     from mbd.gait.basin.made import Made
 
 __all__ = ["Basin"]
@@ -147,13 +151,13 @@ class Basin:
             raise UnknownNameError(nearest(title, columns, "column", "The basin has"))
         return columns[title]
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self) -> DataFrame:
         """A pandas table with a line for each start."""
         from mbd.results.tables import library
 
         return library("pandas", "data", "Basin.to_dataframe()").DataFrame(self.columns)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An xarray Dataset over the axes: outcome, attractor, steps, time [s]; axes have their units."""
         from mbd.results.tables import library
 
@@ -169,9 +173,10 @@ class Basin:
             "attractor": (axes, self.attractor), "steps": (axes, self.steps, {"units": "1"}),
             "time": (axes, self.time, {"units": "s"}),
         }  # fmt: skip
-        return xarray.Dataset(variables, coords=coordinates, attrs={"model": self.name})
+        dataset: Dataset = xarray.Dataset(variables, coords=coordinates, attrs={"model": self.name})
+        return dataset
 
-    def plot(self, path: str | Path | None = None) -> Any:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """The plane of the axes (two), or the line (one), colored by outcome; the figure.
 
         Raises
