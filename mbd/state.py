@@ -152,21 +152,35 @@ class State:
 
     def _result(self, name: str) -> tuple[Any, Sequence[str]]:
         """What a run would tell of it, and names of results; nothing of a state that knows no model."""
-        from mbd.results.at_state import instant, quantity
+        from mbd.results.at_state import quantity
+
+        run = self._instant() if isinstance(name, str) else None
+        return (None, ()) if run is None else (quantity(run, name), run.names)
+
+    def _instant(self) -> Any:
+        """A run of this one row; None of a state that knows no model, or whose model was changed since."""
+        from mbd.results.at_state import instant
 
         known = _MODELS.get(self)
         model = known() if known is not None else None
-        if model is None or not isinstance(name, str):
-            return None, ()
+        if model is None:
+            return None
         try:
-            run = instant(model, self)
-        except ModelError:  # the model was changed since
-            return None, ()
-        return quantity(run, name), run.names
+            return instant(model, self)
+        except ModelError:
+            return None
 
-    def _ipython_key_completions_(self) -> list[str]:
-        """What ``state[…]`` answers, for the completion of notebooks."""
-        return list(dict.fromkeys([*self.names, *self.velocity_names, *self._result("")[1]]))
+    def keys(self) -> list[str]:
+        """All names that ``state[…]`` answers: coordinates, their rates and, of a state that knows its model, results.
+
+        `names` are those of the coordinates alone, in the order of `q`.
+        """
+        from mbd.results.at_state import answered
+
+        run = self._instant()
+        return list(dict.fromkeys([*self.names, *self.velocity_names, *(answered(run) if run is not None else ())]))
+
+    _ipython_key_completions_ = keys
 
     def __repr__(self) -> str:
         lines = [f"State at t = {self.time:g} s, closed: {', '.join(sorted(self.mode.closed)) or 'none'}"]

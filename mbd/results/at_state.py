@@ -13,7 +13,7 @@ from mbd.results.record import Record
 from mbd.state import State, malformed
 from mbd.trajectory import Trajectory
 
-__all__ = ["instant", "quantity"]
+__all__ = ["answered", "instant", "quantity"]
 
 
 def instant(model: Any, state: State) -> Trajectory:
@@ -68,3 +68,13 @@ def quantity(run: Trajectory, name: str) -> Any:
         )
     value = run[name][0]
     return float(value) if np.ndim(value) == 0 else np.array(value)
+
+
+def answered(run: Trajectory) -> list[str]:
+    """Names of the results of a run of one row that do not follow from forces."""
+    columns = run.columns
+    if not isinstance(columns, ModelColumns):
+        return list(run.names)
+    return [
+        name for name in run.names if not asks_for_forces([columns.node(part) for part in columns.components(name)])
+    ]

@@ -76,4 +76,6 @@ def test_vectors_are_arguments_by_their_names(axis):
     expected = [equations.output(f"body.end.{'xyz'[axis]}"), equations.output(f"ball.angular_velocity.{'xyz'[axis]}"),
                 equations.output(f"ball.orientation.{'xyz'[axis]}")]  # fmt: skip
     assert [value.index for value in values] == [each.index for each in expected]
-    assert f"ball.orientation.{'xyz'[axis]}" in start._ipython_key_completions_()
+    keys = start.keys()
+    assert {f"ball.orientation.{'xyz'[axis]}", f"body.end.{'xyz'[axis]}"} <= set(keys) and len(set(keys)) == len(keys)
+    assert all(np.all(np.isfinite(start[name])) for name in keys)
