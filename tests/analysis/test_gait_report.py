@@ -152,9 +152,25 @@ def test_net_moments_are_those_of_inverse_dynamics():
     shares = np.array([0.1, 0.25, 0.4])
     lock = walk().at(time.begin + shares * time.duration)["left knee lock.force"]
     here = {(curve.side, curve.title): curve for curve in stride.curves}["left", "knee moment"].mean
-    np.testing.assert_allclose(here[[10, 25, 40]], -lock, rtol=1e-6)
+    np.testing.assert_allclose(here[[10, 25, 40]], lock, rtol=1e-6)  # in the sense of flexion
     assert np.max(np.abs(moment[~locked][1:-1])) <= np.max(np.abs(moment))
     assert np.all(curves["left", "hip moment"].mean == 0.0)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_flexion_of_a_knee_is_positive(side):
+    """The opposite of the coordinate, which is negative where the knee bends; power stays moment times rate."""
+    stride = mbd.gait_report(walk(), strides=1).walks[0]
+    curves = {(curve.side, curve.title): curve.mean for curve in stride.curves}
+    times = stride.sides[["left", "right"].index(side)].strides[0]
+    shares = np.array([0.2, 0.5, 0.6, 0.7])
+    bent = walk().at(times.begin + shares * times.duration)
+    np.testing.assert_allclose(
+        curves[side, "knee angle"][[20, 50, 60, 70]], -np.rad2deg(bent[f"{side} knee.angle"]), atol=1e-9
+    )
+    assert np.max(curves[side, "knee angle"]) > 20.0 and np.min(curves[side, "knee angle"]) > -1e-6
+    moment, power = (curves[side, f"knee {quantity}"][[20, 60]] for quantity in ("moment", "power"))
+    np.testing.assert_allclose(power, -moment * bent[f"{side} knee.angle.rate"][[0, 2]], atol=1e-9)
 
 
 def test_mass_divides_loads():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,6 +24,9 @@ PERCENT = np.linspace(0.0, 100.0, 101)
 
 SAME = 1e-9
 """Angles that differ less are one [rad]."""
+
+KNEE = re.compile(r"\bknee\b(?!.*\b(?:rotation|abduction|adduction)\b)", re.IGNORECASE)
+"""Subjects whose angle is flexion, which clinicians show as positive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +72,16 @@ def curves_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> lis
 
 
 class _Angle(NamedTuple):
-    """An angle of a side: its name, what it is the angle of, and the coordinate that it is or is the opposite of."""
+    """An angle of a side: its name, what it is the angle of, and the coordinate that it is or is the opposite of.
+
+    shown : −1 where the report has the opposite of the named angle, so that flexion of a knee is positive
+    """
 
     name: str
     subject: str
     coordinate: str = ""
     sign: float = 1.0
+    shown: float = 1.0
 
 
 def _angles(run: Trajectory, side: str) -> list[_Angle]:
@@ -97,7 +105,14 @@ def _angles(run: Trajectory, side: str) -> list[_Angle]:
         found[name] = _Angle(name, subject, *(match or ()))
     observed = [name for name, unit in facts.observations if unit == "rad"]
     found |= {name: _Angle(name, base_name(name.removesuffix(".angle"), side)) for name in observed}
-    return [angle for angle in found.values() if of_side(angle.name, side)]
+    return [_as_in_the_clinic(run, angle) for angle in found.values() if of_side(angle.name, side)]
+
+
+def _as_in_the_clinic(run: Trajectory, angle: _Angle) -> _Angle:
+    """A knee bends one way only: where the angle of one is farthest from straight below zero, its opposite is shown."""
+    values = run[angle.name]
+    bends = KNEE.search(angle.subject) is not None and -float(np.min(values)) > max(float(np.max(values)), SAME)
+    return angle._replace(shown=-1.0) if bends else angle
 
 
 def _sampled(
@@ -107,11 +122,11 @@ def _sampled(
     times = stride.begin + PERCENT / 100.0 * stride.duration
     times[-1] = stride.end - 1e-9 * stride.duration  # before the strike that ends it
     named = run.at(times)
-    found = {angle.name: np.asarray(named[angle.name]) for angle in angles}
+    found = {angle.name: angle.shown * np.asarray(named[angle.name]) for angle in angles}
     known = moments.at(run, times)
     for angle in angles:
         if angle.coordinate in known:
-            found[f"{angle.name} moment"] = angle.sign * known[angle.coordinate]
+            found[f"{angle.name} moment"] = angle.shown * angle.sign * known[angle.coordinate]
             found[f"{angle.name} power"] = known[angle.coordinate] * np.asarray(named[f"{angle.coordinate}.rate"])
     return found | forces_at(run, side, times)
 
