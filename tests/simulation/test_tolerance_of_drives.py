@@ -9,6 +9,7 @@ import pytest
 
 import mbd
 from mbd.errors import MbdWarning
+from mbd.simulation.tolerance.comparison import MAX_PARTS, MAX_PLACES, _inside_steps
 
 SCHEMES = [
     mbd.HHT(0.05), mbd.HHT(0.3), mbd.GeneralizedAlpha(0.9), mbd.GeneralizedAlpha(0.3), mbd.Newmark(), mbd.RadauIIA(),
@@ -126,6 +127,65 @@ def test_torques_of_drives_are_as_accurate_as_tol_says(seed, cut, scheme):
             ours = run.at(time).read(*(f"drive {k}.torque" for k in range(len(true))))
             error = max(np.max(np.abs(ours[f"drive {k}.torque"] - true[k])) for k in range(len(true)))
             assert error <= 2.0 * tol * largest, tol
+
+
+def leg(seed):
+    """A driven thigh whose light shank swings fast until its damper has stilled it; steps are short, then long."""
+    rng = np.random.default_rng(seed)
+    mass, length, share, inertia = (
+        rng.uniform(5, 10),
+        rng.uniform(0.4, 0.9),
+        rng.uniform(0.3, 0.6),
+        rng.uniform(0.1, 0.3),
+    )
+    light, small, w, damped = (
+        rng.uniform(0.01, 0.05),
+        rng.uniform(1e-4, 1e-3),
+        rng.uniform(40, 80),
+        rng.uniform(0.05, 0.2),
+    )
+    size, period, begin, bent = rng.uniform(0.5, 1.5), rng.uniform(1, 2), rng.uniform(-1, 1), rng.uniform(0.5, 1)
+    model = mbd.Model("leg", gravity=(0.0, -9.81, 0.0))
+    thigh, shank = mbd.Link("thigh", mass, length, share * length, inertia), mbd.Link("shank", light, 0.3, 0.1, small)
+    hip = mbd.Revolute("hip", model.ground.origin, thigh.start)
+    model.connect(hip)
+    loss = mbd.Viscous(small * w * damped)
+    model.connect(mbd.Revolute("knee", thigh.end, shank.start, stiffness=1.5 * small * w * w, loss=loss))
+    model.constrain(mbd.Bilateral("drive", hip, value=lambda t: begin + size * mbd.sin(3.1 * t / period)))
+    rates = {"hip.angle": 3.1 * size / period}
+    return model, mbd.assemble(model, {"hip.angle": begin, "knee.angle": bent}, rates, project=True)
+
+
+@pytest.mark.parametrize(
+    ("seed", "scheme", "tol"), [(0, mbd.RadauIIA(), 1e-6), (0, mbd.HHT(0.05), 1e-2), (1, mbd.RadauIIA(), 1e-6)]
+)
+def test_the_estimate_bounds_torques_within_long_steps_among_many_short_ones(seed, scheme, tol):
+    """Estimates neglect higher orders of the step, a tenth here; without long steps the first one misses a fifth."""
+    model, start = leg(seed)
+    run = mbd.simulate(model, start, scheme, tol=tol, until=4.0)
+    fine = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=4.0)
+    assert len(run) > 400 and np.max(np.diff(run.time)) > 7.0 * np.mean(np.diff(run.time))
+    instants = np.linspace(0.0, 4.0, 3001)
+    true = fine.at(instants)["drive.torque"]
+    error = np.max(np.abs(run.at(instants)["drive.torque"] - true)) / np.max(np.abs(true))
+    assert error <= 1.1 * run.stats["tolerance"]["estimated"]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_places_within_steps_are_shared_by_their_length(seed):
+    rng = np.random.default_rng(seed)
+    step = 10.0 ** rng.uniform(-rng.uniform(0.0, 6.0), 0.0, int(10.0 ** rng.uniform(0.0, 4.0)))
+    begin = np.append(0.0, np.cumsum(step)[:-1])
+    places = _inside_steps(begin, step)
+    where = np.searchsorted(begin, places, side="right") - 1
+    assert np.all(places < (begin + step)[where]) and len(places) <= 1.6 * MAX_PLACES
+    parts = np.bincount(where, minlength=len(step))
+    assert np.max(parts) <= MAX_PARTS and np.all(parts[step > np.sum(step) / MAX_PLACES] >= 1)
+    order = np.argsort(step)
+    assert np.all(
+        np.maximum.accumulate(parts[order]) <= parts[order] + 1
+    )  # a longer step has as many, but for rounding
+    assert np.min(parts) >= (2 * len(step) <= MAX_PLACES)
 
 
 def test_a_driven_run_says_what_its_tolerance_holds_for():

@@ -98,9 +98,9 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[
     )  # fmt: skip
     if not drives_of(run) or not drives_of(other):
         return found
-    parts = max(2, min(MAX_PARTS, MAX_PLACES // len(run.time)))
-    inside = [_some_middles(run, end, LATE * (k + 1) / parts, MAX_PLACES // parts) for k in range(parts)]
-    times = np.unique(np.concatenate([_rows(run, end)[:-1], *inside]))
+    lower, between = run._model_columns.grid.middles()
+    inside = _inside_steps(run.time[lower], between.step)
+    times = np.unique(np.concatenate([_rows(run, end)[:-1], inside[inside < end]]))
     size, name = share(run, other, times[apart(times, shifted, beside)])
     return replace(found, size=size, name=name) if size > moved else found
 
@@ -127,12 +127,42 @@ def _rows(run: Trajectory, end: float) -> Vector:
     return np.append(run.time[chosen], end)
 
 
-def _some_middles(run: Trajectory, end: float, theta: float = 0.5, most: int = MIDDLES) -> Vector:
-    """Times of middles between rows until the end, or of other parts of the intervals, a bounded number of them."""
+def _some_middles(run: Trajectory, end: float) -> Vector:
+    """Times of middles between rows until the end, a bounded number of them."""
     _, between = run._model_columns.grid.middles()
-    times = between.time + (theta - 0.5) * between.step
-    times = times[times < end]
-    return times[:: len(times) // most + 1]
+    times = between.time[between.time < end]
+    return times[:: len(times) // MIDDLES + 1]
+
+
+def _inside_steps(begin: Vector, step: Vector) -> Vector:
+    """Times within steps, more in longer ones, which err most: none as long as 1/`MAX_PLACES` of all is left out.
+
+    Steps get places in proportion to their length, `MAX_PARTS` of them at most, and at least one if there are enough.
+    A step with one place has it at its last part, the next such step at half of that.
+    """
+    if not len(step):
+        return np.zeros(0)
+    # places in each step
+    parts = np.diff(np.floor(np.cumsum(step) / _spacing(step) + 0.5), prepend=0.0)
+    parts = np.clip(parts, 2 * len(step) <= MAX_PLACES, MAX_PARTS).astype(np.intp)
+    # where they are
+    single = parts == 1
+    theta = np.where(np.cumsum(single) % 2 == 1, LATE, 0.5 * LATE)
+    times = [begin[single] + theta[single] * step[single]]
+    for k in range(MAX_PARTS):
+        some = (parts > k) & ~single
+        times.append(begin[some] + LATE * (k + 1) / parts[some] * step[some])
+    return np.concatenate(times)
+
+
+def _spacing(step: Vector) -> float:
+    """Distance of places in steps of which the longest have `MAX_PARTS`, so that about `MAX_PLACES` are there [s]."""
+    full = MAX_PLACES // MAX_PARTS
+    longest = np.sort(step)[::-1][:full]
+    left = np.maximum(np.sum(step) - np.cumsum(longest) + longest, longest)
+    spacing = left / (MAX_PLACES - MAX_PARTS * np.arange(len(longest)))
+    fits = np.flatnonzero(longest <= MAX_PARTS * spacing)
+    return float(spacing[fits[0]] if len(fits) else longest[-1] / MAX_PARTS)
 
 
 def _middles(run: Trajectory, end: float, accuracy: float) -> Vector:
