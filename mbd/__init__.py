@@ -128,6 +128,8 @@ if TYPE_CHECKING:
         Valves as Valves,
         Viscous as Viscous,
     )
+    from mbd.laboratory.balance_result import InverseDynamics as InverseDynamics
+    from mbd.laboratory.inverse_dynamics import inverse_dynamics as inverse_dynamics
     from mbd.lagrangian import Lagrangian as Lagrangian
     from mbd.model import Model as Model
     from mbd.optimization.optimize import optimize as optimize
@@ -187,6 +189,8 @@ _HOMES = {
     "Rolling Unilateral When cone disk_touchdown distance extension flexion height measure penalty_parameters "
     "profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
+    "mbd.laboratory.balance_result": "InverseDynamics",
+    "mbd.laboratory.inverse_dynamics": "inverse_dynamics",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",

@@ -65,6 +65,7 @@ EXAMPLES: dict[str, Any] = {
     "mass": 1.0,
     "measure": ANGLE,
     "model": MODEL,
+    "motion": {"time": [0.0, 0.1, 0.2], "hinge.angle": [0.0, 0.1, 0.3]},
     "mu": 0.1,
     "name": "new",
     "other": "foot",
@@ -147,6 +148,7 @@ RESULTS = {
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
+RESULTS |= {"InverseDynamics"}
 RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}

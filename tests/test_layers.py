@@ -36,6 +36,7 @@ RANKS = [
     ("sensitivity",),
     ("analysis",),
     ("gait",),
+    ("laboratory",),
     ("optimization",),
     ("view",),
     ("hardcases",),

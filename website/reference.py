@@ -22,6 +22,7 @@ GROUPS = {
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria sensitivities Sensitivities fit Fit optimize Optimum",
     "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch PointCurve basin Basin",
+    "Laboratory": "inverse_dynamics InverseDynamics",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
 }
@@ -33,7 +34,7 @@ BASES = (
 )
 """What words of one's own inherit from."""
 
-OF_INTEREST = ("Models and bodies", "Starts and runs", "Analysis", "Gaits", "Errors and failures")
+OF_INTEREST = ("Models and bodies", "Starts and runs", "Analysis", "Gaits", "Laboratory", "Errors and failures")
 """Pages that show the methods of their classes; what others have is for those who write words of their own."""
 
 

@@ -19,7 +19,7 @@ def net_moments(equations: Any, ground: Collection[str]) -> Mapping[str, Node]:
 
     The sums are over losses, springs, motors, stops and locks.
 
-    ground : names of contacts of the ground, whose forces are left out
+    ground : names of contacts of the ground and of forces that act from outside, which are left out
 
     Of the expressions that a file has, those that were stored in it.
     """
@@ -33,6 +33,7 @@ def net_moments(equations: Any, ground: Collection[str]) -> Mapping[str, Node]:
         dry = {f"{friction.name} friction" for friction in equations.frictions}
         for effect in equations.effects:
             of_ground = effect.contact >= 0 and equations.contacts[effect.contact].name in ground
+            of_ground = of_ground or effect.name in ground
             if effect.kind == "gravity" or of_ground or effect.name in dry:
                 continue
             switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)

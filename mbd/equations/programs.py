@@ -38,8 +38,8 @@ from mbd.tape.node import Node, Scalar
 
 __all__ = [
     "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "free_rates",
-    "guard_terms", "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "scales",
-    "switched_balance",
+    "guard_terms", "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "row_forces",
+    "scales", "switched_balance",
 ]  # fmt: skip
 
 
@@ -144,7 +144,7 @@ def _system(
         bottom[place] = [b + ratio * g for b, g in zip(B[place], change, strict=True)]
     if stabilized:
         turning = [entry for change in changes for entry in change]
-    right = _row_forces(equations, r, rows, B)
+    right = row_forces(equations, r, rows, B)
     levels = _levels(equations, rows, stabilized)
     forces = _forces(equations, sorted({*rows, *given_rows}), [(c, equations.tape.one) for c in penalties], sliding)
     others = [*(entry for line in (*bottom, *right) for entry in line), *levels, *turning]
@@ -195,7 +195,7 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     M = None if equations.geometry is None else equations.geometry.mass_matrix()
     M = _transposed(mass_matrix(equations, r)) if M is None else M
     B = constraint_jacobian(equations, rows)
-    right = _row_forces(equations, r, rows, B)
+    right = row_forces(equations, r, rows, B)
     hv = [row.rate for row in equations.rows]
     padding = [tape.zero] * equations.n_z
     out = [entry for line in M for entry in line] + f
@@ -372,11 +372,12 @@ def mass_matrix(equations: Equations, balance: Sequence[Node] | None = None) -> 
     return jvps(r, [{rate: 1.0} for rate in (*inputs.a, *inputs.s)])
 
 
-def _row_forces(
-    equations: Equations, r: Sequence[Node], rows: Sequence[int], B: Sequence[Sequence[Node]]
+def row_forces(
+    equations: Equations, r: Sequence[Node], rows: Sequence[int], B: Sequence[Sequence[Node]] | None = None
 ) -> list[list[Node]]:
-    """∂r/∂λ, column by column: Bᵀ, and more where forces depend on multipliers."""
+    """∂r/∂λ, column by column: Bᵀ, and more where forces depend on multipliers; B is made where it is not given."""
     inputs = Inputs.of(equations)
+    B = constraint_jacobian(equations, rows) if B is None else B
     loaded = any(node.op == "input" and node.data[0] == "slip" for node in live(r))
     loaded = loaded or bool(_rubbing(equations, rows))
     if loaded or any(node.op == "input" and node.data[0] == "lam" for node in live(equations.balance)):

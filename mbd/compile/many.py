@@ -1,0 +1,92 @@
+"""A compiled function at many blocks of inputs in one call: the loop over the rows is machine code too."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.backend import Function
+from mbd.compile.layout import Layout
+
+__all__ = ["at_blocks", "blocks_of"]
+
+LOOP = """\
+define void @mbd.each_row(ptr %function, i64 %rows, ptr %block, i64 %block_step, ptr %parameters, i64 %parameter_step,
+ptr %out, i64 %out_step) #0 {
+entry:
+br label %test
+test:
+%k = phi i64 [ 0, %entry ], [ %next, %row ]
+%more = icmp ult i64 %k, %rows
+br i1 %more, label %row, label %done
+row:
+%block_at = mul i64 %k, %block_step
+%parameter_at = mul i64 %k, %parameter_step
+%out_at = mul i64 %k, %out_step
+%b = getelementptr double, ptr %block, i64 %block_at
+%p = getelementptr double, ptr %parameters, i64 %parameter_at
+%o = getelementptr double, ptr %out, i64 %out_at
+call void %function(ptr %b, ptr %p, ptr %o)
+%next = add i64 %k, 1
+br label %test
+done:
+ret void
+}
+attributes #0 = { nounwind }
+"""
+"""Calls a function once for every row of the three arrays, whose rows lie so many numbers apart."""
+
+_PROTOTYPE = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64,
+    ctypes.c_void_p, ctypes.c_int64,
+)  # fmt: skip
+
+
+@cache
+def _loop() -> Any:
+    """The machine code of the loop, made once in a process."""
+    from mbd.compile.llvm import cached_object, emit_object, load_object
+
+    code = cached_object(LOOP, lambda: emit_object(LOOP), lasting=True)
+    return _PROTOTYPE(load_object(code, "mbd.each_row"))
+
+
+def at_blocks(function: Function, blocks: Matrix, parameters: Vector | Matrix) -> Matrix:
+    """The outputs of a function at every row of inputs (R, size).
+
+    Parameters
+    ----------
+    blocks : (R, layout.size), see `mbd.compile.layout`
+    parameters : one vector for all rows, or (R, n_p)
+    """
+    blocks = np.ascontiguousarray(blocks, dtype=float)
+    parameters = np.ascontiguousarray(parameters, dtype=float)
+    rows, several = len(blocks), parameters.ndim == 2
+    out = np.zeros((rows, function.size))
+    if not function.address:
+        for k in range(rows):
+            function(blocks[k], parameters[k] if several else parameters, out[k])
+        return out
+    if rows:
+        function(blocks[0].copy(), (parameters[0] if several else parameters).copy(), out[0])  # which checks sizes
+        _loop()(
+            function.address, rows, blocks.ctypes.data, blocks.shape[1], parameters.ctypes.data,
+            parameters.shape[1] if several else 0, out.ctypes.data, out.shape[1],
+        )  # fmt: skip
+    return out
+
+
+def blocks_of(layout: Layout, inputs: Mapping[str, Any]) -> Matrix:
+    """Blocks of inputs from arrays by kind: {'t': (R,), 'q': (R, n_q), …}; kinds that are absent are zero."""
+    rows = len(inputs["t"])
+    blocks = np.zeros((rows, layout.size))
+    for kind, values in inputs.items():
+        columns = np.asarray(values, dtype=float).reshape(rows, -1)
+        place = layout.place(kind, 0)
+        blocks[:, place : place + columns.shape[1]] = columns
+    return blocks

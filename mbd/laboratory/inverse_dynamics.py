@@ -1,0 +1,224 @@
+"""Moments from motion: the equations of motion read backwards, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import names_of
+from mbd.compile.many import at_blocks, blocks_of
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanisms import mechanism_of
+from mbd.equations.equations import Equations
+from mbd.equations.inputs import Inputs
+from mbd.equations.programs import row_forces, switched_balance
+from mbd.errors import CapabilityError, ModelError, nearest
+from mbd.joints.base import Joint
+from mbd.joints.free import Free
+from mbd.joints.planar import Planar
+from mbd.laboratory.balance_result import InverseDynamics
+from mbd.laboratory.least_norm import balanced
+from mbd.laboratory.motion import Motion, motion_of, parameters_of, record_of
+from mbd.results.columns import ModelColumns
+from mbd.tape.derivatives import live
+from mbd.tape.node import Node
+from mbd.topology.plan import plan
+from mbd.trajectory import Trajectory
+
+__all__ = ["inverse_dynamics"]
+
+
+def inverse_dynamics(
+    model: Any,
+    motion: Any,
+    joints: Sequence[str] | None = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    backend: str = "auto",
+) -> InverseDynamics:
+    """Moments, powers, reactions and residuals of a motion, frame by frame, without a simulation.
+
+    ``M v̇ + f(t, q, v) + Rλ = τ + ρ``: all forces that the model describes act (weight, losses, springs, motors), τ is
+    what must act at the driven joints besides them, λ are the multipliers of the rows of closed loops and of
+    constraints, and ρ, the residual, is what the balance lacks where nothing drives. A perfect recording of a
+    floating body with all its contact forces has no residual.
+
+    1. Velocities and accelerations come from the run, or from splines through the values.
+    2. Machine code evaluates ``g = M v̇ + f`` with all known forces at every frame; its cost is that of one recursive
+       Newton–Euler sweep (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 5.3).
+    3. Without rows ``τ = g`` at the driven coordinates and ``ρ = g`` at the others. With rows ρ is made as small as it
+       can be, then τ, then λ, each of least norm; `InverseDynamics.notes` says where that was needed.
+
+    The contacts of a run push with the forces of the run; those of a recorded motion are open, so that their forces are
+    part of ρ.
+
+    Parameters
+    ----------
+    model : a `Model` or a `Lagrangian`
+    motion : a run; the result of `mbd.inverse_kinematics`; or arrays by name, {'time': t (R,), 'left hip.angle': (R,),
+        'trunk.orientation': (R, 4), …} [s, m, rad], or `Samples`; rates and accelerations may be given too
+        ('left hip.angle.rate'), coordinates that closed loops determine may be left out
+    joints : names of the joints that are driven; by default all but those with which a body floats over the ground
+        (`Free`, in the plane `Planar`)
+    parameters : values that differ from those of the model
+    backend : 'auto', 'llvm' or 'python'
+
+    Raises
+    ------
+    ModelError
+        for a motion that is not one of this model, gaps, joints that are cut or that the model lacks.
+    CapabilityError
+        for states of forces of a recorded motion, and for friction that follows the force of a joint.
+
+    Examples
+    --------
+    A pendulum that is held out level needs the moment m g l:
+
+    >>> import mbd
+    >>> model = mbd.Model("arm")
+    >>> rod = mbd.Link("rod", mass=2.0, length=1.0, center=0.5)
+    >>> model.connect(mbd.Revolute("shoulder", model.ground.origin, rod.start))
+    >>> held = mbd.inverse_dynamics(model, {"time": [0.0], "shoulder.angle": [1.5707963267948966]})
+    >>> print(f"{held['shoulder.moment'][0]:.2f} N m")
+    9.81 N m
+    """
+    mechanism = mechanism_of(model, backend, parameters)
+    found = motion_of(model, mechanism, motion, parameters or {})
+    values = parameters_of(mechanism, found, parameters or {}, model)
+    return dynamics_of(model, mechanism, found, values, joints)
+
+
+def dynamics_of(
+    model: Any,
+    mechanism: Mechanism,
+    motion: Motion,
+    parameters: Vector | Matrix,
+    joints: Sequence[str] | None,
+    notes: Sequence[str] = (),
+    outside: Sequence[str] = (),
+) -> InverseDynamics:
+    """The balance of a motion whose parameters are known at each frame."""
+    equations = mechanism.equations
+    driven = _driven(model, equations, joints)
+    record = record_of(mechanism, motion, parameters)
+    columns = ModelColumns(record, equations)
+    blocks = blocks_of(mechanism.layout, columns.all_inputs(columns.rows))
+    g, R = _forces(mechanism, blocks, parameters)
+    found = balanced(g, R, driven)
+    lam = record.lam.copy()
+    lam[:, list(equations.bilateral)] = found.lam
+    run = Trajectory(replace(record, lam=lam, message="motion that was given", settings={"method": "inverse dynamics"}))
+    remarks = [*motion.notes, *notes, *_notes(equations, found.free, found.shared, driven, motion)]
+    return InverseDynamics(
+        run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), outside
+    )
+
+
+def _forces(mechanism: Mechanism, blocks: Matrix, parameters: Vector | Matrix) -> tuple[Matrix, NDArray[np.float64]]:
+    """g (R, n_v) and R (R, n_v, m) of the rows that always act, whose multipliers are zero in the blocks."""
+    equations, n_v, m = mechanism.equations, mechanism.equations.n_v, len(mechanism.equations.bilateral)
+    key = "inverse dynamics"
+    with equations.tape.lock:
+        if key not in mechanism.named:
+            functions = mechanism.backend.functions(mechanism.layout)
+            functions.add({"inverse_dynamics": _program(equations)})
+            mechanism.named[key] = functions
+    out = at_blocks(mechanism.named[key]["inverse_dynamics"], blocks, parameters)
+    return out[:, :n_v], out[:, n_v:].reshape(len(out), m, n_v).transpose(0, 2, 1)
+
+
+def _program(equations: Equations) -> list[Node]:
+    """g | R, column by column.
+
+    Raises
+    ------
+    CapabilityError
+        where forces depend on the multipliers of these rows by more than R.
+    """
+    r = switched_balance(equations)
+    rows = list(equations.bilateral)
+    columns = row_forces(equations, r, rows) if rows else []
+    wide = [entry for column in columns for entry in column[: equations.n_v]]
+    inputs = Inputs.of(equations)
+    own = {inputs.lam[k].index for k in rows}
+    if any(node.index in own for node in live(wide)) or _follows(equations, own):
+        raise CapabilityError(
+            "inverse dynamics: friction follows the force of a joint or a constraint, which the motion alone does not "
+            "tell; leave it out by model.without('… loss')"
+        )
+    return [*r[: equations.n_v], *wide]
+
+
+def _follows(equations: Equations, own: set[int]) -> bool:
+    limits = [friction.sliding for friction in equations.frictions if friction.contact < 0]
+    return any(node.index in own for node in live(limits)) if limits else False
+
+
+# joints -------------------------------------------------------------------------------------------------------------
+def _joints(model: Any, equations: Equations) -> list[tuple[Joint | None, str, tuple[int, ...]]]:
+    """(joint, name, numbers of its velocities) of the coordinates, those that no joint owns each by itself."""
+    names = equations.velocity_names
+    if not hasattr(model, "joints"):
+        return [(None, name.removesuffix(".rate"), (k,)) for k, name in enumerate(names)]
+    found: list[tuple[Joint | None, str, tuple[int, ...]]] = []
+    first = 0
+    for joint in plan(model).edges:
+        count = len(joint.freedoms)
+        if count:
+            found.append((joint, joint.name, tuple(range(first, first + count))))
+        first += count
+    found += [(None, names[k].removesuffix(".rate"), (k,)) for k in range(first, len(names))]
+    return found
+
+
+def _driven(model: Any, equations: Equations, joints: Sequence[str] | None) -> NDArray[np.bool_]:
+    """Which velocities belong to driven joints."""
+    known = _joints(model, equations)
+    driven = np.zeros(equations.n_v, dtype=bool)
+    if joints is None:
+        for joint, _, places in known:
+            driven[list(places)] = not _floats(model, joint)
+        return driven
+    names = {name: places for _, name, places in known}
+    cut = {joint.name for joint in plan(model).cut} if hasattr(model, "joints") else set()
+    for name in names_of(joints, "joints of inverse_dynamics"):
+        if name in cut:
+            raise ModelError(
+                f"joints: {name!r} closes a loop and is cut, so that it has no coordinate of its own; cut another "
+                "joint of the loop with cut=['…'] of the model"
+            )
+        if name not in names:
+            raise ModelError(f"joints: {nearest(name, names, 'joint', 'The model has')}")
+        driven[list(names[name])] = True
+    return driven
+
+
+def _floats(model: Any, joint: Joint | None) -> bool:
+    """Whether a joint lets a body move freely over the ground."""
+    if joint is None or joint.parent.body.name != model.ground.name:
+        return False
+    return isinstance(joint, Free | Planar) or len(joint.freedoms) == 6
+
+
+def _notes(equations: Equations, free: int, shared: bool, driven: NDArray[np.bool_], motion: Motion) -> list[str]:
+    """What a reader must know of the answer."""
+    found = []
+    if shared:
+        found.append(
+            f"{int(driven.sum())} driven coordinates share the moments of a loop: those of least norm are given; name "
+            "the joints that are driven with joints=[…]"
+        )
+    elif free:
+        count = "a combination" if free == 1 else f"{free} combinations"
+        found.append(
+            f"{count} of the multipliers of rows has no effect (redundant rows); those of least norm are given"
+        )
+    if motion.run is None and equations.contacts:
+        names = ", ".join(repr(contact.name) for contact in equations.contacts[:4])
+        found.append(f"contacts are open, their forces are part of the residual: {names}")
+    return found

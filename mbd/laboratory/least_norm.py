@@ -1,0 +1,74 @@
+"""Forces that balance a motion, at all frames at once; where they are not unique those of least norm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+
+__all__ = ["Balanced", "balanced"]
+
+RANK = 1e-9
+"""Singular values of some rows below this part of the largest of all count as zero [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Balanced:
+    """Forces of ``E τ − R λ + ρ = g`` at each frame.
+
+    effort : (R, n) τ, zero where nothing drives; lam : (R, m) λ; residual : (R, n) ρ, zero where something drives
+    free : number of dimensions of (τ, λ) that the balance leaves open, at most over the frames
+    shared : whether τ itself is not unique
+    """
+
+    effort: Matrix
+    lam: Matrix
+    residual: Matrix
+    free: int = 0
+    shared: bool = False
+
+
+def balanced(g: Matrix, R: NDArray[np.float64], driven: NDArray[np.bool_]) -> Balanced:
+    """τ, λ and ρ with ``E τ − R λ + ρ = g``: ρ as small as it can be, then τ, then λ.
+
+    1. λ₀ of least norm makes ``ρ = g_U + R_U λ`` least, over the coordinates U that nothing drives.
+    2. ``λ = λ₀ + P y`` with P the projector on the null space of R_U; y of least norm makes ``τ = g_D + R_D λ`` least.
+
+    Parameters
+    ----------
+    g : (R, n) ``M v̇ + f`` with all known forces
+    R : (R, n, m) ∂r/∂λ of the rows that always act
+    driven : (n,) coordinates with a force or moment τ
+    """
+    effort, residual = np.where(driven, g, 0.0), np.where(driven, 0.0, g)
+    count, m = len(g), R.shape[2]
+    if not m or not count:
+        return Balanced(effort, np.zeros((count, m)), residual)
+    scale = np.linalg.svd(R, compute_uv=False).max(axis=1, initial=0.0)
+    upper, lower = R[:, ~driven, :], R[:, driven, :]
+    back, held = _inverse(upper, scale)
+    lam = -_applied(back, g[:, ~driven])
+    P = np.eye(m) - back @ upper
+    more, moved = _inverse(lower @ P, scale)
+    lam = lam - _applied(P @ more, g[:, driven] + _applied(lower, lam))
+    residual[:, ~driven] = g[:, ~driven] + _applied(upper, lam)
+    effort[:, driven] = g[:, driven] + _applied(lower, lam)
+    return Balanced(effort, lam, residual, int((m - held).max()), bool(np.any(moved > 0)))
+
+
+def _inverse(matrices: NDArray[np.float64], scale: Vector) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Pseudo-inverse and rank of each matrix; what is below `RANK` of a scale counts as zero."""
+    count, n, m = matrices.shape
+    if not matrices.size:
+        return np.zeros((count, m, n)), np.zeros(count, dtype=np.intp)
+    U, sizes, V = np.linalg.svd(matrices, full_matrices=False)
+    kept = sizes > RANK * scale[:, np.newaxis]
+    inverse = np.where(kept, 1.0 / np.where(kept, sizes, 1.0), 0.0)
+    return np.einsum("kji,kj,klj->kil", V, inverse, U), kept.sum(axis=1)
+
+
+def _applied(matrices: NDArray[np.float64], vectors: Matrix) -> Matrix:
+    return np.asarray(np.einsum("kij,kj->ki", matrices, vectors))

@@ -1,0 +1,389 @@
+"""A motion in a model's own coordinates: positions, velocities and accelerations at each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.assemble import assemble
+from mbd.bodies.values import shown
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.python import array_function
+from mbd.equations.equations import Equations
+from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
+from mbd.forces.samples import Samples
+from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
+from mbd.results.record import Record
+from mbd.trajectory import Trajectory
+
+__all__ = ["Motion", "motion_of", "parameters_of", "record_of"]
+
+CLOSED = 1e-11
+"""Residual of rows up to which coordinates that were not given are completed, over the largest row [-]."""
+MAX_CORRECTIONS = 30
+"""Newton corrections of one frame of a loop."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """q, v and v̇ at the frames of a motion.
+
+    Attributes
+    ----------
+    time : (R,) [s]
+    q : (R, n_q); v, a : (R, n_v)
+    run : the run that it comes from, whose contact forces are known; None of a recorded motion
+    notes : what was done to get it, a sentence each
+    """
+
+    time: Vector
+    q: Matrix
+    v: Matrix
+    a: Matrix
+    run: Trajectory | None = None
+    notes: tuple[str, ...] = ()
+
+
+def motion_of(model: Any, mechanism: Mechanism, motion: Any, changed: Mapping[str, float]) -> Motion:
+    """A motion from a run, or from arrays by name.
+
+    Arrays need the key 'time'. The others are coordinates ('left hip.angle', 'trunk.orientation' of shape (R, 4)) at
+    these times, or `Samples` of them; velocities and accelerations are those of the cubic spline through the values
+    (not-a-knot), unless they are given too ('left hip.angle.rate', 'left hip.angle.acceleration'). Coordinates that
+    the rows of closed loops determine may be left out.
+
+    Raises
+    ------
+    ModelError
+        for names that the model lacks, coordinates that are missing, gaps, times that do not increase.
+    """
+    inner = getattr(motion, "run", motion)
+    if isinstance(inner, Trajectory):
+        return _of_run(mechanism.equations, inner)
+    if isinstance(motion, Mapping):
+        return _of_arrays(model, mechanism, motion, changed)
+    raise ModelError(
+        "motion must be a run, the result of mbd.inverse_kinematics, or arrays by name such as "
+        f"{{'time': t, 'left hip.angle': angle}}; got {shown(motion)[:120]}"
+    )
+
+
+# from a run ---------------------------------------------------------------------------------------------------------
+def acceleration_name(velocity: str) -> str:
+    """The result that is the rate of a velocity.
+
+    >>> acceleration_name("hip.angle.rate"), acceleration_name("ball.angular_velocity.x")
+    ('hip.angle.acceleration', 'ball.angular_velocity.x.acceleration')
+    """
+    return f"{velocity.removesuffix('.rate')}.acceleration"
+
+
+def _of_run(equations: Equations, run: Trajectory) -> Motion:
+    if run.record.equations is equations:
+        return Motion(run.time, run.record.q, run.record.v, run.record.a, run)
+    wanted = [*(c.name for c in equations.coordinates), *equations.velocity_names]
+    wanted += [acceleration_name(name) for name in equations.velocity_names]
+    lacking = [name for name in wanted if name not in run]
+    if lacking:
+        raise ModelError(
+            f"motion: the run of '{run.name}' has no {lacking[0]!r}, a coordinate of '{equations.name}'; give a run "
+            "of a model with the same joints"
+        )
+    columns = np.column_stack([run[name] for name in wanted]) if wanted else np.zeros((len(run), 0))
+    n_q, n_v = equations.n_q, equations.n_v
+    return Motion(run.time, columns[:, :n_q], columns[:, n_q : n_q + n_v], columns[:, n_q + n_v :], run)
+
+
+# from arrays --------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class _Column:
+    """Given values of a coordinate with what is known of their derivatives."""
+
+    value: Vector
+    rate: Vector | None = None
+    acceleration: Vector | None = None
+
+
+def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], changed: Mapping[str, float]) -> Motion:
+    equations = mechanism.equations
+    time = _times(given)
+    columns = _columns(equations, given, time)
+    count, n_q, n_v = len(time), equations.n_q, equations.n_v
+    q, v, a = np.zeros((count, n_q)), np.zeros((count, n_v)), np.zeros((count, n_v))
+    names = [c.name for c in equations.coordinates]
+    missing = [name for name in names if name not in columns]
+    whole = equations.configuration
+    if missing and not any(not row.is_velocity for k, row in _bilateral(equations)):
+        raise ModelError(
+            f"motion: the coordinate {missing[0]!r} of '{equations.name}' is missing"
+            f"{f', and {len(missing) - 1} more' if missing[1:] else ''}; give values of all of them at the times"
+        )
+    turned: set[int] = set()
+    for joint, first_q, first_v in whole.charts:
+        at = first_q + joint.adding
+        parts = names[at : at + 4]
+        if any(part in missing for part in parts):
+            raise ModelError(f"motion: the orientation {parts[0].removesuffix('.w')!r} is missing or incomplete")
+        turned |= set(range(at, at + 4))
+        values = continuous(np.column_stack([columns[part].value for part in parts]), parts[0].removesuffix(".w"))
+        q[:, at : at + 4] = values
+        own = slice(first_v + joint.adding, first_v + joint.adding + 3)
+        spins = [columns[name] for name in equations.velocity_names[own] if name in columns]
+        if len(spins) == 3:
+            v[:, own] = np.column_stack([spin.value for spin in spins])
+            a[:, own] = np.column_stack(
+                [_derivatives(time, s.value)[0] if s.acceleration is None else s.acceleration for s in spins]
+            )
+        else:
+            v[:, own], a[:, own] = quaternion_rates(values, *_derivatives(time, values))
+    places = {int(place): k for k, place in enumerate(whole.places) if place >= 0}
+    for place, name in enumerate(names):
+        if place in turned or name in missing:
+            continue
+        column, k = columns[name], places[place]
+        q[:, place] = column.value
+        rate, acceleration = column.rate, column.acceleration
+        if rate is None or acceleration is None:
+            first, second = _derivatives(time, column.value)
+            if rate is None:
+                rate = first
+            elif acceleration is None:
+                second = _derivatives(time, rate)[0]
+            acceleration = second if acceleration is None else acceleration
+        v[:, k], a[:, k] = rate, acceleration
+    motion = Motion(time, q, v, a)
+    return motion if not missing else _closed(model, mechanism, motion, missing, changed)
+
+
+def _times(given: Mapping[str, Any]) -> Vector:
+    if "time" not in given:
+        raise ModelError("motion: give the times of its frames under 'time' [s]")
+    time = np.asarray(given["time"], dtype=float)
+    if time.ndim != 1 or not len(time) or not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0.0):
+        raise ModelError("motion: 'time' must be one column of finite, increasing times [s]")
+    return time
+
+
+def _columns(equations: Equations, given: Mapping[str, Any], time: Vector) -> dict[str, _Column]:
+    """Values by the names of coordinates and of velocities that are no rates."""
+    names = [c.name for c in equations.coordinates]
+    spins = [name for name in equations.velocity_names if not name.endswith(".rate")]
+    known = _spellings([*names, *spins])
+    rates = {f"{spelling}{end}": name for spelling, name in known.items() for end in (".rate", ".acceleration")}
+    found: dict[str, _Column] = {}
+    later: list[tuple[str, str, Vector]] = []
+    for key, value in given.items():
+        if key == "time":
+            continue
+        plain = "_".join(str(key).split())
+        parts = next(
+            ([f"{plain}{end}" for end in ends] for ends in ((".w", ".x", ".y", ".z"), (".x", ".y", ".z"))
+             if all(f"{plain}{end}" in known for end in ends)), [plain],
+        )  # fmt: skip
+        if not all(part in known or part in rates for part in parts):
+            raise UnknownNameError(f"motion: {nearest(str(key), [*names, *spins], 'coordinate', 'The model has')}")
+        for part, column in zip(parts, _values(key, value, time, len(parts)), strict=True):
+            if part in known:
+                found[known[part]] = column
+            else:
+                later.append((rates[part], part.rpartition(".")[2], column.value))
+    for name, level, values in later:
+        if name not in found:
+            raise ModelError(f"motion: the {level} of {name!r} is given without its value; give both")
+        found[name] = replace(found[name], **{level: values})
+    return found
+
+
+def _spellings(names: list[str]) -> dict[str, str]:
+    """Names without spaces, and of joints with one coordinate without its label."""
+    plain = {"_".join(name.split()): name for name in names}
+    owners: dict[str, list[str]] = {}
+    for name in plain:
+        owners.setdefault(name.rpartition(".")[0], []).append(name)
+    return plain | {owner: plain[own[0]] for owner, own in owners.items() if owner and len(own) == 1}
+
+
+def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
+    """One column for each component, checked."""
+    if isinstance(value, Samples):
+        parts = value.components
+        if len(parts) != width:
+            raise ModelError(f"motion: {key!r} needs {width} components, its Samples have {len(parts)}")
+        return [_Column(*(_of_samples(part, time, order) for order in (0, 1, 2))) for part in parts]
+    try:
+        table = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(f"motion: the values of {key!r} must be numbers, got {shown(value)[:80]}") from None
+    shape = (len(time),) if width == 1 else (len(time), width)
+    if table.shape != shape:
+        raise ModelError(f"motion: the values of {key!r} must have the shape {shape}, got {table.shape}")
+    wrong = np.flatnonzero(~np.isfinite(table.reshape(len(time), -1)).all(axis=1))
+    if len(wrong):
+        raise ModelError(
+            f"motion: {key!r} has a gap at t = {time[wrong[0]]:.6g} s ({len(wrong)} of {len(time)} frames); fill it, "
+            "or leave these frames out"
+        )
+    return [_Column(column) for column in table.reshape(len(time), -1).T]
+
+
+def _of_samples(signal: Samples, time: Vector, order: int) -> Vector:
+    return np.asarray(signal(time, order), dtype=float)
+
+
+def _derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:
+    """First and second derivative of the spline through values at their times; zero of a single frame."""
+    if len(time) == 1:
+        return np.zeros_like(values), np.zeros_like(values)
+    curve = CubicSpline(time, values)
+    return curve(time, 1), curve(time, 2)
+
+
+# loops --------------------------------------------------------------------------------------------------------------
+def _bilateral(equations: Equations) -> list[tuple[int, Any]]:
+    return [(k, equations.rows[k]) for k in equations.bilateral]
+
+
+def _closed(
+    model: Any, mechanism: Mechanism, motion: Motion, missing: list[str], changed: Mapping[str, float]
+) -> Motion:
+    """The motion with the coordinates that the rows determine: positions by Newton's method, from frame to frame."""
+    equations = mechanism.equations
+    whole = equations.configuration
+    names = [c.name for c in equations.coordinates]
+    places = {int(place): k for k, place in enumerate(whole.places) if place >= 0}
+    free = [places[names.index(name)] for name in missing]
+    rows = list(equations.bilateral)
+    position = {name: float(value) for name, value in zip(names, motion.q[0], strict=True) if name not in missing}
+    start = assemble(model, position=position, parameters=dict(changed))
+    q, v, a = motion.q.copy(), motion.v.copy(), motion.a.copy()
+    parameters = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    held = [row.is_velocity for _, row in _bilateral(equations)]
+    last = np.array(start.q)
+    for k, t in enumerate(motion.time):
+        at = q[k].copy()
+        own = [names.index(name) for name in missing]
+        at[own] = last[own] if k < 2 else 2.0 * last[own] - q[k - 2][own]
+        for _ in range(MAX_CORRECTIONS):
+            there = mechanism.acceleration_terms(t, at, v[k], parameters, start.anchors)
+            h = np.where(held, 0.0, there.h[rows])
+            step = np.linalg.lstsq(there.B[np.ix_(rows, free)], -h, rcond=None)[0]
+            x = np.zeros(equations.n_v)
+            x[free] = step
+            at = whole.compose(at, x)
+            if np.abs(step).max(initial=0.0) <= CLOSED * max(1.0, np.abs(at).max()):
+                break
+        there = mechanism.acceleration_terms(t, at, v[k], parameters, start.anchors)
+        off = np.abs(np.where(held, 0.0, there.h[rows]))
+        if off.max(initial=0.0) > 1e3 * CLOSED * max(1.0, np.abs(at).max()):
+            row = equations.rows[rows[int(np.argmax(off))]]
+            raise ModelError(
+                f"motion: at t = {t:.6g} s no {missing[0]!r} closes {row.title} (off by {off.max():.3g} {row.unit})"
+            )
+        B = there.B[rows]
+        v[k, free] = np.linalg.lstsq(B[:, free], -there.rate[rows], rcond=None)[0] + v[k, free]
+        there = mechanism.acceleration_terms(t, at, v[k], parameters, start.anchors)
+        a[k, free] = np.linalg.lstsq(B[:, free], -(B @ a[k] + there.bias[rows]), rcond=None)[0] + a[k, free]
+        q[k] = last = at
+    shown_names = ", ".join(map(repr, missing[:4])) + (f" and {len(missing) - 4} more" if missing[4:] else "")
+    return Motion(motion.time, q, v, a, None, (f"{shown_names} follow from the closed loops",))
+
+
+# the record ---------------------------------------------------------------------------------------------------------
+def parameters_of(mechanism: Mechanism, motion: Motion, changed: Mapping[str, float], model: Any) -> Vector | Matrix:
+    """The parameters at the frames: those of the run, if it is one of the very same equations, with changes."""
+    run = motion.run
+    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    if run is None or run.record.equations is not mechanism.equations:
+        return values
+    own = run.record.parameters_at(np.arange(len(run.time), dtype=np.intp))
+    if not changed:
+        return own
+    places = [k for k, each in enumerate(mechanism.equations.parameters) if each.name in changed]
+    own = np.array(own)
+    own[..., places] = values[places]
+    return own
+
+
+def record_of(mechanism: Mechanism, motion: Motion, parameters: Vector | Matrix) -> Record:
+    """The frames as rows of a run, with the contact and friction forces that are known.
+
+    Those of a run act as they did; contacts of a recorded motion are open, and dry friction of joints slides.
+    """
+    equations, count = mechanism.equations, len(motion.time)
+    several = parameters.ndim == 2
+    changes = [(k, parameters[k]) for k in range(1, count)] if several else []
+    n_z, rows = equations.n_z, len(equations.rows)
+    record = Record(
+        equations, parameters[0] if several else parameters, [each.name for each in equations.parameters],
+        motion.time, motion.q, motion.v, np.zeros((count, n_z)), motion.a, np.zeros((count, n_z)),
+        np.zeros((count, rows)), np.zeros((count, len(equations.contacts)), dtype=np.uint8),
+        parameter_changes=changes, phase=np.zeros((count, len(equations.frictions)), dtype=np.int8),
+    )  # fmt: skip
+    if motion.run is not None:
+        return _with_forces(equations, record, motion.run)
+    if n_z:
+        raise CapabilityError(
+            f"inverse dynamics of a recorded motion does not know {equations.states[0].name!r}, a state of a force; "
+            "leave the force out by model.without(…), or give a run"
+        )
+    return replace(record, phase=_sliding(equations, record)) if equations.frictions else record
+
+
+def _with_forces(equations: Equations, record: Record, run: Trajectory) -> Record:
+    """The same with the contacts of a run: multipliers, frictions and states, found by name."""
+    other = run.record.equations
+    source = run.record
+    if other is None:
+        if equations.contacts or equations.frictions or equations.n_z:
+            raise CapabilityError(
+                "motion: contact and friction forces of a run that was read from a file are not known by row; give the "
+                "run itself, or a model without contacts"
+            )
+        return record
+    lam, closed = record.lam.copy(), record.closed.copy()
+    phase, z, s = record.phase.copy(), record.z.copy(), record.s.copy()
+    theirs = {(row.owner, row.part): k for k, row in enumerate(other.rows)}
+    bilateral = set(equations.bilateral)
+    for k, row in enumerate(equations.rows):
+        if k not in bilateral and (row.owner, row.part) in theirs:
+            lam[:, k] = source.lam[:, theirs[row.owner, row.part]]
+    _copy([c.name for c in equations.contacts], [c.name for c in other.contacts], closed, source.closed)
+    _copy(_friction_names(equations), _friction_names(other), phase, source.phase)
+    _copy([c.name for c in equations.states], [c.name for c in other.states], z, source.z)
+    _copy([c.name for c in equations.states], [c.name for c in other.states], s, source.s)
+    same = [c.name for c in other.contacts] == [c.name for c in equations.contacts]
+    start = source.start if same and other.n_anchors == equations.n_anchors else None
+    return replace(record, lam=lam, closed=closed, phase=phase, z=z, s=s, start=start)
+
+
+def _friction_names(equations: Equations) -> list[str]:
+    return [f"{equations.rows[friction.row].title}" for friction in equations.frictions]
+
+
+def _copy(names: list[str], others: list[str], into: NDArray[Any], source: NDArray[Any]) -> None:
+    places = {name: k for k, name in enumerate(others)}
+    for k, name in enumerate(names):
+        if name in places:
+            into[:, k] = source[:, places[name]]
+
+
+def _sliding(equations: Equations, record: Record) -> NDArray[np.int8]:
+    """Dry friction of joints slides in the direction of its rate; that of open contacts is off."""
+    phase = record.phase.copy()
+    always = [k for k, friction in enumerate(equations.frictions) if friction.contact < 0]
+    rates = array_function([equations.frictions[k].rate for k in always])
+    inputs = {
+        "t": record.time, "q": record.q, "v": record.v, "z": record.z, "a": record.a, "s": record.s, "lam": record.lam,
+        "anchor": np.zeros((len(record.time), equations.n_anchors)), "switch": record.closed,
+        "slip": np.zeros_like(phase),
+    }  # fmt: skip
+    found = rates(inputs, record.parameters_at(np.arange(len(record.time), dtype=np.intp)))
+    for k, rate in zip(always, found, strict=True):
+        phase[:, k] = np.sign(rate)
+    return phase

@@ -1,0 +1,48 @@
+"""Angular velocities and accelerations of orientations that are given as unit quaternions over time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.errors import ModelError
+
+__all__ = ["continuous", "quaternion_rates"]
+
+LENGTH = 1e-3
+"""How far from 1 the length of a given quaternion may be before it is refused [-]."""
+
+
+def continuous(quaternions: Matrix, what: str) -> Matrix:
+    """Quaternions (R, 4) of length 1 with signs that do not jump from row to row; q and −q are one orientation.
+
+    >>> continuous(np.array([[0.6, 0.8, 0.0, 0.0], [-0.6, -0.8, 0.0, 0.0]]), "trunk.orientation")[:, :2].tolist()
+    [[0.6, 0.8], [0.6, 0.8]]
+    """
+    sizes = np.linalg.norm(quaternions, axis=1)
+    wrong = np.flatnonzero(np.abs(sizes - 1.0) > LENGTH)
+    if len(wrong):
+        raise ModelError(
+            f"{what!r} must be unit quaternions (w, x, y, z); that of frame {wrong[0]} has the length "
+            f"{sizes[wrong[0]]:.6g}"
+        )
+    unit = quaternions / sizes[:, np.newaxis]
+    jumps = np.where(np.einsum("ij,ij->i", unit[1:], unit[:-1]) < 0.0, -1.0, 1.0)
+    return np.asarray(unit * np.concatenate([[1.0], np.cumprod(jumps)])[:, np.newaxis])
+
+
+def quaternion_rates(q: Matrix, rate: Matrix, acceleration: Matrix) -> tuple[Matrix, Matrix]:
+    """ω and ω̇ in the axes of the child (R, 3) from q of length 1 and two derivatives of a curve s through it.
+
+    With p = s/|s|, ``ω = 2 vec(q* ⊗ ṡ)`` and ``ω̇ = 2 vec(q* ⊗ s̈) − 2 (q·ṡ) ω``: what of ṡ lies along q changes only
+    the length.
+    """
+    spin = 2.0 * _conjugate_product(q, rate)
+    along = np.einsum("ij,ij->i", q, rate)[:, np.newaxis]
+    return spin, 2.0 * _conjugate_product(q, acceleration) - 2.0 * along * spin
+
+
+def _conjugate_product(q: Matrix, p: Matrix) -> Matrix:
+    """The vector part of q* ⊗ p."""
+    w, x = q[:, :1], q[:, 1:]
+    return np.asarray(w * p[:, 1:] - p[:, :1] * x - np.cross(x, p[:, 1:]))
