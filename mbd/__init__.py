@@ -130,6 +130,8 @@ if TYPE_CHECKING:
     )
     from mbd.laboratory.balance_result import InverseDynamics as InverseDynamics
     from mbd.laboratory.inverse_dynamics import inverse_dynamics as inverse_dynamics
+    from mbd.laboratory.read import read as read
+    from mbd.laboratory.recording import PlateRecord as PlateRecord, Recording as Recording
     from mbd.lagrangian import Lagrangian as Lagrangian
     from mbd.model import Model as Model
     from mbd.optimization.optimize import optimize as optimize
@@ -191,6 +193,8 @@ _HOMES = {
     "mbd.equations.energy_description": "Coordinate",
     "mbd.laboratory.balance_result": "InverseDynamics",
     "mbd.laboratory.inverse_dynamics": "inverse_dynamics",
+    "mbd.laboratory.read": "read",
+    "mbd.laboratory.recording": "PlateRecord Recording",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",

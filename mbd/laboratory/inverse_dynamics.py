@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.values import names_of
+from mbd.bodies.values import named_number_faults, names_of
 from mbd.compile.many import at_blocks, blocks_of
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
@@ -87,6 +87,8 @@ def inverse_dynamics(
     >>> print(f"{held['shoulder.moment'][0]:.2f} N m")
     9.81 N m
     """
+    if faults := named_number_faults(parameters, "parameters"):
+        raise ModelError(faults)
     mechanism = mechanism_of(model, backend, parameters)
     found = motion_of(model, mechanism, motion, parameters or {})
     values = parameters_of(mechanism, found, parameters or {}, model)
