@@ -41,11 +41,13 @@ if TYPE_CHECKING:
         Controller as Controller,
         Event as Event,
         KnifeEdge as KnifeEdge,
+        Mode as Mode,
         Nonholonomic as Nonholonomic,
         Penalty as Penalty,
         PenaltyParameters as PenaltyParameters,
         Plane as Plane,
         Rolling as Rolling,
+        Transition as Transition,
         Unilateral as Unilateral,
         When as When,
         cone as cone,
@@ -187,9 +189,9 @@ _HOMES = {
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
-    "mbd.constraints": "Ball Bilateral Controller Event KnifeEdge Nonholonomic Penalty PenaltyParameters Plane "
-    "Rolling Unilateral When cone disk_touchdown distance extension flexion height measure penalty_parameters "
-    "profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
+    "mbd.constraints": "Ball Bilateral Controller Event KnifeEdge Mode Nonholonomic Penalty PenaltyParameters Plane "
+    "Rolling Transition Unilateral When cone disk_touchdown distance extension flexion height measure "
+    "penalty_parameters profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.laboratory.balance_result": "InverseDynamics",
     "mbd.laboratory.inverse_dynamics": "inverse_dynamics",

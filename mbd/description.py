@@ -15,6 +15,7 @@ from mbd.bodies.values import Vector3, names_of, number, printable, triple
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
+from mbd.constraints.machine import Machine
 from mbd.constraints.observation import Observation
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
@@ -87,10 +88,11 @@ class Description:
         )
         self.constraints += served(all_are(Constraint, constraints, example))
 
-    def apply(self, *forces: Force | Controller) -> None:
-        """Add forces and controllers."""
-        example = "apply takes forces such as mbd.Motor('drive', hip, torque=1.0), and controllers"
-        known = all_are((Force, Controller), forces, example)
+    def apply(self, *forces: Force | Controller | Machine) -> None:
+        """Add forces, controllers, and modes or sampled laws, which `constrain` takes too."""
+        example = "apply takes forces such as mbd.Motor('drive', hip, torque=1.0), controllers and modes"
+        known = all_are((Force, Controller, Machine), forces, example)
+        self.constrain(*[word for word in known if isinstance(word, Machine)])
         self.forces += [word for word in known if isinstance(word, Force)]
         self.controllers += [word for word in known if isinstance(word, Controller)]
 
@@ -199,6 +201,11 @@ class Description:
     def events(self) -> list[Event]:
         """The user's own events."""
         return [cast(Event, word) for word in self.constraints if word.kind == "event"]
+
+    @property
+    def machines(self) -> list[Machine]:
+        """Modes and sampled laws."""
+        return [word for word in self.constraints if isinstance(word, Machine)]
 
     @property
     def parameters(self) -> dict[str, float]:

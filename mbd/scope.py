@@ -75,5 +75,8 @@ class Scope(ParameterSource, Protocol):
     def named(self, name: str) -> Node:
         """Any named quantity: 't', 'left hip.angle', 'left hip.rate', 'left shank.end.x', 'left shank.end.vx', …"""
 
+    def state_names(self, mode: str) -> Sequence[str]:
+        """The states of a mode, whose number is the named quantity `mode`."""
+
     def state(self, owner: str, field: str, initial: float) -> Node:
         """A first-order state z of the owner (registered on first use); its rate is given in `Action.rates`."""

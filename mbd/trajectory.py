@@ -86,6 +86,7 @@ class Trajectory:
             value = gather(self.columns, self.columns.at_rows, name)
             require_finite(name, value, self.time, self.facts)
             doubt_singular(name, value, self.facts, lambda other: gather(self.columns, self.columns.at_rows, other))
+            value = self.facts.worded(name, value)
             value.flags.writeable = False
             self._known[name] = value
         return self._known[name]
@@ -395,7 +396,8 @@ class Moments(Mapping[str, Any]):
             require_finite(name, found, self._places.time, self._facts)
         doubt_singular(name, found, self._facts, self._read)
         shaped = found.reshape(self.time.shape + found.shape[1:])
-        return shaped if shaped.ndim else float(shaped)
+        worded = shaped if self._facts is None else self._facts.worded(name, shaped)
+        return worded if shaped.ndim else str(worded) if worded is not shaped else float(shaped)
 
     def _read(self, name: str) -> Vector:
         return gather(self._columns, lambda names: self._columns.at_places(names, self._places), name)

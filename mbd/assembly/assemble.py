@@ -16,6 +16,7 @@ from mbd.assembly.foreseen import require_inertia
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.infeasibility import Held
 from mbd.assembly.initial_pose import opening
+from mbd.assembly.machines import first_anchors, store_first
 from mbd.assembly.named_projection import nearest_positions, nearest_velocities
 from mbd.assembly.posture import (
     TOLERANCE,
@@ -119,7 +120,7 @@ def assemble(
         raise ModelError(faults)
     guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
     guess = equations.configuration.normalise(guess)
-    anchors = np.zeros(mechanism.layout.n_anchors)
+    anchors = first_anchors(mechanism)
     work = Posture(
         mechanism, manager, values, guess, y.copy(), manager.flags(closed), anchors, named.places, named.speeds
     )
@@ -127,6 +128,7 @@ def assemble(
     if bad:
         raise AssemblyError(bad)
     name_wrapped(work)
+    store_first(mechanism, 0.0, work.q, work.y, values, work.anchors)
     doubt(*doubts, *doubtful(model, equations, position or {}), of=model)
     assembled = State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),

@@ -406,7 +406,9 @@ class Mechanism:
         n, rows = layout.n, layout.n_rows
         return {
             "accelerations": n * n + n + 2 * n * rows + 3 * rows + layout.n_anchors + 1 + layout.n_frictions,
-            "guards": 4 * layout.n_contacts + 2 * len(self.equations.guards) + 3 * layout.n_frictions,
+            "guards": 4 * layout.n_contacts
+            + (3 if self.equations.machines else 2) * len(self.equations.guards)
+            + 3 * layout.n_frictions,
             "scales": n + 2 * rows,
             "compose": layout.n_q,
             "increment_rates": layout.n_v,

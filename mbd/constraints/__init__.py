@@ -10,6 +10,7 @@ from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.law import Closing, Drag, Equation, Law
 from mbd.constraints.measure import Measure
 from mbd.constraints.measures import distance, extension, flexion, height, separation
+from mbd.constraints.mode import Mode, Transition
 from mbd.constraints.nonholonomic import Nonholonomic
 from mbd.constraints.penalty import Penalty
 from mbd.constraints.penalty_parameters import PenaltyParameters, penalty_parameters
@@ -25,7 +26,8 @@ from mbd.constraints.user_measure import measure
 
 __all__ = [
     "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law",
-    "Measure", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Unilateral", "VelocityConstraint",
+    "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Transition", "Unilateral",
+    "VelocityConstraint",
     "When", "cone", "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
     "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown",
     "twist",

@@ -9,6 +9,7 @@ from mbd.bodies.promises import called
 from mbd.constraints.base import Constraint
 from mbd.constraints.event import Event
 from mbd.constraints.law import Closing, Equation, Law
+from mbd.constraints.machine import state_of
 from mbd.constraints.measure import Measure, gap_of
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
@@ -158,7 +159,7 @@ def _contact(
     contacts: Sequence[Constraint],
 ) -> None:  # fmt: skip
     """A law that closes and opens, by rows or by a force."""
-    holding = Holding(scope, sum(len(contact.anchors) for contact in found.contacts))
+    holding = Holding(scope, scope.first_anchor + sum(len(contact.anchors) for contact in found.contacts))
     law = law_of(word, holding, contacts)
     if law.contact is not None:
         by = _by_force if law.push is not None else _by_rows
@@ -191,10 +192,21 @@ def _by_rows(
     return Contact(
         word.name, word.kind, gap, rate, acting, tuple(holding.captured), holding.anchors, opens_on=at.opens_on,
         when=tuple((rule.other, rule.after_impact) for rule in at.releases),
-        only_while=scope.real(gap_of(condition, scope)) if isinstance(condition, Measure) else condition,
+        only_while=_watched(condition, scope),
         restitution=at.restitution, unit=at.unit, may_pull=any(rule.may_pull for rule in at.releases), drags=drags,
         undefined=_undefined(word),
     )  # fmt: skip
+
+
+def _watched(condition: str | Measure | None, scope: DerivationScope) -> str | Node | None:
+    """The contact that must be closed, or what must be positive; of a state of a mode, as long as it lasts."""
+    if isinstance(condition, Measure):
+        return scope.real(gap_of(condition, scope))
+    found = None if condition is None else state_of(condition, scope.modes)
+    if found is None:
+        return condition
+    name, state = found
+    return scope.tape.lift(0.5 - abs(scope.named(name) - float(state)))
 
 
 def _by_force(

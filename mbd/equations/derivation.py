@@ -19,6 +19,7 @@ from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.gathered import Gathered
 from mbd.equations.laws import Laws
+from mbd.equations.machines import declare_machines, machine_guards
 from mbd.equations.magnitudes import of_directions
 from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
@@ -87,12 +88,13 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     are `carried` as coordinates of their own in a second derivation.
     """
     scope = DerivationContext(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
+    declare_machines(scope, model.machines, scope.quantities)
     scope.offer_frames(model.frames.values())
     scope.parameters.expect(model.parameters)
     if plan.planar and plan.cut:
-        scope.count_turns(anchors_held(scope, model.contacts))
+        scope.count_turns(scope.first_anchor + anchors_held(scope, model.contacts))
     elif plan.cut:
-        scope.count_turns_in_space(anchors_held(scope, model.contacts))
+        scope.count_turns_in_space(scope.first_anchor + anchors_held(scope, model.contacts))
     moving = list(scope.bodies.values())
     vectors = all(joint.is_vector for joint in plan.edges)
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
@@ -107,6 +109,8 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     written = {name for controller in model.controllers for name in controller.writes}
     always = [*model.bilaterals, *model.nonholonomic]
     constraints = laws(scope, dynamics, joints, always, model.contacts, model.events, gathered, written=written)
+    with gathered.catch():
+        constraints.take_machines(*machine_guards(scope, model.machines, model.contacts, model.events))
     gathered.raise_all()
     weight = weight_of(scope, dynamics)
     stored = [weight, *found] if weight.acts else found
@@ -129,6 +133,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         anatomy=tuple((each.name, each.anatomy) for each in model.joints if each.anatomy),
         shapes=(*shapes_of(model), *(() if plan.planar else solids_of(model))),
         mirror=None if plan.planar else partial(signs_in_a_mirror, plan.edges, model.gravity),
+        machines=tuple(constraints.machines),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),

@@ -190,8 +190,9 @@ class DerivationContext(ParameterScope):
         return known
 
     def named(self, name: str) -> Node:
-        """A named quantity of the configuration or the velocity."""
-        return self.quantities(name)
+        """A named quantity of the configuration or the velocity, or a parameter."""
+        value = None if self.quantities.offers(name) else self.parameters.declared(name)
+        return self.quantities(name) if value is None else self.parameter(*_owner_and_field(name), value)
 
     def state(self, owner: str, field: str, initial: float) -> Node:
         """A first-order state; registered on first use."""
@@ -372,3 +373,8 @@ class DerivationContext(ParameterScope):
         if name not in self.bodies:
             raise UnknownNameError(nearest(name, self.bodies, "body"))
         return self.bodies[name]
+
+
+def _owner_and_field(name: str) -> tuple[str, str]:
+    owner, _, field = name.rpartition(".")
+    return owner, field

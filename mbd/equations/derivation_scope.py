@@ -37,6 +37,10 @@ class DerivationScope(Scope, Protocol):
     inputs: Inputs
     parameters: ParameterTable
     states: list[tuple[Coordinate, Node]]
+    first_anchor: int
+    modes: dict[str, tuple[str, ...]]
+    held_parameters: dict[str, Node]
+    parameters_by_state: dict[str, tuple[Node, tuple[tuple[str, float | None], ...]]]
 
     @property
     def views(self) -> Resolving: ...

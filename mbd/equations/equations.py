@@ -9,8 +9,8 @@ Inputs on the tape, as (kind, index)
     ('v', i), ('a', i)   velocities, accelerations
     ('z', i), ('s', i)   first-order states and their rates ż
     ('lam', k)     multiplier of row k of `rows`
-    ('anchor', k)  value held since a contact closed (point of touchdown, approach speed); behind those of all contacts,
-                   the whole turns of cut joints
+    ('anchor', k)  value held between instants: what machines hold (state, its beginning, what was read then), what
+                   contacts hold since they closed (point of touchdown, approach speed), whole turns of cut joints
     ('switch', c)  1.0 while penalty contact number c acts, else 0.0
     ('slip', k)    sign of the sliding of friction k, 0.0 while it sticks or its contact is open; of two directions
                    see `mbd.equations.cones`
@@ -30,7 +30,7 @@ from mbd.tape.node import Node, Table, Tape
 
 __all__ = [
     "Chart", "Contact", "Coordinate", "Effect", "Equations", "Facing", "Friction", "Geometry", "Guard", "Parameter",
-    "Row", "Turn",
+    "Machine", "Row", "Transition", "Turn",
 ]  # fmt: skip
 
 
@@ -175,8 +175,32 @@ class Friction:
 
 
 @dataclass(frozen=True)
+class Transition:
+    """How an event changes what a machine holds.
+
+    machine, source, target : their numbers
+    causes : (kind, number) of what makes it happen: ('closed', contact), ('opened', contact), ('event', guard that
+        crosses zero, its own among them), ('taken', guard of another transition)
+    contact : number of a contact that must be closed for it, −1 for none
+    condition : what must be positive for it, None for nothing
+    stored : numbers of the anchors that are stored with it; `Machine.captured` tells what
+    """
+
+    machine: int
+    source: int
+    target: int
+    causes: tuple[tuple[str, int], ...]
+    contact: int = -1
+    condition: Node | None = None
+    stored: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
 class Guard:
-    """A user's event: fires when `value` crosses zero (direction −1 falling, +1 rising, 0 both)."""
+    """A user's event: fires when `value` crosses zero (direction −1 falling, +1 rising, 0 both).
+
+    transition : that of a machine which is this event; one without a guard of its own never fires by itself
+    """
 
     name: str
     value: Node
@@ -184,6 +208,32 @@ class Guard:
     direction: int = 0
     terminal: bool = False
     reset: Any = None
+    transition: Transition | None = None
+
+    @property
+    def is_timer(self) -> bool:
+        """Whether it is the time less an instant that is known as a state is entered."""
+        fires = self.transition is not None and any(kind == "event" for kind, _ in self.transition.causes)
+        return fires and self.rate.op == "const" and self.rate.data == 1.0
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Discrete states and held numbers; its transitions are guards.
+
+    states : their names; anchors : the numbers that it holds, that of the state first; fields : their names
+    times : which of these anchors are instants [s]
+    initial : what they are at the start, None for what is stored then
+    captured : what is stored into each anchor, on the tape; the anchor itself where nothing is
+    """
+
+    name: str
+    states: tuple[str, ...]
+    anchors: tuple[int, ...]
+    fields: tuple[str, ...]
+    times: tuple[int, ...]
+    initial: tuple[float | None, ...]
+    captured: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
@@ -320,6 +370,7 @@ class Equations:
     configuration : what the joints say of coordinates and velocities; made from `coordinates` where it is not given
     turns : of the cut joints, see `Turn`
     facings : of the cut joints whose rows hold sines, see `Facing`
+    machines : discrete states, see `Machine`
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     markers : full names of the named points, which pages show
     observations : (name, unit) of the results of users' own; anatomy : (joint, joint of the body) of those that are one
@@ -353,6 +404,7 @@ class Equations:
     facings: tuple[Facing, ...] = ()
     chart: Chart | None = None
     markers: tuple[str, ...] = ()
+    machines: tuple[Machine, ...] = ()
     observations: tuple[tuple[str, str], ...] = ()
     anatomy: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()
@@ -379,8 +431,14 @@ class Equations:
 
     @property
     def n_anchors(self) -> int:
-        """Values that contacts hold, followed by the whole turns of cut joints."""
-        return sum(len(contact.anchors) for contact in self.contacts) + len(self.turns)
+        """Values that machines hold, then those that contacts do, then the whole turns of cut joints."""
+        held = sum(len(contact.anchors) for contact in self.contacts)
+        return self.n_held_by_machines + held + len(self.turns)
+
+    @property
+    def n_held_by_machines(self) -> int:
+        """Anchors before those of contacts."""
+        return sum(len(machine.anchors) for machine in self.machines)
 
     @property
     def wrapped(self) -> tuple[Turn, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from mbd.bodies.promises import called, title_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Law
+from mbd.constraints.machine import state_of
 from mbd.equations.derivation_scope import DerivationScope
 from mbd.errors import ModelError, nearest
 from mbd.tape.derivatives import gradient, live
@@ -55,7 +56,8 @@ def law_of(word: Constraint, holding: Holding, contacts: Sequence[Constraint]) -
     at = law.contact
     others = [] if at is None else [*(rule.other for rule in at.releases), at.only_while]
     for other in (*others, law.while_closed):
-        if isinstance(other, str) and other not in known:
+        by_state = other is not law.while_closed and isinstance(other, str) and state_of(other, holding.scope.modes)
+        if isinstance(other, str) and other not in known and not by_state:
             faults.append(nearest(other, known, "contact"))
     if faults:
         raise ModelError([f"{title}: {fault}" for fault in faults])

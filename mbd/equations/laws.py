@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mbd.equations.equations import Contact, Effect, Friction, Guard, Row
+from mbd.equations.equations import Contact, Effect, Friction, Guard, Machine, Row
 from mbd.tape.node import Node
 
 __all__ = ["Laws"]
@@ -32,3 +33,9 @@ class Laws:
     effects: list[Effect] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     idle: list[tuple[str, str]] = field(default_factory=list)
+    machines: list[Machine] = field(default_factory=list)
+
+    def take_machines(self, machines: Sequence[Machine], guards: Sequence[Guard]) -> None:
+        """Add machines, and their transitions behind users' events."""
+        self.machines += machines
+        self.guards += guards

@@ -61,6 +61,9 @@ class _ObservingScope:
     def time(self) -> Node:
         return self._scope.time
 
+    def state_names(self, mode: str) -> Sequence[str]:
+        return self._scope.state_names(mode)
+
     def frame(self, frame: Frame) -> FrameMotion:
         unknown = [name for name in frame.parameters() if name not in self._scope.parameters]
         if unknown:

@@ -70,6 +70,10 @@ class ParameterTable:
             f"{', '.join(map(repr, mine)) or 'none'}"
         )
 
+    def declared(self, name: str) -> float | None:
+        """The value that a word declares for a parameter; None where none does."""
+        return None if self._declared is None else self._declared.get(name)
+
     def increment(self, name: str) -> Scalar:
         """What is added to the law of that name: a run-time input where it is asked for, 0 otherwise."""
         if f"{INCREMENT}{name}" not in self._tunable:

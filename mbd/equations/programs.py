@@ -10,7 +10,7 @@ With N = n_v + n_z rates, m active rows in ascending number, R rows and nC conta
 `solution`         K⁻¹b from the factors in the output of `correction`, b in the place of the solution there
 `accelerations`    M (N × N) | f (N) | ∂r/∂λ (N × R) | B (R × N) | h (R) | ḣ (R) | γ (R) | captured | T | limits
 `guards`           g (nC) | ġ (nC) | penalty force (nC) | only_while (nC) | event values | event rates |
-                   sliding velocity | its rate | limit of each friction
+                   sliding velocity | its rate | limit of each friction | with machines conditions of transitions
 `scales`           magnitudes of r (N) | of h (R) | of ḣ (R), term by term before cancellation
 `compose`          q ⊕ x, or None where it is q + x
 `increment_rates`  ẋ = D(x)⁻¹ v (n_v)
@@ -181,9 +181,10 @@ def _levels(equations: Equations, rows: Sequence[int], stabilized: bool) -> list
 def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     """What assembly, impacts and restarts need, over all rows and with penalties behind their switches.
 
-    ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that closing contacts
-    store, in the order of contacts and anchors, and the whole turns as they are; T is the kinetic energy. In `impacts`,
-    where c_C is 1, smooth friction of contacts has no impulse, and dry friction of contacts its limit at rest.
+    ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that transitions
+    and closing contacts store, in the order of anchors, and the whole turns as they are; T is the kinetic energy. In
+    `impacts`, where c_C is 1, smooth friction of contacts has no impulse, and dry friction of contacts its limit at
+    rest.
     """
     inputs = Inputs.of(equations)
     tape = equations.tape
@@ -202,6 +203,7 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     out += [right[k][i] for i in range(inputs.n) for k in rows]
     out += [entry for line in B for entry in [*line, *padding]]
     out += [row.value for row in equations.rows] + hv + _time_rates(equations, hv)
+    out += [value for machine in equations.machines for value in machine.captured]
     out += [value for contact in equations.contacts for value in contact.captured]
     out += [tape.input("anchor", turn.anchor) for turn in equations.turns]
     return [*out, equations.kinetic, *(friction.limit_at_speed(smooth) for friction in equations.frictions)]
@@ -216,7 +218,11 @@ def guards(equations: Equations) -> list[Node]:
     out += [guard.value for guard in equations.guards] + [guard.rate for guard in equations.guards]
     frictions = equations.frictions
     out += [friction.rate for friction in frictions] + [friction.change for friction in frictions]
-    return out + [friction.sliding for friction in frictions]
+    out += [friction.sliding for friction in frictions]
+    if not equations.machines:
+        return out
+    transitions = [guard.transition for guard in equations.guards]
+    return out + [tape.one if each is None or each.condition is None else each.condition for each in transitions]
 
 
 def scales(equations: Equations) -> list[Node]:

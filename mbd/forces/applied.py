@@ -12,6 +12,7 @@ from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
+from mbd.forces.by_mode import by_mode_of
 from mbd.forces.quantities import (
     Mention,
     arguments_of,
@@ -44,6 +45,7 @@ class Applied(Force):
     torque : the same [N m]; a single quantity acts about z
     arguments : what functions are called with, in order: names of quantities ('t', 'left hip.angle'), frames (their
         positions), joints (their coordinates), or (label, number) for a run-time parameter of the function
+    by : name of a mode, whose states have forces and torques of their own: ``force={"thrust": (0, 9.0)}, by="phase"``
     axes : the frame along whose axes the components lie, of any body; None: along those of the ground
 
     Numbers are the run-time parameters 'name.force.x', 'name.torque.z', …
@@ -55,6 +57,7 @@ class Applied(Force):
     torque: Any = None
     arguments: Any = ("t",)
     axes: Frame | None = None
+    by: str | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -63,10 +66,9 @@ class Applied(Force):
         if self.force is None and self.torque is None:
             raise ModelError(f"Applied '{self.name}' does nothing: give force=(x, y, z), torque=(x, y, z), or both")
         if self.force is not None:
-            put(self, "force", triple_of(self.force, f"force of '{self.name}'"))
+            put(self, "force", by_mode_of(self.force, self.by, f"force of '{self.name}'", triple_of))
         if self.torque is not None:
-            torque = (0.0, 0.0, self.torque) if is_single(self.torque) else self.torque
-            put(self, "torque", triple_of(torque, f"torque of '{self.name}'"))
+            put(self, "torque", by_mode_of(self.torque, self.by, f"torque of '{self.name}'", _torque_of))
         put(self, "arguments", arguments_of(self.arguments, f"Applied '{self.name}'"))
         if self.axes is not None:
             what = f"axes of Applied '{self.name}'"
@@ -117,3 +119,8 @@ class Applied(Force):
 
     def _component(self, field: str, scope: Scope) -> tuple[Scalar, ...]:
         return triple_at(getattr(self, field), self.arguments, scope, self.name, field)
+
+
+def _torque_of(value: Any, what: str) -> Any:
+    """Three components; a single quantity acts about z."""
+    return triple_of((0.0, 0.0, value) if is_single(value) else value, what)

@@ -8,6 +8,7 @@ from typing import Any
 from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
+from mbd.forces.by_mode import by_mode_of
 from mbd.forces.quantities import (
     Mention,
     arguments_of,
@@ -37,6 +38,8 @@ class Motor(Force):
         expression or `Samples`, and so is the result called. Along a slider it is a force [N], and so is the result
     arguments : what a function is called with, as for `Applied`
     force : the same along a slider [N], under the name that its result has: the parameter 'name.force'
+    by : name of a mode, whose states have torques of their own: ``torque={"stance": f, "swing": 2.0}, by="phase"``; in
+        states that are left out there is none. A number is the parameter 'name.torque.swing'
     """
 
     name: str
@@ -44,6 +47,7 @@ class Motor(Force):
     torque: Any = None
     arguments: Any = ("t",)
     force: Any = None
+    by: str | None = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Motor")
@@ -56,7 +60,8 @@ class Motor(Force):
             raise ModelError(
                 f"Motor '{self.name}' turns '{self.joint.name}', so that it has a torque: give torque=… [N m]"
             )
-        object.__setattr__(self, self.field, quantity_of(self.effort, f"{self.field} of '{self.name}'"))
+        effort = by_mode_of(self.effort, self.by, f"{self.field} of '{self.name}'", quantity_of)
+        object.__setattr__(self, self.field, effort)
         object.__setattr__(self, "arguments", arguments_of(self.arguments, f"Motor '{self.name}'"))
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number, number
 from mbd.errors import ModelError, UnknownNameError
+from mbd.forces.by_mode import ByMode
 from mbd.forces.samples import Samples
 from mbd.forces.scipy_curves import is_curve
 from mbd.joints.base import Joint
@@ -141,10 +143,15 @@ def resolved(arguments: ArgumentSpec, scope: Scope, owner: str) -> list[Argument
 def scalar(
     value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field: str, otherwise: str = "monotone"
 ) -> Scalar:
-    """A quantity on the tape; a number is the run-time parameter 'owner.field'.
+    """A quantity on the tape; a number is the run-time parameter 'owner.field', of a state 'owner.field.state'.
 
     otherwise : the kind of samples that were given none
     """
+    if isinstance(value, ByMode):
+        return value.select(
+            scope, f"{field} of '{owner}'",
+            lambda state, part: scalar(part, arguments, scope, owner, f"{field}.{state}", otherwise), 0.0,
+        )  # fmt: skip
     if is_number(value):
         return scope.parameter(owner, field, float(value))
     if isinstance(value, Samples):
@@ -155,12 +162,21 @@ def scalar(
 
 def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, field: str) -> tuple[Scalar, ...]:
     """Three components on the tape; numbers are the parameters 'owner.field.x', …, a single torque acts about z."""
+    if isinstance(value, ByMode):
+        parts: dict[str, tuple[Scalar, ...]] = {}
+
+        def component(k: int, state: str, part: Any) -> Scalar:
+            if state not in parts:
+                parts[state] = triple_at(part, arguments, scope, owner, f"{field}.{state}")
+            return parts[state][k]
+
+        return tuple(value.select(scope, f"{field} of '{owner}'", partial(component, k), 0.0) for k in range(3))
     if isinstance(value, tuple):
         return tuple(
             scalar(part, arguments, scope, owner, f"{field}.{axis}") for part, axis in zip(value, "xyz", strict=True)
         )
     result: Any = traced(value, resolved(arguments, scope, owner), f"{field} of '{owner}'", scope.tape)
-    if field == "torque" and not isinstance(result, tuple):
+    if field.partition(".")[0] == "torque" and not isinstance(result, tuple):
         result = (0.0, 0.0, result)
     if not isinstance(result, tuple) or len(result) not in (2, 3):
         came = f"{len(result)} numbers" if isinstance(result, tuple) else "one number"
@@ -172,6 +188,9 @@ def triple_at(value: Any, arguments: ArgumentSpec, scope: Scope, owner: str, fie
 def value_parameters(value: Any, arguments: ArgumentSpec, owner: str, field: str) -> dict[str, float]:
     """Run-time parameters of a quantity, of three components, and of its arguments, by full name."""
     result = {f"{owner}.{label}": given for label, given in arguments if isinstance(given, float)}
+    if isinstance(value, ByMode):
+        for state, part in value.values:
+            result |= value_parameters(part, (), owner, f"{field}.{state}")
     if isinstance(value, tuple):
         for part, axis in zip(value, "xyz", strict=True):
             if is_number(part):
@@ -188,6 +207,9 @@ def law_names(value: Any, owner: str, field: str, components: bool = False) -> t
     """
     if value is None or is_number(value):
         return ()
+    if isinstance(value, ByMode):
+        named = (law_names(part, owner, f"{field}.{state}", components) for state, part in value.values)
+        return tuple(name for names in named for name in names)
     if not components:
         return (f"{owner}.{field}",)
     parts = value if isinstance(value, tuple) else (None,) * 3

@@ -20,6 +20,7 @@ from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import MbdError, ModelError
+from mbd.gait.machines import in_state
 from mbd.gait.mirror import Mirror
 from mbd.gait.reflection import reflections
 from mbd.joints.reflected import exchanged
@@ -138,13 +139,16 @@ def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
     """What is compared, at some states with their mirror images."""
     layout, random = mechanism.layout, np.random.default_rng(3)
     configuration, found = mechanism.equations.configuration, list[tuple[Vector, Vector]]()
-    acting = [e for e, guard in enumerate(mechanism.equations.guards)
-              if guard.terminal or guard.reset is not None or guard.name == mirror.section]  # fmt: skip
+    acting = [
+        e
+        for e, guard in enumerate(mechanism.equations.guards)
+        if guard.terminal or guard.reset is not None or guard.transition or guard.name == mirror.section
+    ]
     order = np.concatenate([mirror.v, layout.n_v + mirror.z]).astype(np.intp)
     signs = np.ones(layout.n)
     if mirror.reflection is not None:
         signs[: layout.n_v] = mirror.reflection.v
-    for _ in range(POSES):
+    for number in range(max([POSES, *(len(machine.states) for machine in mechanism.equations.machines)])):
         q, y = (
             np.array(configuration.defaults) + random.uniform(-0.4, 0.4, layout.n_q),
             random.uniform(-1, 1, layout.n),
@@ -152,7 +156,9 @@ def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
         q = configuration.normalise(q)
         image_q = mirror.of_q(q)
         image_y = np.concatenate([mirror.of_v(y[: layout.n_v]), y[layout.n_v :][mirror.z]])
-        here, there = (_numbers(mechanism, parameters, *at) for at in ((q, y), (image_q, image_y)))
+        held = in_state(mechanism, number)
+        here, there = (_numbers(mechanism, parameters, *at) for at in (
+            (q, y, held), (image_q, image_y, mirror.of_anchors(held))))  # fmt: skip
         for mine, its in zip(here["matrices"], there["matrices"], strict=True):
             found.append((np.ravel(mine[np.ix_(order, order)] * np.outer(signs, signs)), np.ravel(its)))
         for mine, its in zip(here["vectors"], there["vectors"], strict=True):
@@ -167,10 +173,10 @@ def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
     return found
 
 
-def _numbers(mechanism: Mechanism, parameters: Vector, q: Vector, y: Vector) -> dict[str, list[Any]]:
+def _numbers(mechanism: Mechanism, parameters: Vector, q: Vector, y: Vector, anchors: Vector) -> dict[str, list[Any]]:
     """What a state tells of a mechanism; of rows what depends neither on their order nor on their signs."""
     layout, equations = mechanism.layout, mechanism.equations
-    anchors, lam = np.zeros(layout.n_anchors), -np.ones(layout.n_rows)
+    lam = -np.ones(layout.n_rows)
     terms = mechanism.acceleration_terms(0.0, q, y, parameters, anchors, lam=lam)
     guards = np.zeros(max(mechanism.sizes["guards"], 1))
     mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, guards)

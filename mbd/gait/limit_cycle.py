@@ -16,6 +16,7 @@ from mbd.gait.arguments import Functions, check_arguments, increments_named, sec
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.floquet import Multipliers
 from mbd.gait.heading import heading_of
+from mbd.gait.machines import counted_from
 from mbd.gait.mirror import mirror_of
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, fallen_first, first_found, first_return
@@ -96,9 +97,11 @@ def limit_cycle(
     scheme = RungeKutta853() if integrator is None else integrator
     numbers = {"dt": dt, "tol": tol, "longest": longest}
     check_arguments(start, scheme, strides, numbers, parameters, functions, wrt, on_failure)
-    start = replace(start, time=0.0, memory=None)
+    begun, start = start.time, replace(start, time=0.0, memory=None)
     map_ = map_of(model, start, scheme, dt or FIRST, (section, mirror, strides), parameters, functions, modulo, longest,
                   backend)  # fmt: skip
+    if len(start.anchors):
+        start = replace(start, anchors=counted_from(map_.mechanism.equations, start.anchors, begun))
     gait = _found(map_, start, dt, tol)
     if not gait.success and on_failure == "raise":
         raise GaitError(f"{gait.name}: {gait.outcome}", gait)

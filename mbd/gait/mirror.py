@@ -6,16 +6,17 @@ z, y and x under which the mechanism is its own mirror image (`mbd.gait.alike`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError
+from mbd.gait.machines import image_faults, images
 from mbd.gait.reflection import Reflection
 from mbd.joints.reflected import exchanged
 from mbd.state import Mode, State
@@ -32,6 +33,7 @@ class Mirror:
     sides : the two words; q, v, z, anchors : places of coordinates, velocities, first-order states, held values
     reflection : signs of the numbers there, of a walker in space; None: they are those of the other side
     section : the event at which returns end
+    states : by the anchor of the state of a machine, the numbers that those of its partner become
     """
 
     sides: tuple[str, str]
@@ -41,6 +43,7 @@ class Mirror:
     anchors: Numbers
     reflection: Reflection | None = None
     section: str = ""
+    states: Mapping[int, Vector] = field(default_factory=dict)
 
     def name(self, name: str) -> str:
         """The mirror image of a name."""
@@ -60,8 +63,11 @@ class Mirror:
 
     def of_anchors(self, anchors: Any) -> Matrix:
         """Mirror images of held values (…, n_anchors)."""
-        found = anchors[..., self.anchors]
-        return np.asarray(found if self.reflection is None else self.reflection.anchors * found)
+        found = np.asarray(anchors)[..., self.anchors]
+        found = found if self.reflection is None else self.reflection.anchors * found
+        for place, numbers in self.states.items():
+            found[..., place] = numbers[np.abs(found[..., place]).astype(int)]
+        return np.asarray(found)
 
     def state(self, state: State) -> State:
         """The mirror image of a state."""
@@ -94,7 +100,7 @@ def mirror_of(equations: Equations, sides: Any, section: str = "") -> Mirror:
         "velocity": list(equations.velocity_names),
         "state": [s.name for s in equations.states],
         "contact": [c.name for c in equations.contacts],
-        "event": [g.name for g in equations.guards if g.terminal or g.reset is not None],
+        "event": [g.name for g in equations.guards if g.terminal or g.reset is not None or g.transition is not None],
     }
     faults, sided = [], 0
     for kind, names in lists.items():
@@ -103,23 +109,27 @@ def mirror_of(equations: Equations, sides: Any, section: str = "") -> Mirror:
             sided += other != name
             if other not in names:
                 faults.append(f"mirror={(one, two)}: {kind} {name!r} has no partner {other!r}")
+    faults += image_faults(equations, (one, two))
     if not sided:
         faults.append(f"mirror={(one, two)}: no coordinate or contact has one of these words in its name")
     if faults:
         raise ModelError([*faults[:-1], f"{faults[-1]}; name both sides alike, or take mirror=None"])
     q, v, z = (_places(lists[kind], (one, two)) for kind in ("coordinate", "velocity", "state"))
-    return Mirror((one, two), q, v, z, _anchor_places(equations, lists["contact"], (one, two)), section=section)
+    anchors, states = _anchor_places(equations, lists["contact"], (one, two))
+    return Mirror((one, two), q, v, z, anchors, section=section, states=states)
 
 
 def _places(names: Sequence[str], sides: tuple[str, str]) -> Numbers:
     return np.array([names.index(exchanged(name, sides)) for name in names], dtype=np.intp)
 
 
-def _anchor_places(equations: Equations, names: Sequence[str], sides: tuple[str, str]) -> Numbers:
-    """Where each anchor of the mirror image stands; turns of cut joints stay."""
-    found = np.arange(equations.n_anchors, dtype=np.intp)
+def _anchor_places(
+    equations: Equations, names: Sequence[str], sides: tuple[str, str]
+) -> tuple[Numbers, dict[int, Vector]]:
+    """Where each anchor of the mirror image stands, turns of cut joints stay; and what numbers of states become."""
+    found, states = images(equations, sides)
     for contact in equations.contacts:
         partner = equations.contacts[names.index(exchanged(contact.name, sides))]
         if len(partner.anchors) == len(contact.anchors):
             found[list(contact.anchors)] = list(partner.anchors)
-    return found
+    return found, states

@@ -21,7 +21,8 @@ class Outcome:
     """How a walk went, in a word and in a sentence.
 
     kind : 'walks', 'arrives' (at the section), 'falls', 'scuffs', 'other event', 'misses' (the section is not reached),
-        'wrong contacts', 'rests', 'not on the section', 'does not converge', 'numerical error'
+        'wrong contacts', 'other states' (of modes), 'rests', 'not on the section', 'does not converge',
+        'numerical error'
     text : 'falls backward at 0.41 s'
     time : when [s]
     """

@@ -18,6 +18,7 @@ from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.errors import MbdError, ModelError
 from mbd.gait.alike import moves_sides_alike, sides_faults
 from mbd.gait.heading import Heading
+from mbd.gait.machines import counted_from, stored_by
 from mbd.gait.mirror import Mirror
 from mbd.gait.outcome import Outcome, fall_of
 from mbd.gait.section import Section
@@ -48,6 +49,7 @@ class Arrival:
     before : contacts closed just before the last event
     events : (name, kind) of all returns in order, in the names of a walk without exchange of sides; penalty contacts,
         which change nothing abruptly, are none
+    stored : anchors that machines stored at the last instant
     """
 
     state: State
@@ -57,6 +59,7 @@ class Arrival:
     steps: tuple[tuple[str, float, float], ...]
     before: frozenset[str]
     events: tuple[tuple[str, str], ...]
+    stored: frozenset[int] = frozenset()
 
 
 @dataclass(eq=False)
@@ -70,13 +73,21 @@ class _Walk:
     period: float = 0.0
     steps: list[tuple[str, float, float]] = field(default_factory=list)
     events: list[tuple[str, str]] = field(default_factory=list)
+    stored: frozenset[int] = frozenset()
     end: End | None = None
 
     def arrival(self) -> Arrival:
         """Where it has led."""
         assert self.end is not None
         return Arrival(
-            self.state, self.outcome, self.period, self.travel, tuple(self.steps), self.end.before, tuple(self.events)
+            self.state,
+            self.outcome,
+            self.period,
+            self.travel,
+            tuple(self.steps),
+            self.end.before,
+            tuple(self.events),
+            self.stored,
         )
 
 
@@ -119,7 +130,10 @@ class ReturnMap:
         self.penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
         places = {name: place or self._center(name) for name, place in places.items()}
         self.feet = {name: place for name, place in places.items() if place}
-        self.inert = {g.name for g in self.mechanism.equations.guards if g.reset is None and not g.terminal}
+        self.inert = {
+            g.name for g in self.mechanism.equations.guards
+            if g.reset is None and not g.terminal and g.transition is None
+        }  # fmt: skip
         self.parameter_steps: dict[str, float] = {}
         """Differences of parameters whose effect was seen, by name, with which later derivatives begin."""
         self._repeated: dict[tuple[float, float] | None, RepeatedRun] = {}
@@ -238,7 +252,11 @@ class ReturnMap:
         walk.steps += [(self._named(name, odd), walk.period + t, length) for name, t, length in found]
         walk.events += [(self._named(e.name, odd), e.kind) for e in end.events if e.name not in self.penalties]
         walk.period, walk.travel = walk.period + after.time, walk.travel + (self.turned * moved if odd else moved)
-        state = replace(after, time=0.0, moved={}, parameters={})
+        equations = self.mechanism.equations
+        anchors = counted_from(equations, after.anchors, after.time)
+        state = replace(after, time=0.0, anchors=anchors, moved={}, parameters={})
+        last = [e.name for e in end.events if e.kind == "event" and e.time == after.time]
+        walk.stored = stored_by(equations, last if self.mirror is None else [self.mirror.name(name) for name in last])
         walk.state = self.mirror.state(state) if self.mirror is not None else state
 
     def _named(self, name: str, odd: bool) -> str:
@@ -366,7 +384,12 @@ class ReturnMap:
     def against(self, section: Section, arrival: Arrival) -> Outcome:
         """The outcome, where other contacts are closed than on the section a name for that."""
         has, needs = (mode.closed - self.penalties for mode in (arrival.state.mode, section.mode))
-        if not arrival.outcome.good or has == needs:
+        if not arrival.outcome.good:
+            return arrival.outcome
+        if others := section.other_states(arrival.state):
+            text = f"comes to other states at {arrival.period:.3g} s: {others}"
+            return Outcome("other states", text, arrival.period)
+        if has == needs:
             return arrival.outcome
         missing, more = sorted(needs - has), sorted(has - needs)
         sets = ((missing, "open"), (more, "closed"))

@@ -73,7 +73,7 @@ def first_return(
     name = map_.section if map_.mirror is None else map_.mirror.name(map_.section)
     before = arrival.before if map_.mirror is None else map_.mirror.names(arrival.before)
     section = section_of(map_.mechanism, map_.manager, name, arrival.state, before, parameters, map_.fixed,
-                         map_.heading)  # fmt: skip
+                         map_.heading, arrival.stored)  # fmt: skip
     near = on_section(section, start, parameters)
     return section, (arrival.state,) if near is None else (near, arrival.state)
 
@@ -81,7 +81,7 @@ def first_return(
 def on_section(section: Section, start: State, parameters: Vector, near: float = NEAR) -> State | None:
     """The nearest state of the section, if the start is as near."""
     same = start.mode.closed == section.mode.closed and len(start.anchors) == section.mechanism.layout.n_anchors
-    if not same:
+    if not same or section.other_states(start):
         return None
     h, _ = section.positions(start.q, parameters, start.anchors)
     if not np.max(np.abs(h), initial=0.0) <= near:

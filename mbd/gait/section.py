@@ -14,7 +14,7 @@ on the chart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,6 +27,7 @@ from mbd.assembly.posture import position_rows
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import SimulationError
 from mbd.gait.heading import Heading
+from mbd.gait.machines import remembered, state_anchors
 from mbd.gait.whole_turns import unwound
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.state import Mode, State
@@ -50,9 +51,11 @@ class Section:
     mode, armed : closed contacts and those that may close
     places : numbers of rows whose h holds; gaps : (value, rate) places in the program `guards` of gaps that are zero
     rates : numbers of rows whose ḣ holds
-    held : numbers of anchors that are part of the state: of penalty contacts that act
+    held : numbers of anchors that are part of the state: of penalty contacts that act, what machines remember
     fixed : numbers of increments of q along which the walker moves on
     heading : turns about the vertical that change nothing; None: headings differ
+    stored : numbers of anchors that machines store as it is reached
+    states : numbers of the states of machines
     """
 
     mechanism: Mechanism
@@ -65,6 +68,18 @@ class Section:
     held: tuple[int, ...]
     fixed: tuple[int, ...]
     heading: Heading | None = None
+    stored: tuple[int, ...] = ()
+    states: tuple[float, ...] = ()
+
+    def other_states(self, state: State) -> str:
+        """Modes that are in other states than on the section, in words; '' where none is."""
+        machines = self.mechanism.equations.machines if len(state.anchors) else ()
+        found = []
+        for machine, needs in zip(machines, self.states[: len(machines)], strict=True):
+            has = state.anchors[machine.anchors[0]]
+            if has != needs:
+                found.append(f"{machine.name!r} is in {machine.states[int(has)]!r}, not {machine.states[int(needs)]!r}")
+        return " and ".join(found)
 
     @cached_property
     def flags(self) -> NDArray[np.int64]:
@@ -91,7 +106,7 @@ class Section:
         return terms.rate[picked], terms.B[picked][:, : self.mechanism.layout.n_v]
 
     def anchored(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> Vector:
-        """The anchors with what closed unilateral contacts hold at q."""
+        """The anchors with what closed unilateral contacts hold at q, and machines have just stored."""
         if not len(anchors):
             return np.array(anchors, dtype=float)
         terms = self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
@@ -99,6 +114,7 @@ class Section:
         for contact, flag in zip(self.manager.contacts, self.flags, strict=True):
             if flag and contact.kind == "unilateral":
                 found[list(contact.anchors)] = terms.captured[list(contact.anchors)]
+        found[list(self.stored)] = terms.captured[list(self.stored)]
         return found
 
     def _guards(self, q: Vector, v: Vector, parameters: Vector, anchors: Vector) -> Vector:
@@ -198,7 +214,7 @@ class Chart:
 
 def section_of(
     mechanism: Mechanism, manager: ActiveSetManager, name: str, arrived: State, before: frozenset[str],
-    parameters: Vector, fixed: Sequence[int], heading: Heading | None = None,
+    parameters: Vector, fixed: Sequence[int], heading: Heading | None = None, stored: Collection[int] = (),
 ) -> Section:  # fmt: skip
     """The section of an event, from the state just after it and the contacts that were closed just before it."""
     after = arrived.mode.closed
@@ -226,9 +242,11 @@ def section_of(
               if guard.name == name]  # fmt: skip
     gaps = tuple(pair for pair in pairs if abs(out[pair[0]]) <= CLOSED)
     held = [k for c in manager.contacts if c.kind == "penalty" and c.name in after for k in c.anchors]
+    held += [anchor for anchor in remembered(mechanism.equations) if anchor not in stored]
+    states = arrived.anchors[state_anchors(mechanism.equations)] if len(arrived.anchors) else ()
     return Section(
         mechanism, manager, arrived.mode, arrived.armed, tuple(places), gaps, tuple(sorted(set(rates))), tuple(held),
-        tuple(fixed), None if held else heading,
+        tuple(fixed), None if held else heading, tuple(sorted(stored)), tuple(float(each) for each in states),
     )  # fmt: skip
 
 

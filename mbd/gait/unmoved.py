@@ -11,6 +11,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.constraints.expressions import is_expression
 from mbd.equations import programs
 from mbd.equations.equations import Equations
+from mbd.gait.machines import in_state, times_since
 from mbd.tape.derivatives import jvps, live
 
 __all__ = ["depends_on_time", "moving_on", "reset_names"]
@@ -66,21 +67,22 @@ def _changes_nothing(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
     """Whether inertia, forces, Jacobians, gaps and events are the same far away along a coordinate."""
     layout, random = mechanism.layout, np.random.default_rng(7)
     compose, size = mechanism.equations.configuration.compose, max(mechanism.sizes["guards"], 1)
-    defaults, none = np.array(mechanism.equations.configuration.defaults), np.zeros(layout.n_anchors)
+    defaults = np.array(mechanism.equations.configuration.defaults)
 
-    def numbers(touched: Vector, q: Vector, y: Vector) -> Vector:
+    def numbers(touched: Vector, q: Vector, y: Vector, none: Vector) -> Vector:
         anchors = mechanism.acceleration_terms(0.0, touched, y, parameters, none).captured
         terms, guards = mechanism.acceleration_terms(0.0, q, y, parameters, anchors), np.zeros(size)
         mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, guards)
         parts = (terms.M, terms.f, terms.R, terms.B, terms.rate, terms.bias, guards)
         return np.concatenate([np.ravel(part) for part in parts])
 
-    for _ in range(FAR_STATES):
+    for number in range(FAR_STATES):
         q0, q = (compose(defaults, end) for end in random.uniform(-0.5, 0.5, (2, layout.n_v)))
         y = random.uniform(-1.0, 1.0, layout.n)
         move = np.zeros(layout.n_v)
         move[k] = random.uniform(-FAR, FAR)
-        here, there = numbers(q0, q, y), numbers(compose(q0, move), compose(q, move), y)
+        states = in_state(mechanism, number)
+        here, there = numbers(q0, q, y, states), numbers(compose(q0, move), compose(q, move), y, states)
         if not np.max(np.abs(there - here), initial=0.0) <= SAME * max(1.0, float(np.max(np.abs(here), initial=0.0))):
             return False
     return True
@@ -134,7 +136,12 @@ def depends_on_time(mechanism: Mechanism) -> bool:
     known = equations.memory.get("depends on time")
     if known is None:
         with equations.tape.lock:
-            nodes: Sequence[object] = live([*programs.accelerations(equations), *programs.guards(equations)])
+            first = equations.tape.input("t").index  # as an instant that machines store it begins at 0 again
+            stored = {node.index for machine in equations.machines for node in machine.captured if node.index == first}
+            outputs = [node for node in programs.accelerations(equations) if node.index not in stored]
+            given = times_since(equations)
+            live_nodes = live([*outputs, *programs.guards(equations)], given)
+            nodes: Sequence[object] = [node for node in live_nodes if node.index not in given]
         known = any(getattr(node, "op", "") == "input" and getattr(node, "data", ("",))[0] == "t" for node in nodes)
         equations.memory["depends on time"] = known
     return bool(known)

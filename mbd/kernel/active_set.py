@@ -39,6 +39,8 @@ class ActiveSetManager:
         self._row_level = [int(row.is_velocity) for row in equations.rows]
         self._row_friction = [row.friction for row in equations.rows]
         self.frictions = equations.frictions
+        self.machines = equations.machines
+        self._first_anchor = equations.n_held_by_machines
         self.rolling: dict[str, tuple[int, ...]] = {}  # rows of wheels that roll while a contact is closed, by name
         own = {contact.name for contact in equations.contacts}
         for k, row in enumerate(equations.rows):
@@ -57,6 +59,21 @@ class ActiveSetManager:
     @property
     def names(self) -> list[str]:
         return [contact.name for contact in self.contacts]
+
+    @property
+    def instants(self) -> dict[str, tuple[int, ...]]:
+        """Guards by the names of events; 'knee phase: stance' are all transitions that enter this state."""
+        found: dict[str, tuple[int, ...]] = {guard.name: (e,) for e, guard in enumerate(self.guards)}
+        for e, guard in enumerate(self.guards):
+            if guard.transition is not None:
+                machine = self.machines[guard.transition.machine]
+                name = f"{machine.name}: {machine.states[guard.transition.target]}"
+                found[name] = (*found.get(name, ()), e)
+        return found
+
+    def happens(self, name: str, event: str) -> bool:
+        """Whether an event of this name is one that `instants` or a contact is called by."""
+        return name == event or any(self.guards[e].name == event for e in self.instants.get(name, ()))
 
     def flags(self, closed: Iterable[str]) -> Integers:
         """1 for each closed contact, in order of registration."""
@@ -95,7 +112,7 @@ class ActiveSetManager:
         number = {contact.name: c for c, contact in enumerate(self.contacts)}
         opens = {"pull": 0, "gap": 1, "when": 2}
         starts, targets, afters = [0], [], []
-        anchors = [0]
+        anchors = [self._first_anchor]
         while_kind, while_target = [], []
         for contact in self.contacts:
             for other, after in contact.when:
@@ -118,8 +135,32 @@ class ActiveSetManager:
             "opens": [opens[contact.opens_on] for contact in self.contacts],
             "normal": normals, "when_start": starts, "when_target": targets, "when_after": afters,
             "while_kind": while_kind, "while_target": while_target, "anchor_start": anchors,
-            "direction": [guard.direction for guard in self.guards],
+            "direction": [guard.direction for guard in self.guards], **self._transitions(),
         }  # fmt: skip
         tables = ContactTables({name: np.array(values, dtype=np.int64) for name, values in integers.items()})
         tables["restitution"] = np.array([contact.restitution for contact in self.contacts], dtype=float)
         return tables
+
+    def _transitions(self) -> dict[str, list[int]]:
+        """The transitions of machines as the kernel's tables, by guards."""
+        n_c, n_g = len(self.contacts), len(self.guards)
+        begin = {"closed": 0, "opened": n_c, "event": 2 * n_c, "taken": 2 * n_c + n_g}
+        causes, cause_starts, stored, store_starts = list[int](), [0], list[int](), [0]
+        for guard in self.guards:
+            each = guard.transition
+            causes += [] if each is None else [begin[kind] + number for kind, number in each.causes]
+            stored += [] if each is None else each.stored
+            cause_starts.append(len(causes))
+            store_starts.append(len(stored))
+        own = [(e, guard.transition) for e, guard in enumerate(self.guards)]
+        return {
+            "machine_start": [machine.anchors[0] for machine in self.machines],
+            "guard_machine": [-1 if each is None else each.machine for _, each in own],
+            "guard_source": [-1 if each is None else each.source for _, each in own],
+            "guard_target": [-1 if each is None else each.target for _, each in own],
+            "guard_fires": [int(each is not None and ("event", e) in each.causes) for e, each in own],
+            "guard_timed": [int(each is not None and guard.is_timer) for guard, (_, each) in zip(
+                self.guards, own, strict=True)],
+            "guard_contact": [-1 if each is None else each.contact for _, each in own],
+            "cause_start": cause_starts, "cause_mark": causes, "store_start": store_starts, "store_anchor": stored,
+        }  # fmt: skip

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from mbd.kernel.accept_restart import accept_for_restart, project_velocity
+from mbd.kernel.accept_restart import accept_for_restart, event_at_start, project_velocity
 from mbd.kernel.candidate import accept_guards
 from mbd.kernel.charts import divides_further, turned_end, wants_row
 from mbd.kernel.codes import (
     AT_POSE,
     CHATTER,
+    CROSS,
     DONE,
     EVENT,
     FULL,
@@ -49,6 +50,7 @@ from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.step_retry import is_shortened, part_end, step_end, tried_step
+from mbd.kernel.transitions import find_due, has_happened, is_due, settle_fresh, take_transitions
 from mbd.kernel.trial_step import try_step
 
 __all__ = ["advance"]
@@ -105,15 +107,23 @@ def begin(K: Kernel) -> int:
     """What comes before a step: room for its rows, a start of the scheme, code of the mode; −1 if it can be taken."""
     if K.n_stored + 4 + 2 * K.n_guards > K.capacity or K.n_logged + room_to_log(K) > K.event_capacity:
         return FULL
-    if K.restart_due > 0:
+    while K.restart_due > 0:
         visible = K.restart_due == 1
         first = K.n_logged
+        if K.n_machines > 0:
+            status = take_transitions(K)
+            if status != 0:
+                return status
         status = restart(K)
         if status != 0:
             return status
         K.restart_due = 0
         if K.n_guards > 0:
             settle_sides(K)
+        if K.n_machines > 0:
+            settle_fresh(K)
+            if has_happened(K):  # contacts that opened or closed for want of consistent forces
+                K.restart_due = 1
         if visible or K.n_logged > first:
             store_row(K)
         if is_awaited(K, first):
@@ -300,6 +310,17 @@ def advance(K: Kernel) -> int:
             return status
 
 
+def end_timer(K: Kernel, h: float) -> int:
+    """The event of the timer that is due at the end of a candidate of h, or at the accepted state where h is none."""
+    if h <= 0.0:
+        event_at_start(K)
+    K.event_kind = CROSS
+    K.event_index = K.due_guard
+    K.event_after = h
+    status = handle_event(K)
+    return PAUSE if crowds(K) and status < 0 else status
+
+
 def take_step(K: Kernel) -> int:
     """One step: to where it is to end, tried, and judged; −1 where the run goes on."""
     t = K.time
@@ -321,6 +342,14 @@ def take_step(K: Kernel) -> int:
         near = approached_end(K, t1)
         if near < t1:
             t1 = near
+            within = True
+            cut = False
+    if K.n_machines > 0:
+        find_due(K)
+        if is_due(K, t):
+            return end_timer(K, 0.0)
+        if K.due_guard >= 0 and K.due_time < t1:
+            t1 = K.due_time
             within = True
             cut = False
     h = t1 - t
@@ -410,10 +439,17 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             event = TURNS_AWAY if K.strategy == 0 and slides_on(K) else find_event(K, h, t1)
         if event > 0:
             return event
-    pulls = K.n_judged > 0 and event == 0 and not quiet and has_spurious_reaction(K)
+    ends = K.n_machines > 0 and event == 0 and is_due(K, t1)
+    pulls = K.n_judged > 0 and not ends and event == 0 and not quiet and has_spurious_reaction(K)
     if pulls and K.n_active > 0 and calm(K):
         return -1
     add_error(K, h, event < 0)
+    if ends:
+        if K.strategy == 1 and not quiet:
+            status = end_unlocated(K, h, t1)
+            if status != 0:
+                return status
+        return end_timer(K, h)
     if passes:
         log_passed_events(K, K.event_after if event < 0 else h)
     if event < 0:

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from mbd.kernel.codes import LOG_CLOSED, LOG_OPENED, LOG_SLIPPED, LOG_STUCK, NO_FORCE, NO_IMPACT, SLIP, UNKNOWN
+from mbd.kernel.codes import (
+    LOG_CLOSED,
+    LOG_EVENT,
+    LOG_OPENED,
+    LOG_SLIPPED,
+    LOG_STUCK,
+    NO_FORCE,
+    NO_IMPACT,
+    SLIP,
+    UNKNOWN,
+)
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.cones import aim, follows, hold_directions
 from mbd.kernel.impact_solve import strikes
@@ -28,7 +38,7 @@ def room_to_log(K: Sizes) -> int:
     singular configuration does; an impact each contact at most three times: released by one that strikes, closed, and
     opened again.
     """
-    return int(5 * K.n_contacts + 2 * K.n_frictions + 2 * K.n_guards + 8)
+    return int(5 * K.n_contacts + 2 * K.n_frictions + 2 * K.n_guards + 64 * K.n_machines + 8)
 
 
 def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -> None:
@@ -37,6 +47,11 @@ def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -
     impulses : NO_IMPULSE; OWN_IMPULSE, those of the rows of contact `index`; ALL_IMPULSES, with those of the rows that
         belong to no contact that closes in this impact
     """
+    if K.n_machines > 0:
+        if kind == LOG_CLOSED or kind == LOG_OPENED:
+            K.happened[kind * K.n_contacts + index] = 1
+        elif kind == LOG_EVENT:
+            K.happened[2 * K.n_contacts + index] = 1
     if K.n_logged >= K.event_capacity:  # never beyond the array; the run ends with an error
         K.n_lost += 1
         return

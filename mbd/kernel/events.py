@@ -26,6 +26,7 @@ from mbd.kernel.observe import is_awaited, store_row
 from mbd.kernel.records import Guards, Kernel, Switching
 from mbd.kernel.starting import restart_after_event
 from mbd.kernel.switching import switch
+from mbd.kernel.transitions import has_happened, is_allowed, settle_fresh, take_transitions
 
 __all__ = ["handle_event", "land"]
 
@@ -112,7 +113,8 @@ def handle_event(K: Kernel) -> int:
     at_start = K.event_after <= 0.0 and K.stabilized == 0 and (kind == OPEN_FORCE or kind == OPEN_PULL)
     if at_start:  # the accepted row, which does not pull, is the one before
         store_row(K)
-    accept_for_restart(K, K.time + K.event_after)
+    timed = K.n_machines > 0 and kind == CROSS and K.guard_timed[index] == 1
+    accept_for_restart(K, K.due_time if timed else K.time + K.event_after)
     if same_instant(K):
         return CHATTER
     if K.n_guards > 0:
@@ -124,6 +126,12 @@ def handle_event(K: Kernel) -> int:
     if not at_start:
         store_row(K)
     if kind == CROSS or kind == CROSS_BACK:
+        if K.n_machines > 0 and K.guard_machine[index] >= 0 and not is_allowed(K, index):
+            K.passing[index] = 0
+            K.restart_due = 2
+            if kind == CROSS:
+                K.side[index] = -K.side[index]
+            return -1
         log_event(K, LOG_EVENT, index, 0.0, NO_IMPULSE)
         if kind == CROSS:
             K.side[index] = -K.side[index]
@@ -135,6 +143,8 @@ def handle_event(K: Kernel) -> int:
     carry(K.closed, K.kept_flags, 0, K.n_contacts, True)
     status = switch(K)
     K.plastic_impact = 0
+    if status == 0 and K.n_machines > 0:
+        status = take_transitions(K)
     if status != 0:
         return status
     if K.auto == 1 and kind == CLOSE:
@@ -145,6 +155,10 @@ def handle_event(K: Kernel) -> int:
         return status
     if K.n_guards > 0:
         log_crossings(K)
+    if K.n_machines > 0:
+        settle_fresh(K)
+        if has_happened(K):
+            K.restart_due = 1
     for c in range(K.n_contacts if K.restart_due == 0 else 0):
         if K.kept_flags[c] == 1 and K.closed[c] == 0 and K.armed[c] != 1 and K.guards0[K.at_gap_rate + c] < -1e-6:
             K.sinking[c] = min(K.sinking[c], K.time)
@@ -167,6 +181,8 @@ def land(K: Kernel, h: float, t1: float) -> int:
         keep_at_zero(K, h)
         store_row(K)
         status = rebound(K)
+    if status == 0 and K.n_machines > 0:
+        status = take_transitions(K)
     if status == 0:
         status = restart_after_event(K)
     if (status == NO_IMPACT or status == CONFLICT) and K.halvings < MOST_HALVED:
@@ -185,6 +201,10 @@ def land(K: Kernel, h: float, t1: float) -> int:
         return status
     store_row(K)
     log_crossings(K)
+    if K.n_machines > 0:
+        settle_fresh(K)
+        if has_happened(K):
+            K.restart_due = 1
     K.n_repeats = 0
     K.halvings = 0
     return EVENT if is_awaited(K, first) else -1

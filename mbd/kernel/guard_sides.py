@@ -17,7 +17,7 @@ from __future__ import annotations
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, LOG_EVENT, STICK
 from mbd.kernel.contact_modes import NO_IMPULSE, log_event
 from mbd.kernel.guard_round_off import guard_round_off
-from mbd.kernel.guards import gap_tolerance, is_watched
+from mbd.kernel.guards import gap_tolerance, is_waiting, is_watched
 from mbd.kernel.records import Events, Guards, Switching
 
 __all__ = [
@@ -72,6 +72,8 @@ def is_at_event(K: Guards, e: int) -> bool:
 
 def reaches_zero(K: Switching, e: int) -> bool:
     """Whether a guard that approaches zero in its direction is there at the accepted state, the instant of an event."""
+    if K.n_machines > 0 and not is_waiting(K, e):
+        return False
     side = K.side[e]
     rate = -side * K.guards0[K.at_user_rate + e]
     left = side * K.guards0[K.at_user + e]
@@ -90,10 +92,12 @@ def striking_contact(K: Guards) -> int:
     return -1
 
 
-def find_passed(K: Events) -> None:
+def find_passed(K: Guards) -> None:
     """Mark the guards that are beyond zero at the end of a non-smooth step whose end lies below a contact's surface."""
     for e in range(K.n_guards):
         K.passing[e] = 0
+        if K.n_machines > 0 and not is_waiting(K, e):
+            continue
         side = K.side[e]
         rate = K.guards1[K.at_user_rate + e]
         if K.direction[e] * side <= 0.0 and side * K.guards1[K.at_user + e] < 0.0 and side * rate < 0.0:
@@ -115,6 +119,8 @@ def keep_at_zero(K: Switching, h: float) -> None:
 def log_crossings(K: Switching) -> None:
     """The events of the guards that were marked, after that of the contact; the scheme starts after their resets."""
     for e in range(K.n_guards):
+        if K.passing[e] == 1 and K.n_machines > 0 and not is_waiting(K, e):  # a transition that has come before it
+            K.passing[e] = 0
         if K.passing[e] == 1:
             log_event(K, LOG_EVENT, e, 0.0, NO_IMPULSE)
             K.side[e] = -K.side[e]

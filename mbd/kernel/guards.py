@@ -50,8 +50,8 @@ from mbd.kernel.restart import (
 from mbd.kernel.roots import sqrt
 
 __all__ = [
-    "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_watched", "judge", "update_armed",
-    "update_side", "update_sides", "watch",
+    "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
+    "update_armed", "update_side", "update_sides", "watch",
 ]  # fmt: skip
 
 
@@ -75,6 +75,19 @@ def watch(K: Mechanism, t: float, q: Reals, y: Reals, rate: Reals, lam: Reals, v
     K.block[K.o_a : K.o_a + K.n] = rate[: K.n]
     K.block[K.o_lam : K.o_lam + K.n_rows] = lam[: K.n_rows]
     call(K, GUARDS, values)
+
+
+def is_waiting(K: Guards, e: int) -> bool:
+    """Whether guard e is looked at: one of a transition is while its machine is in the state that it leaves.
+
+    A timer is not, whose instant is known (`mbd.kernel.transitions.find_due`).
+    """
+    m = K.guard_machine[e]
+    if m < 0:
+        return True
+    return bool(
+        K.guard_fires[e] == 1 and K.guard_timed[e] == 0 and int(K.anchors[K.machine_start[m]]) == K.guard_source[e]
+    )
 
 
 def is_watched(K: Contacts, c: int, values: Reals) -> bool:
@@ -261,7 +274,7 @@ def judge_user(K: Switching, e: int, h: float) -> None:
     side = K.side[e]
     v0 = side * K.guards0[K.at_user + e]
     v1 = side * K.guards1[K.at_user + e]
-    if K.active[K.flag_user + e] == 1:
+    if K.active[K.flag_user + e] == 1 or (K.n_machines > 0 and not is_waiting(K, e)):
         return
     if v1 >= 0.0:
         judge_return(K, e, v0, v1, h)

@@ -112,6 +112,9 @@ def _facts(facts: Any, heads: Mapping[str, Head]) -> int:
     expect(all(among(part, ANATOMY) for _, part in anatomy), "'anatomy'")
     for pair in _list(facts.get("mirror", []), list, "'mirror'"):
         expect(len(pair) == 2 and isinstance(pair[0], str) and pair[1] in (1.0, -1.0), "'mirror'")
+    for mode in _list(facts.get("modes", []), list, "'modes'"):
+        expect(len(mode) == 2 and isinstance(mode[0], str), "'modes'")
+        _list(mode[1], str, "'modes'")
     for shape in _list(facts.get("shapes", []), dict, "'shapes'"):
         _shape(shape)
     return len(facts["contacts"])

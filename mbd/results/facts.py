@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mbd.equations.held import WAYS
 from mbd.equations.shapes import HEIGHT, Shape, drawn
 from mbd.joints.anatomy import Angle, angles_of
@@ -50,6 +52,7 @@ class Facts:
     shapes : grounds, wheels, blades, and in space solids and hinges, that pictures show
     anatomy : (joint, 'left hip') of joints of the body, whose angles are named
     mirror : (name, sign) of coordinates and velocities in space in its mirror image, that exchanges left and right
+    modes : (name, (state, …)) of discrete states, whose results are these texts
     """
 
     model: str = ""
@@ -64,6 +67,7 @@ class Facts:
     shapes: tuple[Shape, ...] = ()
     anatomy: tuple[tuple[str, str], ...] = ()
     mirror: tuple[tuple[str, float], ...] = ()
+    modes: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     @property
     def rates(self) -> tuple[str, ...]:
@@ -79,6 +83,11 @@ class Facts:
             for angles, _ in angles_of(part)
             for angle in angles
         }
+
+    def worded(self, name: str, values: Any) -> Any:
+        """The texts of a discrete state in place of its numbers; other results as they are."""
+        states = dict(self.modes).get(name)
+        return values if states is None else np.asarray(states)[np.asarray(values).astype(int)]
 
     @property
     def drawn(self) -> tuple[str, ...]:
@@ -128,6 +137,7 @@ class Facts:
             equations.shapes,
             equations.anatomy,
             tuple(equations.mirror().items()) if equations.mirror is not None else (),
+            tuple((each.name, each.states) for each in equations.machines if len(each.states) > 1),
         )
 
     @classmethod
@@ -146,6 +156,7 @@ class Facts:
             tuple(_shape(shape) for shape in data.get("shapes", ())),
             tuple((joint, part) for joint, part in data.get("anatomy", ())),
             tuple((name, float(sign)) for name, sign in data.get("mirror", ())),
+            tuple((name, tuple(states)) for name, states in data.get("modes", ())),
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -143,6 +143,7 @@ class StoredStates:
         counts = [turn.anchor for turn in self.equations.turns]
         if counts and start is not None and len(start.anchors) == held.shape[1]:
             held[:, counts] = start.anchors[counts]
+        self._follow_machines(held)
         rows = self.record.rows(held)
         for number, contact in enumerate(self.equations.contacts):
             closed = self.record.closed[:, number].astype(bool)
@@ -157,6 +158,27 @@ class StoredStates:
         for turn, (angle, rate) in zip(wrapped, self._turning(self.record.rows(held)), strict=True):
             held[:, turn.anchor] += counted(self.record.time, angle, rate)
         return held
+
+    def _follow_machines(self, held: Matrix) -> None:
+        """Write what machines hold at each row, from the start and from their events."""
+        machines, record = self.equations.machines, self.record
+        if not machines:
+            return
+        count = self.equations.n_held_by_machines
+        start = record.start
+        if start is not None and len(start.anchors) == held.shape[1]:
+            held[:, :count] = start.anchors[:count]
+        guards = {guard.name: guard.transition for guard in self.equations.guards if guard.transition is not None}
+        for event in record.events:
+            taken = guards.get(event.name) if event.kind == "event" else None
+            if taken is None or event.row >= len(held):
+                continue
+            machine, row = machines[taken.machine], np.array([event.row], dtype=np.intp)
+            nodes = [machine.captured[machine.anchors.index(anchor)] for anchor in taken.stored]
+            values = self.evaluate(nodes, record.part(row, held[row]))
+            for anchor, value in zip(taken.stored, values, strict=True):
+                held[event.row :, anchor] = value[0]
+            held[event.row :, machine.anchors[0]] = taken.target
 
     def _turning(self, rows: Rows) -> list[tuple[Vector, Vector]]:
         """Angle and rate of every cut joint whose turns are counted along the motion."""

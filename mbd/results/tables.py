@@ -77,7 +77,8 @@ def columns_of(
     time, read = _axis(run, at, side)
     wanted = _wanted(run, names)
     scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
-    return time, dict(zip(scalars, read(scalars), strict=True))
+    found = zip(scalars, read(scalars), strict=True)
+    return time, {name: run.facts.worded(name, values) for name, values in found}
 
 
 def dataset(
@@ -95,7 +96,7 @@ def dataset(
     for name, several in parts.items():
         about = {"units": unit(several[0], run.facts), "long_name": long_name(name)}
         about = {key: text for key, text in about.items() if text}
-        values = [found[part] for part in several]
+        values = [run.facts.worded(part, found[part]) for part in several]
         one = len(values) == 1
         endings = [part.rpartition(".")[2] for part in several]
         along = {"w": "part", "1": "turn"}.get(endings[0], "axis")

@@ -55,7 +55,8 @@ def trigger(
     guards = {guard.name: e for e, guard in enumerate(equations.guards)}
     frictions = {friction.name: f for f, friction in enumerate(equations.frictions)}
     closed = {event.name for event in events if event.kind == "closed"}
-    found = [Trigger("event", guards[event.name], event.name) for event in events if event.kind == "event"]
+    crossed = [guards[event.name] for event in events if event.kind == "event"]
+    found = [Trigger("event", e, equations.guards[e].name) for e in crossed if _fires(equations, e)]
     for name in sorted(closed):
         c = numbers[name]
         if equations.contacts[c].kind == "penalty" or gap_rates[c] < -STILL:
@@ -79,6 +80,12 @@ def trigger(
     if not found:
         raise refused(f"what ended the step at t = {time:.9g} s is not known")
     return found[0]
+
+
+def _fires(equations: Equations, e: int) -> bool:
+    """Whether an event happens by its own guard: transitions that others cause follow from these."""
+    taken = equations.guards[e].transition
+    return taken is None or ("event", e) in taken.causes
 
 
 def shift_of_end(

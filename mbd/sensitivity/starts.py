@@ -21,6 +21,7 @@ from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.strikes import captured
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names
+from mbd.sensitivity.transitions import stored_at_start
 
 __all__ = [
     "Direction", "directions", "programs_of", "restitution_names", "restitutions_of", "start_tangent", "unknown_name",
@@ -144,9 +145,9 @@ def start_tangent(
 
 
 def _completed(rows: RunRows, programs: Programs, motion: Motion, mode: Mode, free: tuple[Flags, Flags]) -> Motion:
-    """The motion with positions and velocities on the rows, and contacts that hold where they are."""
+    """The motion with positions and velocities on the rows, and contacts and machines that hold what is now."""
     if not mode.held:
-        return motion
+        return stored_at_start(programs, motion, mode)
     c, equations = programs.columns, programs.equations
     normals = {contact.rows[0] for contact in equations.contacts if contact.rows}
     zero = np.zeros(c.n), np.zeros(c.rows)
@@ -164,7 +165,7 @@ def _completed(rows: RunRows, programs: Programs, motion: Motion, mode: Mode, fr
     change = _least(M, rates[:, c.y][:, : c.n_v], rates @ motion.tangent.stacked(c), free[1])
     y = motion.tangent.y.copy()
     y[: c.n_v] += change
-    return motion.with_tangent(y=y)
+    return stored_at_start(programs, motion.with_tangent(y=y), mode)
 
 
 def _least(M: Matrix, B: Matrix, off: Matrix, free: Flags) -> Matrix:

@@ -39,6 +39,7 @@ from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 from mbd.sensitivity.shortened import Shortened
 from mbd.sensitivity.strikes import captured, struck
+from mbd.sensitivity.transitions import with_transitions
 from mbd.sensitivity.watching import Watching
 
 __all__ = ["Instant", "Passed", "Walk"]
@@ -318,7 +319,7 @@ class Walk:
         held = captured(self.programs, before, mode, sorted({*rigid, *gripped}))
         motion = replace(motion, anchors=held.anchors).with_tangent(anchors=held.tangent.anchors)
         soft = [c for c in fresh if equations.contacts[c].kind == "penalty"]
-        return captured(self.programs, motion, mode, soft)
+        return with_transitions(self.programs, captured(self.programs, motion, mode, soft), mode, events)
 
     def _held_in_impact(self, events: Sequence[EventRecord], mode: Mode) -> list[int]:
         """Contacts whose tangents an impact takes where they are: those that close, and those that slide."""

@@ -122,7 +122,7 @@ def end_of(until: Any, manager: ActiveSetManager, dt: float, begin: float) -> tu
     if not isinstance(until, tuple):
         return float(until), None
     name, latest = until
-    known = [*manager.names, *(guard.name for guard in manager.guards)]
+    known = [*manager.names, *manager.instants]
     if name not in known:
         raise UnknownNameError("until: " + nearest(name, known, "contact or event"))
     return float(latest), name

@@ -69,6 +69,10 @@ class FreeScope:
     ) -> Table:
         return self.tape.table(owner, breaks, coefficients, jumps)
 
+    def state_names(self, mode: str) -> Sequence[str]:
+        """There are no modes."""
+        raise UnknownNameError(f"this scope has no mode {mode!r}")
+
     def state(self, owner: str, field: str, initial: float) -> Node:
         node = self.states.setdefault(f"{owner}.{field}", self.tape.input("z", len(self.states)))
         self.numbers.setdefault(node, initial)

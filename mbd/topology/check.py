@@ -45,6 +45,7 @@ def faults(model: Description) -> list[str]:
     found += reach_faults(model)
     found += mention_faults(model)
     found += rule_faults(model)
+    found += machine_faults(model)
     found += choice_faults(model)
     found += massless_faults(model, model.parameters)
     found += tilted_faults(model)
@@ -246,6 +247,8 @@ def mention_faults(model: Description) -> list[str]:
     joints = {joint.name for joint in model.joints}
     found = [fault for each in model.observations for fault in each.faults(model.bodies, joints)]
     known = set(quantities(model))
+    known |= {name for word in model.constraints for name in getattr(word, "quantity_names", ())}
+    known |= set(model.parameters)
     known |= {name.removesuffix(".x") for name in known if name.endswith(".x") and f"{name[:-1]}z" in known}
     owners = {force.name for force in model.forces}
     words: list[Force | Constraint] = [*model.forces, *model.constraints]
@@ -289,12 +292,13 @@ class Ruled(Protocol):
 def rule_faults(model: Ruled) -> list[str]:
     """Names in When, only_while and the controllers' on= and writes= that do not exist."""
     contacts = [word.name for word in model.contacts]
-    instants = contacts + [event.name for event in model.events]
+    states = [name for word in getattr(model, "machines", ()) for name in word.state_titles]
+    instants = [*contacts, *(event.name for event in model.events), *states]
     parameters = model.parameters
     found = []
     rolling = [word for word in getattr(model, "nonholonomic", ()) if not isinstance(word, str)]
     for word in (*model.contacts, *model.events, *rolling):
-        unknown = [other for other in word.others if other not in contacts]
+        unknown = [other for other in word.others if other not in (*contacts, *states)]
         found += [f"'{word.name}': " + nearest(other, contacts, "contact") for other in unknown]
     for controller in model.controllers:
         for name in controller.on:
@@ -303,6 +307,25 @@ def rule_faults(model: Ruled) -> list[str]:
         for name in controller.writes:
             if name not in parameters:
                 found.append(f"'{controller.name}' writes: " + nearest(name, parameters, "parameter", "There are"))
+    return found
+
+
+def machine_faults(model: Description) -> list[str]:
+    """Parameters that modes and sampled laws set, and that do not exist or belong to bodies."""
+    found = []
+    geometry = {name for body in model.bodies.values() for name in body.parameters()}
+    geometry |= {name for frame in model.points() for name in frame.parameters()}
+    geometry |= {f"gravity.{axis}" for axis in "xyz"}
+    parameters = model.parameters if model.machines else {}
+    for word in model.machines:
+        for name in (*word.parameters_by_state(), *word.held_parameters()):
+            if name not in parameters:
+                found.append(f"'{word.name}' sets {name!r}: " + nearest(name, parameters, "parameter", "There are"))
+            elif name in geometry:
+                found.append(
+                    f"'{word.name}' sets {name!r}, which bodies are made of; only parameters of forces, losses, "
+                    "contacts and measures change at instants"
+                )
     return found
 
 

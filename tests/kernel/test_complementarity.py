@@ -34,8 +34,9 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         row_friction[friction_row] = np.arange(contacts)
     size = n + rows
     K = Scene(
-        vector=1, n=n, n_v=n, n_q=n, n_rows=rows, n_contacts=contacts, n_frictions=frictions, n_cones=0, n_anchors=0,
-        loaded=0, rubs=0, o_lam=0, o_slip=rows, params=np.zeros(1), block=np.zeros(rows + max(frictions, 1)),
+        vector=1, n=n, n_v=n, n_q=n, n_rows=rows, n_contacts=contacts, n_frictions=frictions, n_cones=0,
+        n_machines=0, n_anchors=0, loaded=0, rubs=0, o_lam=0, o_slip=rows, params=np.zeros(1),
+        block=np.zeros(rows + max(frictions, 1)),
         acc=np.zeros(n * n + n + 2 * n * rows + 3 * rows + 1 + max(frictions, 1)),
         kkt=np.zeros(size * size), rhs=np.zeros(size), columns=np.zeros(size, dtype=int), work=np.zeros(3 * size),
         basis=np.zeros((rows + 1) * n), lower=np.zeros((rows + 1) * rows), dependence=np.zeros(rows * rows),
@@ -48,7 +49,7 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         parting=np.zeros(contacts, dtype=int), free=np.ones(contacts, dtype=int), normal=normal,
         friction_row=friction_row, friction_contact=np.arange(max(contacts, 1)), row_contact=row_contact,
         row_normal=is_normal, row_friction=row_friction, rows=np.zeros(rows, dtype=int),
-        dropped=np.zeros(rows, dtype=int), state=np.zeros(24, dtype=int), counts=np.zeros(24, dtype=int),
+        dropped=np.zeros(rows, dtype=int), state=np.zeros(26, dtype=int), counts=np.zeros(24, dtype=int),
         partner=np.full(max(frictions, 1), -1),
         detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip

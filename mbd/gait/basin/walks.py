@@ -12,6 +12,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.gait.basin.balls import Ball
 from mbd.gait.basin.kinds import NUMBER
 from mbd.gait.basin.verdicts import Verdicts
+from mbd.gait.machines import counted_from
 from mbd.gait.return_map import ReturnMap
 from mbd.kernel import codes
 from mbd.simulation.batch.changes import Changes
@@ -88,7 +89,8 @@ class Walks:
         q, v = row[:, 1 : self._at_y], row[:, self._at_y : self._at_y + run.n_v]
         z = row[:, self._at_y + run.n_v : self._at_y + run.n]
         at = self._at_y + 2 * run.n + run.n_rows
-        closed, anchors = row[:, at : at + run.n_contacts], ends.anchors
+        closed = row[:, at : at + run.n_contacts]
+        anchors = counted_from(self.map.mechanism.equations, ends.anchors, row[:, 0])
         if mirror is not None:
             q, v, z, anchors = mirror.of_q(q), mirror.of_v(v), z[:, mirror.z], mirror.of_anchors(anchors)
         armed = ends.armed[:, self._contacts]

@@ -69,6 +69,24 @@ class Events(SchemeAbilities):
     passing: Integers = integers(lambda s: s.n_guards, kept=True)  # 1: crosses at this instant, its side is not known
     met: Reals = reals(lambda s: 2 * s.n_guards, kept=True)  # values and rates of these before the event did anything
     direction: Integers = integers()
+    machine_start: Integers = integers()  # anchor that holds the number of the state of each machine
+    guard_machine: Integers = integers()  # of the transition that a guard is, −1 for an event alone
+    guard_source: Integers = integers()  # the state that it leaves
+    guard_target: Integers = integers()  # and enters
+    guard_fires: Integers = integers()  # 1: it happens as its guard crosses zero, 0: as something else happens
+    guard_timed: Integers = integers()  # 1: it is the time less an instant that is known, at which a step ends
+    guard_contact: Integers = integers()  # that must be closed for it, −1 for none
+    cause_start: Integers = integers()  # what makes a transition happen
+    cause_mark: Integers = integers()
+    store_start: Integers = integers()  # anchors that are stored with it
+    store_anchor: Integers = integers()
+    happened: Integers = integers(lambda s: s.n_marks, kept=True)  # contacts closed, opened, guards crossed, taken
+    fresh: Integers = integers(lambda s: s.n_guards, kept=True)  # 1: its side follows from where it is after a restart
+    taken: Integers = integers(lambda s: s.n_machines)  # the transition that each machine takes
+    n_rounds: int = place("state")  # of transitions at this instant
+    chain_time: float = place("clock")  # which it is
+    due_time: float = place("clock")  # the next instant of a timer
+    due_guard: int = place("state")  # whose it is, −1 for none
     notify: Integers = integers(lambda s: s.n_contacts + s.n_guards + s.n_frictions)
     crossed: Reals = reals(lambda s: s.n_guards)  # from the start of the step to an event without a restart, or < 0
     doubt: Reals = reals(lambda s: 2 * s.n_watched + 2 * s.n)  # guards, then round-off of positions and velocities

@@ -18,6 +18,7 @@ class Sizes(Record):
     n_contacts: int
     n_guards: int  # of the user
     n_frictions: int
+    n_machines: int  # discrete states with transitions
     n_cones: int  # pairs of frictions that slide together, those of contacts in space
     o_q: int  # offsets into the block
     o_x: int
@@ -67,6 +68,8 @@ class Sizes(Record):
     at_slip: int = formula(lambda s: s.at_user + 2 * s.n_guards)  # sliding velocities of frictions
     at_slip_rate: int = formula(lambda s: s.at_slip + s.n_frictions)
     at_limit: int = formula(lambda s: s.at_slip + 2 * s.n_frictions)  # largest frictions
+    at_allowed: int = formula(lambda s: s.at_limit + s.n_frictions)  # conditions of transitions, of machines
+    n_marks: int = formula(lambda s: 2 * s.n_contacts + 2 * s.n_guards)  # of what may happen at an instant
     flag_user: int = formula(lambda s: s.n_contacts)  # where guards of the user begin among flags, behind contacts
     flag_friction: int = formula(lambda s: s.n_contacts + s.n_guards)  # frictions
 

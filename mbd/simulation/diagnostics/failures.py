@@ -157,6 +157,11 @@ def _what(
             f"{_clashing(stepper, status)}{closed}; leave one out, hold fewer contacts closed, or, where they do so in "
             "this singular configuration only, start beside it"
         )
+    if status == codes.ENDLESS_TRANSITIONS:
+        return (
+            f"transitions follow each other without end at one instant: {_last_events(events)}; one of the modes needs "
+            "another cause, or an only_while= that ends them"
+        )
     if status in (codes.CHATTER, codes.NO_IMPACT, codes.ENERGY_GAIN, codes.NO_FORCE):
         return _no_contact(stepper, status, closed, events)
     return f"the instant of an event could not be isolated{closed}{_worst(stepper)}; try a smaller dt"

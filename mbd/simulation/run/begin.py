@@ -10,6 +10,7 @@ from mbd.arrays import Vector
 from mbd.assembly.assemble import BELOW
 from mbd.assembly.consistency import residuals
 from mbd.assembly.inertia import undetermined
+from mbd.assembly.machines import first_anchors, store_first
 from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture
 from mbd.errors import ModelError
@@ -27,8 +28,10 @@ def notify(run: RunData) -> None:
     ends = {run.stop} | {name for controller in run.boundaries.controllers for name in controller.on}
     for c, contact in enumerate(run.manager.contacts):
         notify[c] = int(contact.name in ends)
+    instants = run.manager.instants
+    ended = {e for name in ends if name is not None for e in instants.get(name, ())}
     for e, guard in enumerate(run.manager.guards):
-        wanted = guard.terminal or guard.reset is not None or guard.name in ends
+        wanted = guard.terminal or guard.reset is not None or e in ended
         notify[run.kernel.n_contacts + e] = int(wanted)
 
 
@@ -39,6 +42,9 @@ def begin(run: RunData, start: State) -> None:
     v.y[: v.n] = np.concatenate([start.v, start.z])
     if len(start.anchors) == v.n_anchors:  # else all contacts are open, and store theirs as they close
         v.anchors[: v.n_anchors] = start.anchors
+    elif run.mechanism.equations.machines:
+        v.anchors[: v.n_anchors] = first_anchors(run.mechanism)
+        store_first(run.mechanism, start.time, start.q, v.y[: v.n], v.params, v.anchors[: v.n_anchors])
     n_contacts, n_guards = v.n_contacts, v.n_guards
     v.closed[:n_contacts] = run.manager.flags(start.mode.closed)
     armed: Iterable[str] = set(run.manager.names) - start.mode.closed if start.armed is None else start.armed

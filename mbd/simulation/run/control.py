@@ -210,7 +210,7 @@ def arrive(run: RunData, target: float) -> bool:
 def call_controllers(run: RunData, name: str) -> None:
     """Call the controllers that listen to an event."""
     for controller in run.boundaries.controllers:
-        if name in controller.on:
+        if any(run.manager.happens(each, name) for each in controller.on):
             _call(run, controller)
 
 

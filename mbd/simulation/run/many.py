@@ -29,7 +29,7 @@ def may_be_many(run: Run, late_resets: bool = False) -> str:
     late_resets : whether who asks resets the state himself after an event that ends a run (`reset_ends`)
     """
     for guard in run.manager.guards:
-        last = guard.terminal or guard.name == run.stop
+        last = guard.terminal or (run.stop is not None and run.manager.happens(run.stop, guard.name))
         if guard.reset is not None and not (last and late_resets and may_reset_late(run, guard)):
             return f"the event {guard.name!r} resets the state, which Python does"
     if run.boundaries.controllers:

@@ -245,6 +245,6 @@ class Run(RunData):
             if guard is not None and guard.reset is not None:
                 apply_reset(self, guard)
             call_controllers(self, event.name)
-            if event.name == self.stop or (guard is not None and guard.terminal):
-                ended = event.name
+            if (self.stop and self.manager.happens(self.stop, event.name)) or (guard is not None and guard.terminal):
+                ended = event.name if self.stop is None or guard is None or guard.terminal else self.stop
         return ended

@@ -113,7 +113,8 @@ class Stepper:
             n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
             n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
-            n_frictions=layout.n_frictions, n_cones=sum(f.partner >= 0 for f in self.manager.frictions) // 2,
+            n_frictions=layout.n_frictions, n_machines=len(self.manager.machines),
+            n_cones=sum(f.partner >= 0 for f in self.manager.frictions) // 2,
             n_watched=self.mechanism.sizes["guards"],
             n_judged=layout.n_frictions
             + sum(contact.kind != "penalty" and contact.opens_on == "pull" for contact in self.manager.contacts),

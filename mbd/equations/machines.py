@@ -1,0 +1,173 @@
+"""Machines as expressions: first their anchors and named quantities, which laws ask for, and last their changes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from mbd.constraints.base import Constraint
+from mbd.constraints.event import Event
+from mbd.constraints.machine import Change, Machine, state_of
+from mbd.equations import equations as records
+from mbd.equations.derivation_scope import DerivationScope
+from mbd.equations.equations import Guard, Transition
+from mbd.equations.outputs import Outputs
+from mbd.errors import ModelError, nearest
+from mbd.tape.derivatives import live
+from mbd.tape.node import Node
+
+__all__ = ["declare_machines", "machine_guards"]
+
+OPENED = " opened"
+"""Behind the name of a contact, what its opening is called among causes."""
+
+
+def held_by(scope: DerivationScope, words: Sequence[Machine]) -> dict[str, list[Node]]:
+    """The numbers that each machine holds, on the tape."""
+    found, first = {}, 0
+    for word in words:
+        found[word.name] = [scope.tape.input("anchor", first + k) for k in range(len(word.fields))]
+        first += len(word.fields)
+    return found
+
+
+def declare_machines(scope: DerivationScope, words: Sequence[Machine], quantities: Outputs) -> None:
+    """Their anchors, and what they offer by name and set in the place of parameters.
+
+    Raises
+    ------
+    ModelError
+        for parameters that are known already, which geometry is made of, and those that two machines set.
+    """
+    faults = list[str]()
+    for word, held in zip(words, held_by(scope, words).values(), strict=True):
+        scope.first_anchor += len(held)
+        scope.modes[word.name] = word.state_names
+        for name, value in word.quantities(scope, held).items():
+            quantities.value(name, value)
+        for name in (*word.held_parameters(), *word.parameters_by_state()):
+            if name in scope.parameters:
+                faults.append(
+                    f"'{word.name}' sets {name!r}, which the geometry is made of; only parameters of forces, losses, "
+                    "contacts and measures change at instants"
+                )
+            if name in scope.held_parameters or name in scope.parameters_by_state:
+                faults.append(f"'{word.name}' sets {name!r}, which another mode or sampled law sets as well")
+        scope.held_parameters |= {name: held[place] for name, place in word.held_parameters().items()}
+        for name, values in word.parameters_by_state().items():
+            named = [(f"{name}.{state}", values[state]) if state in values else (name, None)
+                     for state in word.state_names]  # fmt: skip
+            scope.parameters_by_state[name] = held[0], tuple(named)
+    if faults:
+        raise ModelError(faults)
+
+
+def machine_guards(
+    scope: DerivationScope, words: Sequence[Machine], contacts: Sequence[Constraint], events: Sequence[Event]
+) -> tuple[list[records.Machine], list[Guard]]:
+    """The machines, and their changes as guards behind those of users' events.
+
+    Raises
+    ------
+    ModelError
+        with names of causes and conditions that do not exist, and what is stored that is not known at an instant.
+    """
+    held = held_by(scope, words)
+    changes = [(m, change) for m, word in enumerate(words) for change in word.changes(scope, held[word.name])]
+    causes = _Causes(words, contacts, events, changes)
+    machines, guards, faults = list[records.Machine](), list[Guard](), list[str]()
+    stored: list[dict[int, Node]] = [
+        {k: scope.real(value) for k, value in word.first_values(scope, held[word.name]).items()} for word in words
+    ]
+    for number, (m, change) in enumerate(changes):
+        title = f"'{change.name}'"
+        for k, value in change.stored.items():
+            node = scope.real(value)
+            if stored[m].setdefault(k, node) is not node:
+                faults.append(f"{title} stores {words[m].fields[k]!r} in another way than others do")
+        value = scope.tape.one if change.guard is None else scope.real(change.guard)
+        rate = scope.tape.zero if change.guard is None else scope.change(change.guard)
+        faults += causes.faults(title, change, value)
+        if faults:
+            continue
+        condition = None if change.condition is None else scope.real(change.condition)
+        places = [held[words[m].name][k].data[1] for k in change.stored]
+        contact, while_state = causes.condition(change.contact)
+        if while_state is not None:
+            other, state = while_state
+            index = held[other][0]
+            condition = scope.tape.lift(0.5 - abs(index - float(state)))
+        guards.append(Guard(
+            change.name, value, rate, change.direction,
+            transition=Transition(
+                m, change.source, change.target, causes.of(change, len(events) + number), contact, condition,
+                tuple(places),
+            ),
+        ))  # fmt: skip
+    for m, word in enumerate(words):
+        own = held[word.name]
+        for k, node in stored[m].items():
+            if any(each.op == "input" and each.data[0] in ("a", "s", "lam") for each in live([node])):
+                faults.append(
+                    f"'{word.name}' stores {word.fields[k]!r}, which depends on accelerations or forces of contacts; "
+                    "they jump at the instant: store what positions and velocities tell"
+                )
+        machines.append(records.Machine(
+            word.name, word.state_names, tuple(node.data[1] for node in own), word.fields,
+            tuple(own[k].data[1] for k in word.times), word.initial(),
+            tuple(stored[m].get(k, node) for k, node in enumerate(own)),
+        ))  # fmt: skip
+    if faults:
+        raise ModelError(list(dict.fromkeys(faults)))
+    return machines, guards
+
+
+class _Causes:
+    """What may cause changes, by name."""
+
+    def __init__(
+        self,
+        words: Sequence[Machine],
+        contacts: Sequence[Constraint],
+        events: Sequence[Event],
+        changes: Sequence[tuple[int, Change]],
+    ) -> None:
+        self.states: Mapping[str, Sequence[str]] = {word.name: word.state_names for word in words}
+        self.contacts = {word.name: c for c, word in enumerate(contacts)}
+        known: dict[str, tuple[tuple[str, int], ...]] = {}
+        for name, c in self.contacts.items():
+            known[name] = (("closed", c),)
+            known[f"{name}{OPENED}"] = (("opened", c),)
+        known |= {event.name: (("event", e),) for e, event in enumerate(events)}
+        for m, word in enumerate(words):
+            own = [(len(events) + k, change) for k, (owner, change) in enumerate(changes) if owner == m]
+            known[word.name] = tuple(("taken", e) for e, _ in own)
+            for number, state in enumerate(word.state_names):
+                entering = tuple(("taken", e) for e, change in own if change.target == number)
+                known[f"{word.name}: {state}"] = entering
+            known |= {change.name: (("taken", e),) for e, change in own}
+        self.known = known
+
+    def faults(self, title: str, change: Change, guard: Node) -> list[str]:
+        """What is wrong with the names of a change, and a guard that never changes."""
+        found = []
+        if change.on and change.on not in self.known:
+            found.append(f"{title}, on: " + nearest(change.on, self.known, "contact, event or mode"))
+        if change.contact and change.contact not in self.contacts and self._state(change.contact) is None:
+            states = [f"{name}: {state}" for name, own in self.states.items() for state in own]
+            known = [*self.contacts, *states]
+            found.append(f"{title}, only_while: " + nearest(change.contact, known, "contact or state"))
+        if change.guard is not None and not any(node.op == "input" and node.data[0] != "p" for node in live([guard])):
+            found.append(f"{title}: what it waits for never changes; let it depend on a coordinate, a rate or the time")
+        return found
+
+    def of(self, change: Change, guard: int) -> tuple[tuple[str, int], ...]:
+        """The causes of a change whose guard has this number."""
+        return self.known[change.on] if change.on else (("event", guard),)
+
+    def condition(self, name: str) -> tuple[int, tuple[str, int] | None]:
+        """The contact that must be closed, −1 for none, or the state of a machine."""
+        state = self._state(name)
+        return (-1, state) if state is not None or not name else (self.contacts[name], None)
+
+    def _state(self, name: str) -> tuple[str, int] | None:
+        return state_of(name, self.states)

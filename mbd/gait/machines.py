@@ -1,0 +1,135 @@
+"""What machines hold, in return maps: which of it the motion remembers, its mirror image, and its instants.
+
+A return begins at time 0, so that instants are counted from there. The numbers of states are compared, not solved for;
+what was stored as the section was reached follows from the state there; the rest, as far as the motion depends on it,
+is among the coordinates of the section.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.equations import programs
+from mbd.equations.equations import Equations, Machine
+from mbd.joints.reflected import exchanged
+from mbd.tape.derivatives import live
+from mbd.tape.node import Node
+
+__all__ = [
+    "counted_from",
+    "image_faults",
+    "in_state",
+    "images",
+    "remembered",
+    "state_anchors",
+    "stored_by",
+    "times_since",
+]
+
+Numbers = NDArray[np.intp]
+
+
+def state_anchors(equations: Equations) -> list[int]:
+    """Anchors that hold the numbers of states."""
+    return [machine.anchors[0] for machine in equations.machines]
+
+
+def counted_from(equations: Equations, anchors: Matrix, time: Vector | float) -> Matrix:
+    """Anchors (…, n_anchors) with their instants counted from a time (…)."""
+    instants = [anchor for machine in equations.machines for anchor in machine.times]
+    if not instants:
+        return anchors
+    found = np.array(anchors, dtype=float)
+    found[..., instants] -= np.asarray(time)[..., np.newaxis]
+    return found
+
+
+def in_state(mechanism: Mechanism, number: int) -> Vector:
+    """Anchors of zeros (n_anchors,), with each machine in the state of this number, modulo how many it has."""
+    found = np.zeros(mechanism.layout.n_anchors)
+    for machine in mechanism.equations.machines:
+        found[machine.anchors[0]] = number % len(machine.states)
+    return found
+
+
+def times_since(equations: Equations) -> set[int]:
+    """Numbers of the nodes t − T of instants T that machines hold."""
+    tape = equations.tape
+    instants = [anchor for machine in equations.machines for anchor in machine.times]
+    return {tape.sub(tape.input("t"), tape.input("anchor", anchor)).index for anchor in instants}
+
+
+def remembered(equations: Equations) -> tuple[int, ...]:
+    """Anchors of machines, but for numbers of states, on which motion, events or what is stored depends."""
+    known = equations.memory.get("remembered by machines")
+    if known is None:
+        own = {anchor for machine in equations.machines for anchor in machine.anchors[1:]}
+        stored = {a: node for each in equations.machines for a, node in zip(each.anchors, each.captured, strict=True)}
+        with equations.tape.lock:
+            outputs = programs.accelerations(equations)
+            first = len(outputs) - 1 - len(equations.frictions) - equations.n_anchors
+            outputs = outputs[:first] + outputs[first + equations.n_held_by_machines :]
+            found = _anchors_in([*outputs, *programs.guards(equations)]) & own
+            while True:  # what is stored counts where what it is stored into does
+                more = _anchors_in([stored[anchor] for anchor in found if not _is_itself(stored[anchor], anchor)]) & own
+                if more <= found:
+                    break
+                found |= more
+        known = equations.memory["remembered by machines"] = tuple(sorted(found))
+    return tuple(known)
+
+
+def _anchors_in(nodes: Sequence[Node]) -> set[int]:
+    return {node.data[1] for node in live(nodes) if node.op == "input" and node.data[0] == "anchor"}
+
+
+def _is_itself(node: Node, anchor: int) -> bool:
+    return bool(node.op == "input" and node.data == ("anchor", anchor))
+
+
+def stored_by(equations: Equations, names: Sequence[str]) -> frozenset[int]:
+    """Anchors that transitions store whose events have these names."""
+    taken = {guard.name: guard.transition for guard in equations.guards if guard.transition is not None}
+    return frozenset(anchor for name in names if name in taken for anchor in taken[name].stored)
+
+
+def images(equations: Equations, sides: tuple[str, str]) -> tuple[Numbers, dict[int, Vector]]:
+    """From which anchor each takes its mirror image, and by the anchors of states, the numbers that these become."""
+    places = np.arange(equations.n_anchors, dtype=np.intp)
+    states = dict[int, Vector]()
+    partners = {machine.name: machine for machine in equations.machines}
+    for machine in equations.machines:
+        other = partners[exchanged(machine.name, sides)]
+        fields = dict(zip(other.fields, other.anchors, strict=True))
+        for name, anchor in zip(machine.fields, machine.anchors, strict=True):
+            places[anchor] = fields[exchanged(name, sides)]
+        names = [exchanged(state, sides) for state in other.states]
+        states[machine.anchors[0]] = np.array([machine.states.index(name) for name in names], dtype=float)
+    return places, states
+
+
+def image_faults(equations: Equations, sides: tuple[str, str]) -> list[str]:
+    """What has no partner among machines, their states, and what they remember."""
+    partners, faults = {machine.name: machine for machine in equations.machines}, list[str]()
+    for machine in equations.machines:
+        name = exchanged(machine.name, sides)
+        if name not in partners:
+            faults.append(f"mirror={sides}: mode {machine.name!r} has no partner {name!r}")
+            continue
+        faults += _pair_faults(machine, partners[name], sides)
+    return faults
+
+
+def _pair_faults(one: Machine, other: Machine, sides: tuple[str, str]) -> list[str]:
+    return [
+        f"mirror={sides}: {kind} {name!r} of mode {one.name!r} has no partner {exchanged(name, sides)!r}"
+        + (f" in {other.name!r}" if other is not one else "")
+        for kind, own, others in (("state", one.states, other.states), ("value", one.fields, other.fields))
+        for name in own
+        if exchanged(name, sides) not in others
+    ]

@@ -1,0 +1,287 @@
+"""Discrete states: located transitions, timers, memories, laws by state, chains of one instant, and bad input."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import mbd
+from mbd.errors import ModelError, SimulationError
+
+G = 9.81
+
+
+def knee(**changes: Any) -> mbd.Model:
+    """A shank that is let go, then pulled back to where it turned, then damped."""
+    model = mbd.Model("knee")
+    shank = mbd.Link("shank", mass=2.0, length=0.4, center=0.2, inertia=0.03)
+    hinge = mbd.Revolute("knee", model.ground.origin, shank.start, loss=mbd.Viscous(0.05))
+    model.connect(hinge)
+    model.apply(
+        mbd.Mode(
+            "phase", ("swing", "pull", "brake"),
+            transitions=[
+                mbd.Transition("swing", "pull", when="knee.rate", direction=1),
+                mbd.Transition("pull", "brake", after=0.13),
+                mbd.Transition("brake", "swing", when=mbd.measure(lambda q: q - 0.1, "knee.angle")),
+            ],
+            remembers={"turn": {"pull": "knee.angle"}}, sets={"knee loss.coefficient": {"pull": 0.04}},
+        ),
+        mbd.Motor(
+            "drive", hinge, by="phase", arguments=["knee.angle", "knee.rate", "phase.time", "phase.turn"],
+            torque={"pull": lambda q, v, tau, turn: -3.0 * (q - turn) + tau, "brake": lambda q, v, tau, turn: -0.1 * v},
+        ),
+    )  # fmt: skip
+    return model
+
+
+def oracle(end: float, angle: float) -> tuple[list[tuple[float, str]], Any]:
+    """The same by scipy at 1e-13, phase by phase: the transitions, and (q, v) at the end."""
+
+    def rate(t: float, y: Any, phase: str, since: float, turn: float) -> list[float]:
+        q, v = y
+        torque = {"swing": 0.0, "pull": -3.0 * (q - turn) + (t - since), "brake": -0.1 * v}[phase]
+        return [v, (torque - (0.04 if phase == "pull" else 0.05) * v - 2.0 * G * 0.2 * np.sin(q)) / 0.11]
+
+    def at_turn(t: float, y: Any, *_: Any) -> Any:
+        return y[1]
+
+    def at_angle(t: float, y: Any, *_: Any) -> Any:
+        return y[0] - 0.1
+
+    at_turn.direction, at_turn.terminal, at_angle.terminal = 1.0, True, True  # type: ignore[attr-defined]
+    t, y, phase, since, turn, found = 0.0, np.array([angle, 0.0]), "swing", 0.0, angle, list[tuple[float, str]]()
+    while t < end:
+        last, event = (min(since + 0.13, end), None) if phase == "pull" else (end, at_turn)
+        event = at_angle if phase == "brake" else event
+        options: dict[str, Any] = {"rtol": 1e-13, "atol": 1e-14, "method": "DOP853", "args": (phase, since, turn)}
+        if event is not None:  # beyond what it begins with
+            run = solve_ivp(rate, (t, t + 1e-5), y, **options)
+            t, y = t + 1e-5, run.y[:, -1]
+        run = solve_ivp(rate, (t, last), y, events=event, **options)
+        t, y = float(run.t[-1]), run.y[:, -1]
+        if t < end:
+            phase = {"swing": "pull", "pull": "brake", "brake": "swing"}[phase]
+            since, turn = t, float(y[0]) if phase == "pull" else turn
+            found.append((t, phase))
+    return found, y
+
+
+@pytest.mark.parametrize("backend", ["auto", "python"])
+def test_an_impedance_machine_switches_as_an_integration_beside_it(backend: str) -> None:
+    model = knee()
+    start = mbd.assemble(model, {"knee.angle": 0.8})
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=4.0, backend=backend)
+    wanted, (q, v) = oracle(4.0, 0.8)
+    assert len(wanted) >= 4
+    assert [event.name.rpartition(" to ")[2] for event in run.events] == [phase for _, phase in wanted]
+    np.testing.assert_allclose([event.time for event in run.events], [time for time, _ in wanted], atol=1e-10)
+    np.testing.assert_allclose([run.final.q[0], run.final.v[0]], [q, v], atol=1e-9)
+    assert np.max(np.abs(run.energy.numerical)) < 1e-9
+
+
+@pytest.mark.parametrize("integrator", [mbd.RungeKutta853(), mbd.HHT(), mbd.RadauIIA()], ids=repr)
+def test_timers_end_at_their_instant_and_laws_know_the_time_in_the_state(integrator: Any) -> None:
+    model = knee()
+    run = mbd.simulate(model, mbd.assemble(model, {"knee.angle": 0.8}), integrator, dt=0.005, until=0.72)
+    turned, braked = (event.time for event in run.events[:2])
+    assert abs(braked - turned - 0.13) < 4e-16
+    time, phase = run.time, run["phase"]
+    inside = (time > turned) & (time < braked)
+    assert set(phase[inside]) == {"pull"} and phase[0] == "swing" and phase[-1] == "brake"
+    np.testing.assert_allclose(run["phase.time"][inside], time[inside] - turned, atol=1e-15)
+    np.testing.assert_allclose(run["phase.turn"][inside], run.at(turned)["knee.angle"], atol=1e-12)
+    assert run.at(0.5 * (turned + braked))["phase"] == "pull"
+    np.testing.assert_array_equal(run["phase.index"], [("swing", "pull", "brake").index(each) for each in phase])
+
+
+def test_schemes_keep_their_order_across_transitions() -> None:
+    model = knee()
+    start = mbd.assemble(model, {"knee.angle": 0.8})
+    _, (q, _) = oracle(1.0, 0.8)
+    errors = []
+    for dt in (4e-3, 2e-3, 1e-3):
+        errors.append(abs(mbd.simulate(model, start, mbd.HHT(alpha=0.0), dt=dt, until=1.0).final.q[0] - q))
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert np.all(np.abs(orders - 2.0) < 0.15), orders
+
+
+def test_a_run_that_goes_on_or_was_saved_is_the_same_to_the_bit(tmp_path: Any) -> None:
+    model = knee()
+    start = mbd.assemble(model, {"knee.angle": 0.8})
+    whole = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=3.0)
+    first = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=whole.events[0].time + 0.07)
+    second = mbd.simulate(model, first.final, mbd.RungeKutta853(), dt=0.01, until=3.0)
+    for name in ("q", "v", "anchors"):
+        np.testing.assert_array_equal(getattr(second.final, name), getattr(whole.final, name))
+    assert second["phase"][0] == "pull"
+    whole.save(tmp_path / "run.npz")
+    loaded = mbd.load(tmp_path / "run.npz")
+    for name in ("phase", "phase.time", "phase.turn", "drive.torque"):
+        np.testing.assert_array_equal(loaded[name], whole[name])
+        assert loaded.at(1.234)[name] == whole.at(1.234)[name]
+    assert set(whole.to_dataframe(["phase"])["phase"]) == {"swing", "pull", "brake"}
+
+
+def test_derivatives_go_through_transitions_timers_and_memories() -> None:
+    model = knee()
+    names = ("knee.angle", "phase.pull to brake.after", "knee loss.coefficient.pull", "shank.mass")
+    of = ("knee.angle", "knee.rate", "phase.turn", "phase.time", "phase: pull to brake.time")
+
+    def ends(name: str, change: float) -> Any:
+        start = mbd.assemble(model, {"knee.angle": 0.8 + (change if name == "knee.angle" else 0.0)})
+        values = {} if name == "knee.angle" else {name: model.parameters[name] + change}
+        run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=2.5, parameters=values)
+        braked = next(event.time for event in run.events if event.name == "phase: pull to brake")
+        return np.array([*(run[each][-1] for each in of[:-1]), braked])
+
+    start = mbd.assemble(model, {"knee.angle": 0.8})
+    found = mbd.sensitivities(model, start, mbd.RungeKutta853(), dt=0.01, until=2.5, wrt=list(names), of=list(of))
+    for name in names:
+        near, far = (ends(name, h) - ends(name, -h) for h in (1e-4, 2e-4))
+        wanted = (8.0 * near - far) / 12e-4
+        np.testing.assert_allclose([found[each, name] for each in of], wanted, rtol=1e-8, atol=1e-9)
+
+
+def hopper(*transitions: mbd.Transition, **more: Any) -> tuple[mbd.Model, mbd.State]:
+    """A mass that falls on the floor, waits, and is thrust up for a time."""
+    model = mbd.Model("hopper")
+    body = mbd.PointMass("body", mass=80.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, axis="y")
+    model.connect(rail)
+    model.constrain(
+        mbd.Unilateral("floor", mbd.height(body.origin)),
+        mbd.Mode(
+            "leg", ("flight", "wait", "thrust"),
+            transitions=transitions or [
+                mbd.Transition("flight", "wait", on="floor"),
+                mbd.Transition("wait", "thrust", after=0.05),
+                mbd.Transition("thrust", "flight", after="leg.push time"),
+            ],
+            numbers={"push time": 0.1}, remembers={"speed": {"thrust": "rail.rate"}}, **more,
+        ),
+    )  # fmt: skip
+    model.apply(mbd.Motor("drive", rail, force={"thrust": 80.0 * (G + 20.0)}, by="leg"))
+    return model, mbd.assemble(model, {"rail.displacement": 0.5})
+
+
+def test_a_contact_closes_waits_for_a_timer_and_is_thrust_off_for_a_time() -> None:
+    model, start = hopper()
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.9)
+    landed = np.sqrt(2.0 * 0.5 / G)
+    wanted = [(landed, "floor"), (landed, "leg: flight to wait"), (landed + 0.05, "leg: wait to thrust"),
+              (landed + 0.05, "floor"), (landed + 0.15, "leg: thrust to flight")]  # fmt: skip
+    assert [event.name for event in run.events] == [name for _, name in wanted]
+    np.testing.assert_allclose([event.time for event in run.events], [time for time, _ in wanted], atol=1e-13)
+    assert run.events[3].kind == "opened"
+    np.testing.assert_allclose(run.at(landed + 0.15)["rail.rate"], 2.0, rtol=1e-12)
+    longer = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.9, parameters={"leg.push time": 0.2})
+    np.testing.assert_allclose(longer.events[4].time, landed + 0.25, atol=1e-13)
+    ended = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until="leg: thrust")
+    assert ended.final.time == longer.events[2].time
+
+
+def test_modes_follow_each_other_at_one_instant_in_order() -> None:
+    model, start = hopper()
+    model.constrain(
+        mbd.Mode("count", ("even", "odd"), transitions=[
+            mbd.Transition("even", "odd", on="leg: thrust"), mbd.Transition("odd", "even", on="leg: thrust")]),
+        mbd.Mode("light", ("off", "on"), transitions=[
+            mbd.Transition("off", "on", on="count: odd"), mbd.Transition("on", "off", on="count")]),
+    )  # fmt: skip
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=2.0)
+    thrusts = [event.time for event in run.events if event.name == "leg: wait to thrust"]
+    assert len(thrusts) >= 3
+    for number, time in enumerate(thrusts):
+        here = [event.name for event in run.events if event.time == time and event.kind == "event"]
+        there, light = ("even to odd", "off to on") if number % 2 == 0 else ("odd to even", "on to off")
+        assert here == ["leg: wait to thrust", f"count: {there}", f"light: {light}"]
+
+
+def test_a_transition_waits_while_its_condition_does_not_hold() -> None:
+    model, start = hopper(
+        mbd.Transition("flight", "wait", on="floor"),
+        mbd.Transition("wait", "thrust", after=0.05, only_while="floor"),
+        mbd.Transition("thrust", "flight", when="rail.displacement", only_while=mbd.measure("rail.rate")),
+        mbd.Transition("thrust", "flight", when=mbd.measure(lambda y: y - 0.2, "rail.displacement"),
+                       only_while="leg: thrust"),
+    )  # fmt: skip
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.6)
+    assert [event.name for event in run.events][-1] == "leg: thrust to flight (2)"
+    np.testing.assert_allclose(run["rail.displacement"][run.events[-1].row], 0.2, atol=1e-12)
+
+
+def test_transitions_without_end_are_named() -> None:
+    model, start = hopper()
+    model.constrain(
+        mbd.Mode("a", ("0", "1"), transitions=[mbd.Transition("0", "1", on="b"), mbd.Transition("1", "0", on="b"),
+                                               mbd.Transition("0", "1", on="floor")]),
+        mbd.Mode("b", ("0", "1"), transitions=[mbd.Transition("0", "1", on="a"), mbd.Transition("1", "0", on="a")]),
+    )  # fmt: skip
+    with pytest.raises(SimulationError, match="transitions follow each other without end at one instant.*'b: "):
+        mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=1.0)
+
+
+def test_contacts_are_watched_only_in_a_state() -> None:
+    model, start = hopper()
+    shelf = mbd.measure(lambda y: y - 0.02, "rail.displacement")
+    model.constrain(mbd.Unilateral("shelf", shelf, only_while="leg: thrust"))
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.9)
+    assert run.events[0].name == "floor"  # through the shelf
+    model.constrain(mbd.Unilateral("other", mbd.measure("rail.displacement"), only_while="leg: trust"))
+    with pytest.raises(ModelError, match="no contact named 'leg: trust'"):
+        mbd.assemble(model, {"rail.displacement": 0.5})
+
+
+T = mbd.Transition
+
+
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: mbd.Mode("m", ("a",)), "two states at least"),
+    (lambda: mbd.Mode("m", ("a", "b"), transitions=[T("a", "c", after=1.0)]), "no state named 'c'"),
+    (lambda: mbd.Mode("m", ("a", "b"), start="c"), "no state named 'c'"),
+    (lambda: mbd.Mode("m", ("a", "b")), "never leaves 'a'"),
+    (lambda: mbd.Mode("m", ("a", "b", "c"), transitions=[T("a", "b", after=1.0)]), "lead from 'a' to 'c'"),
+    (lambda: T("a", "b", after=0.0), "after 0 s is not positive"),
+    (lambda: T("a", "b", after=-1.0), "after -1 s is not positive"),
+    (lambda: T("a", "b"), "takes one cause, on=, when= or after=; got none"),
+    (lambda: T("a", "b", after=1.0, on="foot"), "got on and after"),
+    (lambda: T("a", "b", when=3.0), "when is a measure"),
+    (lambda: mode(remembers={"time": "t"}), "names two things"),
+    (lambda: mode(sets={"x.y": {"c": 1.0}}), "sets 'x.y' in"),
+])  # fmt: skip
+def test_bad_modes_are_errors_by_name(make: Any, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        make()
+
+
+def mode(*transitions: mbd.Transition, **more: Any) -> mbd.Mode:
+    return mbd.Mode("m", ("a", "b"), transitions=transitions or [T("a", "b", after=1.0)], **more)
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    ([lambda j: mode(T("a", "b", on="foor"))], "on: no contact, event or mode named 'foor'"),
+    ([lambda j: mode(T("a", "b", after=1.0, only_while="m: c"))], "only_while: no contact or state named 'm: c'"),
+    ([lambda j: mode(T("a", "b", when="rail.displcement"))], "no quantity named 'rail.displcement'"),
+    ([lambda j: mode(remembers={"x": "rail.acceleration"})], "'rail.acceleration' is a result"),
+    ([lambda j: mode(sets={"body.mass": {"a": 2.0}})], "body.mass"),
+    ([lambda j: mode(sets={"drive.trque": {"a": 2.0}})], "sets 'drive.trque'"),
+    ([lambda j: mbd.Motor("drive", j, force={"a": 1.0})], "name the mode too: by="),
+    ([lambda j: mode(), lambda j: mbd.Motor("drive", j, force={"c": 1.0}, by="m")], "no state named 'c'"),
+    ([lambda j: mode(), lambda j: mbd.Motor("drive", j, force={"a": 1.0}, by="n")], "no mode named 'n'"),
+])  # fmt: skip
+def test_bad_names_of_modes_are_errors_at_build(words: Any, message: str) -> None:
+    model = mbd.Model("slider")
+    body = mbd.PointMass("body", mass=1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, body.origin)
+    model.connect(rail)
+
+    def built() -> mbd.State:
+        model.apply(*(make(rail) for make in words))
+        return mbd.assemble(model, {"rail.displacement": 0.0})
+
+    with pytest.raises(ModelError, match=message):
+        built()

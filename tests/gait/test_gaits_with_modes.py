@@ -1,0 +1,121 @@
+"""Gaits of machines with discrete states: compared, mirrored by name; what is remembered is part of the gait."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.errors import ModelError
+
+
+def walker(remembers: bool = False, more: tuple[Any, ...] = ()) -> tuple[mbd.Model, mbd.State]:
+    """A compass gait that carries a torso, held upright by the hip of the leg that stands.
+
+    With a memory the torso is held at a share of the angle at which the foot touched down, for 0.3 s of each step
+    softer than later.
+    """
+    model = mbd.Model("torso walker", gravity=mbd.on_slope(math.radians(3.0)))
+    hip = mbd.PointMass("hip", mass=10.0)
+    torso = mbd.Link("torso", mass=2.0, length=0.5, center=0.25, inertia=0.1)
+    legs = {side: mbd.Link(f"{side} leg", mass=5.0, length=1.0, center=0.5) for side in ("left", "right")}
+    waist = mbd.Revolute("waist", hip.origin, torso.start)
+    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin), waist)
+    steps = [mbd.Transition("left", "right", on="right foot"), mbd.Transition("right", "left", on="left foot")]
+    for side, other in ("left", "right"), ("right", "left"):
+        ahead = mbd.measure(lambda a, b: a[0] - b[0] - 0.1, legs[side].end, legs[other].end)
+        model.connect(mbd.Revolute(f"{side} hip", hip.origin, legs[side].start))
+        model.constrain(mbd.Unilateral(
+            f"{side} foot", mbd.touchdown(legs[side].end), release=mbd.When(f"{other} foot", may_pull=True),
+            only_while=ahead,
+        ))  # fmt: skip
+    memory = {"left angle": {"left": "left hip.angle"}, "right angle": {"right": "right hip.angle"}}
+    model.constrain(mbd.Mode("stance", ("left", "right"), transitions=steps, remembers=memory if remembers else {}))
+    if remembers:
+        model.constrain(mbd.Mode("grip", ("soft", "firm"), transitions=[
+            mbd.Transition("soft", "firm", after=0.3),
+            mbd.Transition("firm", "soft", on="stance"),
+        ]))  # fmt: skip
+
+    def hold(q: Any, v: Any, angle: Any, grip: Any) -> Any:
+        return (100.0 + 20.0 * grip) * (q - math.pi - 0.1 * angle) + 20.0 * v
+
+    for side in legs:
+        names = ["waist.angle", "waist.rate", f"stance.{side} angle", "grip"]
+        law = hold if remembers else lambda q, v: hold(q, v, 0.0, 0.0)
+        names = names if remembers else names[:2]
+        joint = next(joint for joint in model.joints if joint.name == f"{side} hip")
+        model.apply(
+            mbd.Motor(f"{side} hold", waist, torque={side: lambda *x, f=law: -f(*x)}, by="stance", arguments=names),
+            mbd.Motor(f"{side} back", joint, torque={side: law}, by="stance", arguments=names),
+        )
+    model.constrain(*more)
+    start = mbd.assemble(
+        model, {"left hip.angle": 0.271, "right hip.angle": -0.271, "waist.angle": math.pi},
+        {"left hip.rate": -1.0924, "right hip.rate": -0.3774, "waist.rate": 0.0}, closed=["left foot"],
+    )  # fmt: skip
+    return model, start
+
+
+def test_a_gait_held_to_the_stance_leg_repeats_itself_on_the_other_side() -> None:
+    model, start = walker()
+    gait = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+    run = mbd.simulate(model, gait.state, mbd.RungeKutta853(), dt=gait.period / 60.0, until=3.5 * gait.period)
+    struck = [event.time for event in run.events if event.kind == "closed"]
+    np.testing.assert_allclose(struck, gait.period * np.arange(1, len(struck) + 1), atol=1e-9)
+    assert [event.name for event in run.events if event.kind == "event"] == [
+        "stance: left to right", "stance: right to left", "stance: left to right",
+    ]  # fmt: skip
+    stride = mbd.limit_cycle(model, gait.state, section="left foot")
+    np.testing.assert_allclose(stride.period, 2.0 * gait.period, atol=1e-9)
+    mine, its = (np.sort(np.abs(each)) for each in (np.array(gait.multipliers) ** 2, stride.multipliers))
+    np.testing.assert_allclose(mine[-2:], its[-2:], atol=1e-6)
+
+
+def test_multipliers_do_not_depend_on_where_the_section_is_though_values_are_remembered() -> None:
+    late = mbd.Event("passing", mbd.measure(lambda a, b: a + b, "left hip.angle", "right hip.angle"))
+    model, start = walker(remembers=True, more=(late,))
+    strike = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+    firm = mbd.limit_cycle(model, strike.state, section="grip: soft to firm", mirror=("left", "right"))
+    np.testing.assert_allclose(firm.period, strike.period, atol=1e-9)
+    sizes = [np.sort(np.abs(each.multipliers))[::-1] for each in (strike, firm)]
+    np.testing.assert_allclose(sizes[0][:3], sizes[1][:3], atol=1e-6)
+    names = ("stance.left angle", "stance.right angle")
+    run = mbd.simulate(model, strike.state, mbd.RungeKutta853(), dt=0.01, until=2.2 * strike.period)
+    np.testing.assert_allclose(run.at(1.5 * strike.period)[names[1]], strike.state["left hip.angle"], atol=1e-8)
+
+
+def test_runs_of_many_starts_are_those_of_each_to_the_bit() -> None:
+    model, start = walker(remembers=True)
+    rates = np.linspace(-0.1, 0.1, 4)
+    names = ["left hip.angle", "waist.rate", "stance.index", "grip.time"]
+    many = mbd.batch(
+        model, (start, {"waist.rate": rates}), mbd.RungeKutta853(), dt=0.01, until="grip: soft to firm", results=names
+    )
+    assert many.success.all()
+    for k in range(len(rates)):
+        one = mbd.simulate(model, many.start(k), mbd.RungeKutta853(), dt=0.01, until="grip: soft to firm")
+        np.testing.assert_array_equal([many[name][k] for name in names], [one[name][-1] for name in names])
+
+
+def test_a_mirror_needs_partners_of_modes_and_of_what_they_remember() -> None:
+    model, start = walker()
+    model.constrain(mbd.Mode("left grip", ("soft", "firm"), transitions=[mbd.Transition("soft", "firm", after=0.3)]))
+    with pytest.raises(ModelError, match="mode 'left grip' has no partner 'right grip'"):
+        mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+    model, start = walker()
+    model.constrain(
+        mbd.Mode(
+            "gait",
+            ("left push", "rest"),
+            transitions=[
+                mbd.Transition("left push", "rest", after=0.3),
+                mbd.Transition("rest", "left push", on="left foot"),
+            ],
+        )
+    )
+    with pytest.raises(ModelError, match="state 'left push' of mode 'gait' has no partner 'right push'"):
+        mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
