@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import sys
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -20,9 +21,10 @@ from typing import TYPE_CHECKING, Any
 from mbd.kernel.schemes import contract
 
 if TYPE_CHECKING:  # the trees of the kernel's functions are made only where it is built
+    from mbd.compile.host import Host
     from mbd.kernel.tree import Function
 
-__all__ = ["entry", "kernel_functions", "kernel_object", "kernel_text", "object_of", "source_digest"]
+__all__ = ["compiled", "entry", "kernel_functions", "kernel_object", "kernel_text", "object_of", "source_digest"]
 
 ENTRY = "mbd_kernel"
 
@@ -80,10 +82,11 @@ def object_of(text: str, level: int = 2) -> bytes:
     from mbd.compile.host import host
 
     with COMPILING:
-        return _compiled(text, host(), level)
+        return compiled(text, host(), level)
 
 
-def _compiled(text: str, here: Any, level: int) -> bytes:
+def compiled(text: str, here: Host, level: int) -> bytes:
+    """The object file of an IR text for the processor that `here` says, for callers that hold `COMPILING`."""
     import llvmlite.binding as llvm
 
     module = llvm.parse_assembly(text)
@@ -132,12 +135,18 @@ def kernel_functions() -> list[Function]:
 @lru_cache(maxsize=1)
 def entry() -> Callable[[int], int]:
     """The compiled kernel: ``entry(address of table) → status``; at first perhaps one without optimization."""
+    from mbd.compile.backend import LEVEL
     from mbd.compile.cache import default_cache
     from mbd.compile.llvm import cached_object, load_object, tag_key
+    from mbd.kernel import shipped
     from mbd.kernel.first_build import is_allowed
 
-    if contract.SCHEMES == LISTED and is_allowed() and default_cache().load(tag_key(tag()), lasting=True) is None:
-        return _quick_entry()
+    if contract.SCHEMES == LISTED and LEVEL not in os.environ:
+        code = shipped.load()
+        if code is not None:
+            return _called(load_object(code, ENTRY))
+        if is_allowed() and default_cache().load(tag_key(tag()), lasting=True) is None:
+            return _quick_entry()
     return _called(load_object(cached_object(tag(), kernel_object, lasting=True), ENTRY))
 
 

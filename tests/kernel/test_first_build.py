@@ -10,9 +10,11 @@ import time
 
 import pytest
 
+import mbd
 from mbd.compile.cache import default_cache
+from mbd.compile.host import Host
 from mbd.compile.llvm import tag_key
-from mbd.kernel import build, first_build
+from mbd.kernel import build, first_build, shipped
 
 SCRIPT = """
 import time, mbd
@@ -68,3 +70,34 @@ def test_two_processes_build_the_kernel_once(monkeypatch, tmp_path):
         thread.join(10.0)
     assert made == ["text"] and default_cache().load(tag_key(build.tag()), lasting=True) == b"machine code"
     assert not list((tmp_path / "cache").glob("*.building"))
+
+
+V3 = ",".join(f"+{name}" for name in shipped.LEVEL_3)
+
+
+@pytest.mark.parametrize(
+    ("triple", "features", "suits"),
+    [
+        ("x86_64-unknown-linux-gnu", V3, True),
+        ("x86_64-unknown-linux-gnu", f"{V3},-fma", False),
+        ("x86_64-unknown-linux-gnu", V3.replace("+avx2,", ""), False),
+        ("x86_64-pc-windows-msvc", V3, False),
+        ("aarch64-unknown-linux-gnu", V3, False),
+    ],
+)
+def test_a_kernel_of_a_wheel_is_used_where_its_sources_and_the_processor_are_those(
+    monkeypatch, tmp_path, triple, features, suits
+):
+    monkeypatch.setattr(shipped, "OBJECT", tmp_path / "objects" / "kernel.object")
+    monkeypatch.setattr(shipped, "host", lambda: Host(triple, "", features, "", True))
+    assert shipped.load() is None, "there is none yet"
+    monkeypatch.setattr(build, "kernel_text", lambda: "text")
+    monkeypatch.setattr(build, "compiled", lambda text, here, level: f"{text} for {here.cpu}".encode())
+    if "x86_64" not in triple or "linux" not in triple:
+        with pytest.raises(mbd.CapabilityError, match="x86-64 under Linux"):
+            shipped.write()
+        return
+    shipped.write()
+    assert shipped.load() == (b"text for x86-64-v3" if suits else None)
+    monkeypatch.setattr(build, "source_digest", lambda: "of other sources")
+    assert shipped.load() is None
