@@ -132,6 +132,8 @@ if TYPE_CHECKING:
     )
     from mbd.laboratory.balance_result import InverseDynamics as InverseDynamics
     from mbd.laboratory.inverse_dynamics import inverse_dynamics as inverse_dynamics
+    from mbd.laboratory.inverse_kinematics import inverse_kinematics as inverse_kinematics
+    from mbd.laboratory.kinematics_result import InverseKinematics as InverseKinematics
     from mbd.laboratory.read import read as read
     from mbd.laboratory.recording import PlateRecord as PlateRecord, Recording as Recording
     from mbd.lagrangian import Lagrangian as Lagrangian
@@ -195,6 +197,8 @@ _HOMES = {
     "mbd.equations.energy_description": "Coordinate",
     "mbd.laboratory.balance_result": "InverseDynamics",
     "mbd.laboratory.inverse_dynamics": "inverse_dynamics",
+    "mbd.laboratory.inverse_kinematics": "inverse_kinematics",
+    "mbd.laboratory.kinematics_result": "InverseKinematics",
     "mbd.laboratory.read": "read",
     "mbd.laboratory.recording": "PlateRecord Recording",
     "mbd.lagrangian": "Lagrangian",

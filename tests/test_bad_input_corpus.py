@@ -109,6 +109,9 @@ OWN: dict[tuple[str, str], Any] = {
     ("rolling_touchdown", "center"): END, ("disk_touchdown", "center"): END,
     ("sphere_touchdown", "center"): END, ("Ball", "center"): END,
     ("disk_touchdown", "axis"): (0.0, 0.0, 1.0),
+    ("inverse_kinematics", "recording"): mbd.Recording([0.0], {"mark": [(1.0, 0.0, 0.0)]}),
+    ("inverse_kinematics", "markers"): {"mark": END}, ("inverse_kinematics", "weights"): {"mark": 1.0},
+    ("inverse_kinematics", "coordinates"): {"hinge.angle": [0.1]}, ("inverse_kinematics", "cutoff"): None,
     ("gait_report", "run"): walker(steps=5),
     ("fit", "data"): {"time": [0.1, 0.2], "hinge.angle": [0.3, 0.2]}, ("fit", "dt"): 0.1,
     ("fit", "parameters"): {"upper.length": 1.2},
@@ -149,7 +152,7 @@ RESULTS = {
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
-RESULTS |= {"InverseDynamics", "PlateRecord", "Recording"}
+RESULTS |= {"InverseDynamics", "InverseKinematics", "PlateRecord", "Recording"}
 RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}

@@ -22,7 +22,7 @@ from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
 from mbd.results.record import Record
 from mbd.trajectory import Trajectory
 
-__all__ = ["Motion", "motion_of", "parameters_of", "record_of"]
+__all__ = ["Motion", "derivatives", "motion_of", "parameters_of", "record_of"]
 
 CLOSED = 1e-11
 """Residual of rows up to which coordinates that were not given are completed, over the largest row [-]."""
@@ -63,9 +63,11 @@ def motion_of(model: Any, mechanism: Mechanism, motion: Any, changed: Mapping[st
     ModelError
         for names that the model lacks, coordinates that are missing, gaps, times that do not increase.
     """
-    inner = getattr(motion, "run", motion)
-    if isinstance(inner, Trajectory):
-        return _of_run(mechanism.equations, inner)
+    if isinstance(motion, Trajectory):
+        return _of_run(mechanism.equations, motion)
+    inner = getattr(motion, "run", None)
+    if isinstance(inner, Trajectory):  # of inverse kinematics, which knows no forces
+        return replace(_of_run(mechanism.equations, inner), run=None)
     if isinstance(motion, Mapping):
         return _of_arrays(model, mechanism, motion, changed)
     raise ModelError(
@@ -138,10 +140,10 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
         if len(spins) == 3:
             v[:, own] = np.column_stack([spin.value for spin in spins])
             a[:, own] = np.column_stack(
-                [_derivatives(time, s.value)[0] if s.acceleration is None else s.acceleration for s in spins]
+                [derivatives(time, s.value)[0] if s.acceleration is None else s.acceleration for s in spins]
             )
         else:
-            v[:, own], a[:, own] = quaternion_rates(values, *_derivatives(time, values))
+            v[:, own], a[:, own] = quaternion_rates(values, *derivatives(time, values))
     places = {int(place): k for k, place in enumerate(whole.places) if place >= 0}
     for place, name in enumerate(names):
         if place in turned or name in missing:
@@ -150,11 +152,11 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
         q[:, place] = column.value
         rate, acceleration = column.rate, column.acceleration
         if rate is None or acceleration is None:
-            first, second = _derivatives(time, column.value)
+            first, second = derivatives(time, column.value)
             if rate is None:
                 rate = first
             elif acceleration is None:
-                second = _derivatives(time, rate)[0]
+                second = derivatives(time, rate)[0]
             acceleration = second if acceleration is None else acceleration
         v[:, k], a[:, k] = rate, acceleration
     motion = Motion(time, q, v, a)
@@ -236,7 +238,7 @@ def _of_samples(signal: Samples, time: Vector, order: int) -> Vector:
     return np.asarray(signal(time, order), dtype=float)
 
 
-def _derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:
+def derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:
     """First and second derivative of the spline through values at their times; zero of a single frame."""
     if len(time) == 1:
         return np.zeros_like(values), np.zeros_like(values)

@@ -1,0 +1,240 @@
+"""Motion from markers: the postures of a model nearest to what the cameras saw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.arrays import Matrix, Vector
+from mbd.assembly.assemble import assemble
+from mbd.bodies.values import named_number_faults, number, shown
+from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanisms import mechanism_of
+from mbd.equations.equations import Equations
+from mbd.errors import ModelError, nearest
+from mbd.joints.free import Free
+from mbd.laboratory.kinematics_result import InverseKinematics
+from mbd.laboratory.marker_program import MarkerProgram, marker_program, point_names
+from mbd.laboratory.nearest_posture import Problem, nearest_postures
+from mbd.laboratory.recording import Recording
+from mbd.state import State
+
+__all__ = ["inverse_kinematics"]
+
+
+def inverse_kinematics(
+    model: Any,
+    recording: Recording,
+    markers: Mapping[str, Any] | None = None,
+    *,
+    weights: Mapping[str, float] | None = None,
+    coordinates: Mapping[str, Any] | None = None,
+    start: State | None = None,
+    cutoff: float | None = None,
+    parameters: Mapping[str, float] | None = None,
+    backend: str = "auto",
+) -> InverseKinematics:
+    """The motion of a model whose markers come nearest to those of a recording.
+
+    At each frame ``Σ w² |p(q) − p_measured|² + Σ w² (q_k − q_measured)²`` is least, while the rows of closed loops and
+    constraints hold and the stops of joints are not passed:
+
+    1. The first frame with most markers starts from `start`, or from the assembled model with a floating body laid onto
+       the markers (W. Kabsch, Acta Cryst. A 32 (1976) 922).
+    2. Each other frame starts from those beside it. Gauss–Newton steps ``(JᵀWJ) x = −JᵀW r``, with the exact J of the
+       model and multipliers for the rows, are halved while they do not come nearer. Markers that are missing are left
+       out of their frames.
+    3. Further Gauss–Newton steps of all frames at once, until their error is below 1e-10 m or rad.
+    4. Velocities and accelerations are those of splines through the coordinates.
+
+    Parameters
+    ----------
+    model : a `Model`
+    recording : see `mbd.read`; its markers in meters
+    markers : {name in the recording: point of the model or its name}; by default the markers of the recording that have
+        the name of a point of the model (`mbd.Marker`)
+    weights : w by the name of a marker (1 unless given; 0 leaves it out) or of a coordinate below (1 m or rad)
+    coordinates : {'left knee.angle': measured}: values (R,) or the name of a channel, followed with their weight
+    start : posture from which the first frame begins; where it is far from the markers another minimum may be found
+    cutoff : of a filter without lag for the coordinates before their rates are taken [Hz]; None: no filter
+    parameters : values that differ from those of the model
+
+    Raises
+    ------
+    ModelError
+        for markers that the model or the recording lacks, weights that are none, a frame without markers, and a
+        posture that Newton's method does not find.
+    """
+    # what is compared with what
+    if not isinstance(recording, Recording):
+        raise ModelError(
+            f"recording: what mbd.read gives, or a mbd.Recording, is expected, got {shown(recording)[:80]}"
+        )
+    if faults := [*named_number_faults(weights, "weights"), *named_number_faults(parameters, "parameters")]:
+        raise ModelError(faults)
+    if cutoff is not None and not (number(cutoff, "cutoff of inverse_kinematics") > 0.0 and len(recording.time) >= 5):
+        raise ModelError(
+            f"cutoff must be positive [Hz], with 5 frames at least; got {cutoff!r}, {len(recording.time)} frames"
+        )
+    mechanism = mechanism_of(model, backend, parameters)
+    equations = mechanism.equations
+    notes: list[str] = []
+    points = point_names(equations, _pairs(equations, recording, markers, notes))
+    followed = _followed(equations, recording, coordinates)
+    size = _weights(weights, [*points, *followed])
+    # rows that hold, and stops that must not be passed
+    rows = [k for k in equations.bilateral if not equations.rows[k].is_velocity]
+    gaps = [k for k, contact in enumerate(equations.contacts) if contact.unit == "rad" and not contact.is_velocity]
+    program = marker_program(mechanism, list(points.values()), list(followed), rows, gaps)
+    problem = _problem(program, recording, points, followed, size, len(rows), len(gaps))
+    values = mechanism.parameters(parameters, getattr(model, "parameters", {}))
+    # the first frame, then all others
+    first = _first(problem, recording)
+    begin = _begin(model, mechanism, problem, recording, points, first, start, parameters, values)
+    found = nearest_postures(problem, recording.time, begin, first, values, mechanism)
+    return InverseKinematics.of(
+        mechanism, values, recording.time, found, problem, list(points), list(followed), cutoff, notes
+    )
+
+
+def _pairs(
+    equations: Equations, recording: Recording, markers: Mapping[str, Any] | None, notes: list[str]
+) -> dict[str, Any]:
+    """Points of the model by the markers of the recording."""
+    if markers is None:
+        known = {name.removesuffix(".x") for name in equations.output_names() if name.endswith(".x")}
+        found: dict[str, Any] = {name: name for name in recording.markers if name in known}
+        rest = [name for name in recording.markers if name not in known]
+        if not found:
+            raise ModelError(
+                "markers: no marker of the recording has the name of a point of the model; give {name: point}, or name "
+                f"points such as mbd.Marker({next(iter(recording.markers), 'RHEE')!r}, foot, (0.1, 0.0))"
+            )
+        if rest:
+            notes.append(f"{len(rest)} markers are no points of the model: {', '.join(map(repr, rest[:5]))}")
+        return found
+    if not isinstance(markers, Mapping) or not markers:
+        raise ModelError(
+            f"markers must map names of the recording to points, {{'RHEE': foot.heel}}, got {shown(markers)}"
+        )
+    for name in markers:
+        if name not in recording.markers:
+            raise ModelError(f"markers: {nearest(str(name), recording.markers, 'marker', 'The recording has')}")
+    return dict(markers)
+
+
+def _followed(equations: Equations, recording: Recording, coordinates: Mapping[str, Any] | None) -> dict[str, Vector]:
+    """Measured values of coordinates (R,), by name."""
+    places = equations.configuration.places
+    names = [equations.coordinates[int(place)].name for place in places if place >= 0]
+    found = {}
+    if coordinates is not None and not isinstance(coordinates, Mapping):
+        raise ModelError(f"coordinates must map names to measured values, got {shown(coordinates)[:80]}")
+    for name, given in (coordinates or {}).items():
+        if name not in names:
+            raise ModelError(f"coordinates: {nearest(str(name), names, 'coordinate', 'The model has')}")
+        values = recording[given] if isinstance(given, str) else given
+        try:
+            column = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise ModelError(f"coordinates: the values of {name!r} must be numbers, got {shown(given)[:80]}") from None
+        if column.shape != recording.time.shape:
+            raise ModelError(
+                f"coordinates: {name!r} needs a value for each of the {len(recording.time)} frames, got the shape "
+                f"{column.shape}"
+            )
+        found[name] = column
+    return found
+
+
+def _weights(weights: Mapping[str, float] | None, names: Sequence[str]) -> dict[str, float]:
+    found = dict.fromkeys(names, 1.0)
+    for name, value in (weights or {}).items():
+        if name not in found:
+            raise ModelError(f"weights: {nearest(str(name), names, 'marker', 'There are')}")
+        found[name] = number(value, f"the weight of {name!r}")
+        if found[name] < 0.0:
+            raise ModelError(f"weights: that of {name!r} must not be negative, got {value!r}")
+    return found
+
+
+def _problem(
+    program: MarkerProgram, recording: Recording, points: Mapping[str, str], followed: Mapping[str, Vector],
+    weights: Mapping[str, float], rows: int, gaps: int,
+) -> Problem:  # fmt: skip
+    """What was measured, with the weight of each component at each frame: 0 where it is missing."""
+    count = len(recording.time)
+    measured = np.concatenate(
+        [recording.markers[name] for name in points] + [column[:, np.newaxis] for column in followed.values()], axis=1
+    )
+    weight = np.concatenate([np.repeat([weights[name] for name in points], 3), [weights[name] for name in followed]])
+    missing = ~np.isfinite(measured)
+    for k in range(len(points)):
+        missing[:, 3 * k : 3 * k + 3] |= missing[:, 3 * k : 3 * k + 3].any(axis=1, keepdims=True)
+    weight = np.where(missing | program.fixed[: measured.shape[1]], 0.0, np.broadcast_to(weight, (count, len(weight))))
+    empty = np.flatnonzero(~(weight > 0.0).any(axis=1))
+    if len(empty):
+        raise ModelError(
+            f"no marker is seen at t = {recording.time[empty[0]]:.6g} s ({len(empty)} of {count} frames); cut them "
+            "off by recording.between(…), or fill the gaps by recording.filled(…)"
+        )
+    return Problem(program, np.where(missing, 0.0, measured), np.asarray(weight), rows, gaps)
+
+
+def _first(problem: Problem, recording: Recording) -> int:
+    """The first frame with as many components as any."""
+    seen = (problem.weight > 0.0).sum(axis=1)
+    return int(np.argmax(seen)) if len(recording.time) else 0
+
+
+def _begin(
+    model: Any, mechanism: Mechanism, problem: Problem, recording: Recording, points: Mapping[str, str], first: int,
+    start: State | None, parameters: Mapping[str, float] | None, values: Vector,
+) -> Vector:  # fmt: skip
+    """Coordinates (n_q,) from which the first frame begins."""
+    equations = mechanism.equations
+    if start is not None:
+        if not isinstance(start, State) or len(start.q) != equations.n_q:
+            raise ModelError(f"start: a state of '{equations.name}' is expected, such as mbd.assemble(model)")
+        return np.array(start.q, dtype=float)
+    q = np.array(assemble(model, parameters=dict(parameters or {})).q, dtype=float)
+    for joint, first_q, first_v in equations.configuration.charts:
+        if isinstance(joint, Free) and first_v == 0:
+            return _laid(mechanism, problem, q, first_q, first, float(recording.time[first]), values, len(points))
+    return q
+
+
+def _laid(
+    mechanism: Mechanism, problem: Problem, q: Vector, place: int, first: int, time: float, values: Vector, markers: int
+) -> Vector:
+    """The posture with its floating body turned and shifted so that its markers lie on those measured."""
+    y, _ = problem.program.at_all(np.array([time]), q[np.newaxis], values)
+    model = y[0, : 3 * markers].reshape(-1, 3)
+    seen = problem.measured[first, : 3 * markers].reshape(-1, 3)
+    weight = problem.weight[first, : 3 * markers : 3] ** 2
+    if (weight > 0.0).sum() < 3:
+        return q
+    a, b = (np.average(part, axis=0, weights=weight) for part in (model, seen))
+    U, _, V = np.linalg.svd(((model - a) * weight[:, np.newaxis]).T @ (seen - b))
+    sign = np.sign(np.linalg.det(V.T @ U.T)) or 1.0
+    R = V.T @ np.diag([1.0, 1.0, sign]) @ U.T
+    out = q.copy()
+    out[place : place + 3] = b + R @ (q[place : place + 3] - a)
+    out[place + 3 : place + 7] = _product(_quaternion(R), q[place + 3 : place + 7])
+    return out
+
+
+def _quaternion(R: Matrix) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(R).as_quat()
+    return np.array([w, x, y, z])
+
+
+def _product(p: Vector, q: Vector) -> Vector:
+    """p ⊗ q."""
+    a, b = p[1:], q[1:]
+    return np.concatenate([[p[0] * q[0] - a @ b], p[0] * b + q[0] * a + np.cross(a, b)])
