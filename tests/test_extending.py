@@ -31,7 +31,7 @@ def test_a_new_joint_loss_measure_and_law_are_one_file_and_one_line(tmp_path):
             added.append(name)
         elif title == "test":
             tests.append(code)
-    assert added == ["PinInSlot", "Root", "Clearance", "Clutch"]
+    assert added == ["PinInSlot", "Root", "MountedDamper", "Clearance", "Clutch"]
     done = subprocess.run(
         [sys.executable, "-c", "\n".join(tests)], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)},
         capture_output=True, text=True, timeout=600,

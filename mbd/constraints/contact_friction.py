@@ -7,7 +7,7 @@ from typing import Any
 
 from mbd.bodies.values import number
 from mbd.errors import ModelError
-from mbd.joints.losses.base import Loss, LossSum
+from mbd.joints.losses.base import Loss, LossSum, without_states
 from mbd.joints.losses.isotropic import isotropic
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
@@ -29,7 +29,8 @@ def friction_of(value: Any, name: str) -> float | Loss | None:
                 f"friction of '{name}': {value!r} follows the force in a joint; friction of a contact follows its "
                 "normal force by itself: give μ, or mbd.Viscous(…)"
             )
-        return value
+        instead = "give a contact mbd.Coulomb, mbd.Stribeck, mbd.Viscous or μ"
+        return without_states(value, f"friction of '{name}'", instead)
     if value is None:
         return None
     return number(value, f"friction of '{name}'")

@@ -28,7 +28,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from mbd.tape.node import Scalar
+from mbd.tape.node import Node, Scalar
 
 if TYPE_CHECKING:
     from mbd.constraints.measure import Measure
@@ -124,6 +124,8 @@ class Law:
     rubbing : smooth friction of a contact by rows
     elastic : energy that the force law can give back [J], which the ledger books apart from losses; None: not told
     while_closed : name of a contact by rows that must be closed for rows on velocities to hold
+    rates : (z, ż) of its first-order states ``scope.state(self.name, field, initial)``. They follow their rates at all
+        times, also while a contact is open; forces, limits and `elastic` may depend on z, rows and gaps may not
     """
 
     rows: Sequence[Equation] = ()
@@ -133,3 +135,4 @@ class Law:
     rubbing: Rubbing | None = None
     elastic: Scalar | None = None
     while_closed: str | None = None
+    rates: Sequence[tuple[Node, Scalar]] = field(default=())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from functools import partial
 
 from mbd.bodies.promises import called
@@ -20,6 +21,7 @@ from mbd.equations.gathered import Gathered
 from mbd.equations.law_of import Holding, law_of
 from mbd.equations.laws import Laws
 from mbd.equations.rubbing import rubbing_contact
+from mbd.equations.states import with_states
 from mbd.joints.base import Joint, row_unit
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
@@ -65,6 +67,10 @@ def laws(
         with gathered.catch(event.name):
             found.guards.append(_guard(scope, event))
             found.faults += _never(scope, found.guards[-1], written)
+    found.contacts = [
+        replace(contact, generalized=with_states(scope, contact.generalized)) if contact.generalized else contact
+        for contact in found.contacts
+    ]
     gathered.add(found.faults)
     return found
 
@@ -79,6 +85,7 @@ def _always(
 ) -> None:
     """Rows that act at all times, or as long as another contact is closed."""
     law = law_of(word, Holding(scope, 0), contacts)
+    found.rates += law.rates
     numbers = [k for k, contact in enumerate(contacts) if contact.name == law.while_closed]
     number = numbers[0] if numbers else -1
     if number >= 0 and contacts[number].kind == "penalty":
@@ -161,6 +168,7 @@ def _contact(
     """A law that closes and opens, by rows or by a force."""
     holding = Holding(scope, scope.first_anchor + sum(len(contact.anchors) for contact in found.contacts))
     law = law_of(word, holding, contacts)
+    found.rates += law.rates
     if law.contact is not None:
         by = _by_force if law.push is not None else _by_rows
         found.contacts.append(by(found, scope, dynamics, word, law, law.contact, holding, number))
@@ -214,14 +222,14 @@ def _by_force(
     holding: Holding, number: int,
 ) -> Contact:  # fmt: skip
     """A force law: −p ∂g/∂q on the left-hand side while it acts, −p ∂g/∂v where g is a velocity, and its drags."""
-    lift, rest = scope.tape.lift, [scope.tape.zero] * len(scope.states)
+    lift = scope.tape.lift
     gap, force = lift(at.gap), lift(law.push if law.push is not None else 0.0)
     inside = {node.data[0] for node in live([scope.real(gap)]) if node.op == "input"}
     fast = "v" in inside
     if not inside & {"x", "v"}:
         found.faults.append(f"the gap of '{word.name}' is the same whatever the motion; let it depend on the posture")
     work = Work([], [], [gap], [-force]) if fast else Work([gap], [-force])
-    generalized = (*dynamics.generalized(work), *rest)
+    generalized = tuple(dynamics.generalized(work))
     found.penalties.append((number, gap, force))
     elastic = None if law.elastic is None else scope.real(law.elastic)
     rate = scope.change(gap) if fast else scope.rates([gap])[0]
@@ -240,7 +248,7 @@ def _by_force(
         views = [found.drags[k - len(drags)] for k in own]
         work = Work([], [], [velocity for _, velocity, _ in views], [-force for _, _, force in views])
         moving = [drags[k][1:] for k in own]
-        along = (*dynamics.generalized(work), *rest)
+        along = dynamics.generalized(work)
         found.effects.append(drag_effect(f"{word.name} {title}", number, moving, along, scope))
     return Contact(
         word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,

@@ -12,9 +12,8 @@ from mbd.bodies.domains import ParameterCheck
 from mbd.equations.changes import partials, rates
 from mbd.equations.contacts import anchors_held, laws
 from mbd.equations.derivation_context import DerivationContext
-from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.dynamics import Dynamics, Work
-from mbd.equations.effects import Cause, causes, effect_of, weight_of
+from mbd.equations.effects import causes, effect_of, weight_of
 from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.gathered import Gathered
@@ -28,6 +27,7 @@ from mbd.equations.row_sizes import row_sizes
 from mbd.equations.shapes import offer_shapes, shapes_of
 from mbd.equations.sizes import require_room
 from mbd.equations.solids import offer_solids, solids_of
+from mbd.equations.states import state_balance
 from mbd.equations.switching_times import table_faults
 from mbd.errors import ModelError
 from mbd.joints.reflected import signs_in_a_mirror
@@ -40,7 +40,7 @@ from mbd.topology.plan import Plan, plan
 if TYPE_CHECKING:
     from mbd.description import Description
 
-__all__ = ["FrontDoor", "derivation_faults", "derive", "state_balance"]
+__all__ = ["FrontDoor", "derivation_faults", "derive"]
 
 
 @runtime_checkable
@@ -102,15 +102,15 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     gathered = Gathered()
     found = causes(scope, (*plan.edges, *plan.cut), model.forces, gathered)
     work = sum((cause.work for cause in found), Work())
-    rests: list[Node] = []
-    with gathered.catch():
-        rests = state_balance(scope, found)
     joints = (*plan.edges, *plan.cut)
     written = {name for controller in model.controllers for name in controller.writes}
     always = [*model.bilaterals, *model.nonholonomic]
     constraints = laws(scope, dynamics, joints, always, model.contacts, model.events, gathered, written=written)
     with gathered.catch():
         constraints.take_machines(*machine_guards(scope, model.machines, model.contacts, model.events))
+    rests: list[Node] = []
+    with gathered.catch():
+        rests = state_balance(scope, [*(pair for cause in found for pair in cause.rates), *constraints.rates])
     gathered.raise_all()
     weight = weight_of(scope, dynamics)
     stored = [weight, *found] if weight.acts else found
@@ -215,15 +215,6 @@ def _closed(scope: DerivationContext, constraints: Laws) -> Work:
         by_rows = constraints.contacts[number].force is None  # its force follows the multiplier of the normal row
         work.on_velocity(velocity, -force if by_rows else -(scope.tape.input("switch", number) * force))
     return work
-
-
-def state_balance(scope: DerivationScope, found: Sequence[Cause]) -> list[Node]:
-    """ż − s of every first-order state."""
-    given = {state.index: rate for cause in found for state, rate in cause.rates}
-    missing = [coordinate.name for coordinate, node in scope.states if node.index not in given]
-    if missing:
-        raise ModelError([f"state '{name}' has no rate; its force must list it in Action.rates" for name in missing])
-    return [scope.tape.input("s", k) - scope.real(given[node.index]) for k, (_, node) in enumerate(scope.states)]
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from mbd.bodies.promises import called, title_of
 from mbd.equations.derivation_context import DerivationContext
@@ -11,9 +12,11 @@ from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Effect
 from mbd.equations.gathered import Gathered
+from mbd.equations.states import has_pairs, with_states
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.joints.base import Joint
+from mbd.joints.losses.base import rates_of
 from mbd.tape.derivatives import jvp
 from mbd.tape.node import Node, Scalar
 
@@ -72,12 +75,19 @@ def _joint_spring(joint: Joint, scope: DerivationScope) -> Cause:
 
 
 def _joint_loss(joint: Joint, scope: DerivationScope) -> Cause:
-    """``∂D/∂q̇`` on each rate."""
+    """``∂D/∂q̇`` on each rate, the states of losses and what these store."""
     cause = Cause(f"{joint.name} loss", "loss", "joint loss")
     if joint.losses():
         rates = scope.joint(joint.name).rates
         pairs = list(zip(rates, joint.resistance(rates, scope), strict=True))
         _apply(cause, [(rate, -scope.tape.lift(force)) for rate, force in pairs], scope)
+        with_state = [each for each in joint.losses() if each[2].has_states]
+        cause.rates = tuple(
+            pair for place, owner, loss in with_state for pair in rates_of(loss, rates[place], scope, owner)
+        )
+        stored = sum((scope.tape.lift(loss.elastic(scope, owner)) for _, owner, loss in with_state), scope.tape.zero)
+        if not stored.is_zero:
+            _store(cause, stored, scope)
     return cause
 
 
@@ -101,8 +111,7 @@ def _action(force: Force, scope: DerivationScope) -> Action:
         raise ModelError(f"{title}: act(scope) must return an mbd.forces.Action, got {action!r}")
     for field_name, example in (("pairs", "(velocity, force)"), ("rates", "(state, its rate)")):
         given = getattr(action, field_name)
-        several = isinstance(given, Sequence) and not isinstance(given, str)
-        if not several or not all(isinstance(pair, Sequence) and len(pair) == 2 for pair in given):
+        if not has_pairs(given):
             raise ModelError(
                 f"{title}: act(scope) returns Action({field_name}={given!r}); give pairs {example}, such as "
                 f"{field_name}=({example},)"
@@ -157,7 +166,8 @@ def penalty_effect(
     It is force · (∂g/∂v · v) of a gap that is a velocity (`fast`).
     """
     speed = _of_motion(gap, scope) if fast else rate - jvp([gap], {scope.time: 1.0})[0]
-    return Effect(name, "penalty", lambda: generalized, force * speed, contact=contact, elastic=elastic)
+    forces = partial(with_states, scope, generalized)
+    return Effect(name, "penalty", forces, force * speed, contact=contact, elastic=elastic)
 
 
 def drag_effect(
@@ -167,7 +177,7 @@ def drag_effect(
     power = scope.tape.zero
     for velocity, force in drags:
         power = power + force * _of_motion(velocity, scope)
-    return Effect(name, "loss", lambda: generalized, power, contact=contact, column="friction")
+    return Effect(name, "loss", partial(with_states, scope, generalized), power, contact=contact, column="friction")
 
 
 def _of_motion(velocity: Node, scope: DerivationScope) -> Node:
@@ -176,4 +186,4 @@ def _of_motion(velocity: Node, scope: DerivationScope) -> Node:
 
 
 def _lazily(scope: DerivationScope, dynamics: Generalized, work: Work) -> Callable[[], Sequence[Node]]:
-    return lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states))
+    return lambda: with_states(scope, dynamics.generalized(work))

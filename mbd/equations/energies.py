@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from mbd.equations import equations as records
 from mbd.equations.contacts import laws
 from mbd.equations.coordinate_scope import CoordinateScope, identifier
-from mbd.equations.derivation import state_balance
 from mbd.equations.dynamics import Work
 from mbd.equations.effects import causes, effect_of
 from mbd.equations.equations import Effect, Equations, Row
@@ -18,6 +17,7 @@ from mbd.equations.laws import Laws
 from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_contacts, offer_effects, offer_rows
+from mbd.equations.states import state_balance
 from mbd.errors import ModelError, TraceError, nearest
 from mbd.tape.derivatives import gradient, jvp, live
 from mbd.tape.node import Node, Scalar, Tape
@@ -118,9 +118,9 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     found = causes(scope, (), system.applied, gathered)
     acting = scope.generalized(sum((cause.work for cause in found), Work()))
     balance = [r + f for r, f in zip(balance, acting, strict=True)]
-    with gathered.catch():
-        balance += state_balance(scope, found)
     known = _laws(system, lowering, gathered)
+    with gathered.catch():
+        balance += state_balance(scope, [*(pair for cause in found for pair in cause.rates), *known.rates])
     gathered.raise_all()
     effects = (*own, *(effect_of(cause, scope, scope) for cause in found), *known.effects)
     potential = V

@@ -285,7 +285,7 @@ class Effect:
     column : kind of cause in the energy ledger, see `mbd.results.ledger.Part`; by default from its kind
     generalized : makes its part of f (length n_v + n_z), positive on the left-hand side
     power : rate of work it does on the mechanism [W]; None where `potential` accounts for it
-    potential : its stored energy [J] or None
+    potential : its stored energy [J] or None; what it gains as first-order states change, the effect gives
     contact : the penalty contact whose switch it follows, −1 otherwise
     elastic : energy that a penalty contact can give back while it acts [J], of which `power` is not the account; None
         where its law does not tell

@@ -12,6 +12,7 @@ from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Effect, Friction, Row
 from mbd.equations.laws import Laws
+from mbd.equations.states import with_states
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import substitute
@@ -161,6 +162,6 @@ def _add_loss(found: Laws, scope: DerivationScope, dynamics: Generalized, name: 
     found.effects.append(
         Effect(
             f"{name} friction", "loss",
-            lambda: (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states)), power, column="friction",
+            lambda: with_states(scope, dynamics.generalized(work)), power, column="friction",
         )
     )  # fmt: skip

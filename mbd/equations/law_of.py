@@ -10,6 +10,7 @@ from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Law
 from mbd.constraints.machine import state_of
 from mbd.equations.derivation_scope import DerivationScope
+from mbd.equations.states import has_pairs
 from mbd.errors import ModelError, nearest
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node, Scalar
@@ -44,14 +45,11 @@ def law_of(word: Constraint, holding: Holding, contacts: Sequence[Constraint]) -
     ModelError
         where that is not what its kind promises, each fault by name.
     """
-    states = len(holding.scope.states)
     title = f"{title_of(word)} of kind '{word.kind}'"
     law = called(word, "act", "act(scope, hold)", holding.scope, holding)
     if not isinstance(law, Law):
         raise ModelError([f"{title}: act(scope, hold) must return an mbd.constraints.Law, got {law!r}"])
     faults = list(_faults(word, law, holding))
-    if len(holding.scope.states) > states:
-        faults.append("a law has no first-order states; give them to a force")
     known = {contact.name: contact for contact in contacts}
     at = law.contact
     others = [] if at is None else [*(rule.other for rule in at.releases), at.only_while]
@@ -77,6 +75,8 @@ def _faults(word: Constraint, law: Law, holding: Holding) -> Iterator[str]:
         yield "rubbing= is the smooth friction of contacts by rows; of laws of kind 'penalty' give drags="
     if holding.captured and not closes:
         yield "it never closes, so that hold() has no instant; only laws with a contact hold values"
+    if not has_pairs(law.rates):
+        yield f"rates={law.rates!r} must be pairs (state, its rate), such as rates=((z, speed - z / lag),)"
     if law.while_closed is not None and (closes or any(row.limit is not None for row in law.rows)):
         yield "while_closed= is for rows that act as long as another contact is closed, and have no limit"
     if law.contact is not None:
@@ -97,6 +97,8 @@ def _closing_faults(law: Law, at: Closing, by_force: bool, scope: DerivationScop
         yield f"restitution {at.restitution:g} is negative"
     if by_force and _has_velocity(gradient(scope.real(at.gap), scope.inputs.v)):
         yield "its gap is not linear in velocities"
+    if any(node.op == "input" and node.data[0] == "z" for node in live([scope.real(at.gap)])):
+        yield "its gap depends on states; let the force depend on them, and the gap on the posture"
     if law.rows:
         first = law.rows[0]
         watched = scope.tape.lift(first.value) is scope.tape.lift(at.gap)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from mbd.equations.equations import Contact, Effect, Friction, Guard, Machine, Row
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["Laws"]
 
@@ -20,6 +20,7 @@ class Laws:
     drags : (number, velocity, force) of their forces along velocities in views
     sliding : the sliding velocities of `frictions` in views
     idle : (owner, part) of rows of cut joints that hold by themselves
+    rates : (z, ż) of the first-order states of laws
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -33,6 +34,7 @@ class Laws:
     effects: list[Effect] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     idle: list[tuple[str, str]] = field(default_factory=list)
+    rates: list[tuple[Node, Scalar]] = field(default_factory=list)
     machines: list[Machine] = field(default_factory=list)
 
     def take_machines(self, machines: Sequence[Machine], guards: Sequence[Guard]) -> None:

@@ -113,4 +113,4 @@ class _ObservingScope:
         raise ModelError(f"{self._what} takes no samples; look them up in the results instead")
 
     def state(self, owner: str, field: str, initial: float) -> Node:
-        raise ModelError(f"{self._what} has no states; a force of one's own has")
+        raise ModelError(f"{self._what} has no states; a force, a loss or a law of one's own has")

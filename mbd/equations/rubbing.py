@@ -47,7 +47,7 @@ def rubbing_contact(
         return ()
     found.drags += [(number, speed, force) for speed, force in zip(speeds, forces, strict=True)]
     work = Work([], [], speeds, [-force for force in forces])
-    generalized = (*dynamics.generalized(work), *[scope.tape.zero] * len(scope.states))
+    generalized = dynamics.generalized(work)
     real, sizes = scope.views.real(speeds), scope.views.real(forces)
     moving = list(zip(real, sizes, strict=True))
     _add_effect(found, drag_effect(f"{name} friction", -1, moving, generalized, scope))

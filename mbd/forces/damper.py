@@ -11,7 +11,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number, name_of
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
-from mbd.joints.losses.base import Loss, loss_of
+from mbd.joints.losses.base import Loss, loss_of, rates_of
 from mbd.joints.losses.viscous import Viscous
 from mbd.scope import Scope
 
@@ -78,7 +78,9 @@ class Damper(Force):
         a, b = scope.frame(self.a), scope.frame(self.b)
         arm = difference(b.position, a.position)
         rate = dot(arm, difference(b.velocity, a.velocity)) / norm(arm)
-        return Action(pairs=((rate, -self.law.force(rate, scope, self.name)),))
+        stored = self.law.elastic(scope, self.name) if self.law.has_states else None
+        pairs = ((rate, -self.law.force(rate, scope, self.name)),)
+        return Action(pairs, stored, rates=tuple(rates_of(self.law, rate, scope, self.name)))
 
     def results(self) -> dict[str, Result]:
         """'force': F(ḋ), which pulls its ends together where it is positive [N]."""

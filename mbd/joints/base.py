@@ -231,6 +231,12 @@ class Joint(Parameterized, ABC):
         """What is physically impossible about it, one sentence each."""
         faults = [fault for _, owner, loss in self.losses() for fault in loss.faults(owner)]
         faults += super().faults()
+        if isinstance(self.loss, Loss) and self.loss.has_states and len(self.freedoms) > 1:
+            several = ", ".join(f"'{label.name}': …" for label in self.freedoms)
+            faults.append(
+                f"'{self.name} loss': {self.loss!r} has a state, which one velocity bends; give one for each "
+                f"velocity, loss={{{several}}}"
+            )
         for place, owner, loss in self.losses():
             if loss.needs_reaction and self.freedoms[place].unit != "rad":
                 name = self.freedoms[place].name

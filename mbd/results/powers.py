@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -53,8 +53,8 @@ def powers(equations: Equations) -> list[Power]:
 
     Effects give their own power; a row with
     h_t ≠ 0 does the work ``λ h_t``; with ``dT/dt = Q·v − ∂T/∂t + d/dt(2T − v·∂T/∂v)`` and
-    ``dV/dt = v·∂V/∂q + ∂V/∂t + ∂V/∂z·ż`` a kinetic energy or a potential that depends on time or on first-order states
-    adds the rest.
+    ``dV/dt = v·∂V/∂q + ∂V/∂t + ∂V/∂z·ż`` a kinetic energy or a potential that depends on time adds the rest; what a
+    potential gains as first-order states change belongs to the effect that stores it.
     """
     tape = equations.tape
     found: dict[tuple[str, str], Node] = {}
@@ -64,14 +64,20 @@ def powers(equations: Equations) -> list[Power]:
     def add(name: str, kind: str, power: Node) -> None:
         found[name, kind] = found.get((name, kind), tape.zero) + power
 
+    states: dict[Node, Scalar] = dict(
+        zip((tape.input("z", k) for k in range(equations.n_z)), _flow(equations), strict=True)
+    )
     for effect in equations.effects:
+        stored = tape.zero if effect.potential is None else jvp([effect.potential], states)[0]
+        if not stored.is_zero:
+            add(effect.name, effect.column, stored)
         if effect.power is not None:
             switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)
             if effect.column == "friction" and effect.name in dry:  # what sticks does no work
                 switch = _slides(equations, dry[effect.name])
             add(effect.name, effect.column, switch * effect.power)
             if effect.elastic is not None:
-                elastic[effect.name, effect.column] = switch * _change(equations, effect.elastic), effect
+                elastic[effect.name, effect.column] = switch * _change(equations, effect.elastic, states), effect
     still = {tape.input("v", k): 0.0 for k in range(equations.n_v)}
     for number, row in enumerate(equations.rows):
         speed = substitute([row.rate], still)[0]
@@ -84,10 +90,9 @@ def powers(equations: Equations) -> list[Power]:
             work = tape.input("switch", number) * contact.force * speed
             add(contact.name, "penalty", work)
             add(f"surface of {contact.name}", "constraint", -work)
-    states: dict[Node, Scalar] = {tape.input("z", k): tape.input("s", k) for k in range(equations.n_z)}
     for name, power in (
         ("moving coordinates", -jvp([equations.kinetic], clock)[0]),
-        ("changing potential", jvp([equations.potential], clock | states)[0]),
+        ("changing potential", jvp([equations.potential], clock)[0]),
     ):
         if not power.is_zero:
             add(name, "constraint", power)
@@ -121,10 +126,17 @@ def _slides(equations: Equations, k: int) -> Node:
     return square / (square + NO_SLIP)
 
 
-def _change(equations: Equations, value: Node) -> Node:
-    """d/dt of a function of t and q ⊕ x."""
+def _flow(equations: Equations) -> list[Node]:
+    """ż of every first-order state as a function of t, q ⊕ x, v and z."""
     tape = equations.tape
-    seeds: dict[Node, Scalar] = {tape.input("t"): 1.0}
+    still = {tape.input("s", k): 0.0 for k in range(equations.n_z)}
+    return [-rest for rest in substitute(list(equations.balance[equations.n_v :]), still)]
+
+
+def _change(equations: Equations, value: Node, states: Mapping[Node, Scalar]) -> Node:
+    """d/dt of a function of t, q ⊕ x and z."""
+    tape = equations.tape
+    seeds: dict[Node, Scalar] = {tape.input("t"): 1.0, **states}
     seeds |= {tape.input("x", k): tape.input("v", k) for k in range(equations.n_v)}
     return jvp([value], seeds)[0]
 

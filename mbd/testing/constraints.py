@@ -138,6 +138,7 @@ def _force_law(findings: Findings, equations: Equations, contact: Contact, seed:
     for k, depth in enumerate((0.0, 1e-4, 1e-3, 1e-2)):
         point = inputs(equations, seed + k)
         point |= {("anchor", j): 0.5 for j in contact.anchors} | {("v", j): 0.0 for j in range(equations.n_v)}
+        point |= {("z", j): float(state.default) for j, state in enumerate(equations.states)}
         placed = _at_gap(equations, contact, point, -depth)
         if placed is None:
             findings.note(f"force law of '{contact.name}': no posture with a gap of {-depth:g} was found")

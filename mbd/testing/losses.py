@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from mbd.testing.scope import FreeScope
 __all__ = ["check_loss"]
 
 OWNER = "knee loss"
+
+Numbers = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def check_loss(loss: Loss | Callable[[], Loss], *, rates: int = 60, fastest: float = 50.0, seed: int = 0) -> Verdict:
@@ -44,6 +47,9 @@ def check_loss(loss: Loss | Callable[[], Loss], *, rates: int = 60, fastest: flo
         _tangent(findings, made, rate)
     findings.where = f"seed {seed}"
     _dry(findings, made, rng)
+    if made.has_states:
+        for size in (0.01, 0.1, 1.0):
+            _memory(findings, made, size * fastest, rng)
     return findings.verdict()
 
 
@@ -100,6 +106,7 @@ def _declared(findings: Findings, loss: Loss) -> None:
     loss.force(scope.tape.input("v", 0), scope, OWNER)
     loss.dry(scope.tape.input("lam", 0), scope, OWNER)
     loss.sliding(scope.tape.input("lam", 0), scope.tape.input("v", 1), scope, OWNER)
+    _ = loss.rates(scope.tape.input("v", 0), scope, OWNER), loss.elastic(scope, OWNER)
     law = "parameters are declared before they are used"
     hint = "fields() must name every scope.parameter(owner, field, value) with the same value"
     declared = loss.parameters(OWNER)
@@ -127,6 +134,42 @@ def _power(findings: Findings, loss: Loss, rate: float, fastest: float) -> None:
     sentence = f"F jumps from {force:.6g} to {nearby:.6g} between rates {1e-8 * fastest:.1g} apart"
     hint = "Newton's method needs a continuous force; smooth the jump"
     findings.holds("continuity", abs(nearby - force) <= allowed, sentence, hint)
+
+
+def _memory(findings: Findings, loss: Loss, fastest: float, rng: np.random.Generator) -> None:
+    """Along a motion from rest, what it took since then is at least what its states store: ``∫ F v dt ≥ U(z) ≥ 0``.
+
+    The motion is a sum of sines that begins and ends where it is at rest: with small swings, which bend states only.
+    """
+    scope = FreeScope()
+    v = scope.tape.input("v", 0)
+    pairs = [(z, scope.tape.lift(rate)) for z, rate in loss.rates(v, scope, OWNER)]
+    force, stored = scope.tape.lift(loss.force(v, scope, OWNER)), scope.tape.lift(loss.elastic(scope, OWNER))
+    missing = [name for name, node in scope.states.items() if all(node is not z for z, _ in pairs)]
+    law = "every state has a rate"
+    findings.holds(law, not missing, f"without a rate: {', '.join(missing)}", "list it in what rates() returns")
+    if missing:
+        return
+    states = [z for z, _ in pairs]
+    frequencies, sizes = rng.uniform(1.0, 6.0, 3), rng.uniform(-1.0, 1.0, 3) * fastest / 3.0
+
+    def rates(t: float, y: Numbers) -> list[float]:
+        speed = float(sizes @ np.sin(frequencies * t))
+        given = dict(zip(states, map(float, y[:-1]), strict=True)) | {v: speed}
+        values = scope.value(*(rate for _, rate in pairs), force, given=given)
+        return [*values[:-1], values[-1] * speed]
+
+    begin = np.array([*(scope.numbers[z] for z in states), 0.0])
+    from scipy.integrate import solve_ivp
+
+    motion = solve_ivp(rates, (0.0, 3.0), begin, method="LSODA", rtol=1e-8, atol=1e-10 * fastest)
+    given = [dict(zip(states, map(float, line), strict=True)) for line in motion.y[:-1].T]
+    energy = np.array([scope.value(stored, given=each)[0] for each in given])
+    left = motion.y[-1] + energy[0] - energy
+    worst, size = float(left.min()), float(np.max(np.abs(motion.y[-1])))
+    sentence = f"it gave {-worst:.6g} J more than its states stored, of {size:.6g} J that went through it"
+    hint = "F v ≥ dU/dt must hold along every motion, with U(z) = elastic()"
+    findings.holds("passivity of its memory", worst >= -1e-6 * size, sentence, hint)
 
 
 def _tangent(findings: Findings, loss: Loss, rate: float) -> None:

@@ -287,7 +287,15 @@ WRONG = {
         lambda s, h: Law(contact=Closing(height(s)), push=1.0, drags=[Drag(s.named("p.x.rate") ** 2, 1.0)]),
         "the velocity of its friction is not linear",
     ),
-    "state": ("penalty", lambda s, h: Law(contact=Closing(height(s)), push=s.state("a", "b", 0.0)), "no first-order"),
+    "state": (
+        "penalty", lambda s, h: Law(contact=Closing(height(s)), push=s.state("stop", "b", 0.0)), "'stop.b' has no rate",
+    ),
+    "state in a gap": (
+        "penalty",
+        lambda s, h: Law(contact=Closing(s.state("stop", "b", 0.0)), push=1.0),
+        "its gap depends on states",
+    ),
+    "rates": ("bilateral", lambda s, h: Law([Equation(height(s))], rates=[1.0]), "must be pairs (state, its rate)"),
     "held for ever": ("bilateral", lambda s, h: Law([Equation(height(s) - h([height(s)])[0])]), "never closes"),
     "gap that nothing moves": (
         "penalty", lambda s, h: Law(contact=Closing(s.tape.lift(1.0)), push=1.0), "the same whatever the motion",
@@ -301,6 +309,6 @@ def test_a_law_that_is_not_what_its_kind_promises_is_refused_by_name(kind, law, 
     ball = mbd.PointMass("ball", 1.0)
     model.connect(mbd.Translation("p", model.ground.origin, ball.origin))
     model.constrain(Saying("stop", kind, law))
-    with pytest.raises(mbd.ModelError, match="'stop'") as refused:
+    with pytest.raises(mbd.ModelError, match="'stop") as refused:
         mbd.assemble(model)
     assert said in str(refused.value)

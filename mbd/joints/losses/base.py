@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from mbd.bodies.algebra import derivatives_at
 from mbd.bodies.domains import Domain, at_least_zero
-from mbd.bodies.promises import scalar
+from mbd.bodies.promises import called, scalar, title_of
 from mbd.errors import ModelError
 from mbd.scope import Scope
-from mbd.tape.node import Scalar
+from mbd.tape.node import Node, Scalar
 
-__all__ = ["DissipationFunction", "Loss", "LossSum", "loss_of"]
+__all__ = ["DissipationFunction", "Loss", "LossSum", "StateRates", "loss_of", "rates_of", "without_states"]
 
 DISSIPATES = at_least_zero("is negative, so it would feed energy in; give a value ≥ 0")
 """The domain of a coefficient of friction or damping."""
+
+
+StateRates: TypeAlias = "Sequence[tuple[Node, Scalar]]"
+"""(z, ż) of first-order states."""
 
 
 class Loss(ABC):
@@ -25,6 +29,9 @@ class Loss(ABC):
 
     F is positive on the left-hand side of ``M a + f + Bᵀλ = 0``: the mechanism feels −F. Losses add with ``+``.
     A new loss is a frozen dataclass that gives `force`, or a `DissipationFunction` that gives D(v).
+
+    A loss with memory has first-order states z, asked for by ``scope.state(owner, field, initial)``: `force` may
+    depend on them, `rates` gives ż, and `elastic` the energy U(z) that they store, with ``F v ≥ U̇``.
     """
 
     @abstractmethod
@@ -57,6 +64,19 @@ class Loss(ABC):
     def sliding(self, load: Scalar, speed: Scalar, scope: Scope, owner: str) -> Scalar:
         """What `dry` becomes at a speed ≥ 0 [m/s or rad/s] of sliding; it tends to `dry` as that falls to zero."""
         return self.dry(load, scope, owner)
+
+    def rates(self, rate: Scalar, scope: Scope, owner: str) -> StateRates:
+        """(z, ż) of its first-order states at a rate v [m/s or rad/s]; none for a loss without memory."""
+        return ()
+
+    def elastic(self, scope: Scope, owner: str) -> Scalar:
+        """Energy U(z) that its states store and that it can give back [J]."""
+        return 0.0
+
+    @property
+    def has_states(self) -> bool:
+        """Whether it has first-order states."""
+        return type(self).rates is not Loss.rates
 
     @property
     def smooth(self) -> Loss | None:
@@ -138,6 +158,19 @@ class LossSum(Loss):
         """The same at a speed."""
         return self._sum(owner, lambda name, loss: loss.sliding(load, speed, scope, name))
 
+    def rates(self, rate: Scalar, scope: Scope, owner: str) -> StateRates:
+        """The states of its parts."""
+        return [pair for name, loss in self.named(owner) for pair in loss.rates(rate, scope, name)]
+
+    def elastic(self, scope: Scope, owner: str) -> Scalar:
+        """What its parts store."""
+        return self._sum(owner, lambda name, loss: loss.elastic(scope, name))
+
+    @property
+    def has_states(self) -> bool:
+        """Whether one of its parts does."""
+        return any(loss.has_states for loss in self.losses)
+
     def _sum(self, owner: str, part: Callable[[str, Loss], Scalar]) -> Scalar:
         result: Scalar = 0.0
         for name, loss in self.named(owner):
@@ -165,6 +198,29 @@ class LossSum(Loss):
 
 def _parts(loss: Loss) -> tuple[Loss, ...]:
     return loss.losses if isinstance(loss, LossSum) else (loss,)
+
+
+def rates_of(loss: Loss, rate: Scalar, scope: Scope, owner: str) -> StateRates:
+    """What ``loss.rates`` returns, or a `ModelError` of what that should be."""
+    call = f"rates(rate, scope, {owner!r})"
+    given: StateRates = called(loss, "rates", call, rate, scope, owner)
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    if not several or not all(isinstance(pair, Sequence) and len(pair) == 2 for pair in given):
+        raise ModelError(f"{title_of(loss)}: {call} must return pairs (state, its rate), got {given!r}")
+    return given
+
+
+def without_states(loss: Loss, what: str, instead: str) -> Loss:
+    """The same loss, where its states have no place an error that says what to give `instead`.
+
+    Raises
+    ------
+    ModelError
+        for a loss with first-order states.
+    """
+    if loss.has_states:
+        raise ModelError(f"{what}: {loss!r} has a state of its own, which one velocity bends; {instead}")
+    return loss
 
 
 def loss_of(value: Any, owner: str) -> Loss | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbd.errors import ModelError
-from mbd.joints.losses.base import Loss
+from mbd.joints.losses.base import Loss, StateRates
 from mbd.scope import Scope
 from mbd.tape.functions import maximum, minimum
 from mbd.tape.node import Scalar
@@ -55,6 +55,24 @@ class Valves(Loss):
         ahead, back = maximum(rate, 0.0), minimum(rate, 0.0)
         sides: tuple[Loss, Loss] = (self.forward, self.backward)
         return sides[0].force(ahead, scope, f"{owner}.forward") + sides[1].force(back, scope, f"{owner}.backward")
+
+    def rates(self, rate: Scalar, scope: Scope, owner: str) -> StateRates:
+        """The states of both, each bent by the motion in its direction."""
+        ahead, back = maximum(rate, 0.0), minimum(rate, 0.0)
+        sides: tuple[Loss, Loss] = (self.forward, self.backward)
+        return [
+            *sides[0].rates(ahead, scope, f"{owner}.forward"), *sides[1].rates(back, scope, f"{owner}.backward"),
+        ]  # fmt: skip
+
+    def elastic(self, scope: Scope, owner: str) -> Scalar:
+        """What both store."""
+        sides: tuple[Loss, Loss] = (self.forward, self.backward)
+        return sides[0].elastic(scope, f"{owner}.forward") + sides[1].elastic(scope, f"{owner}.backward")
+
+    @property
+    def has_states(self) -> bool:
+        """Whether one of both does."""
+        return any(loss.has_states for loss in self.parts().values())
 
     def fields(self) -> dict[str, float]:
         """Those of both: 'backward.coefficient', 'forward.coefficient'."""
