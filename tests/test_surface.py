@@ -89,7 +89,7 @@ def test_editors_and_type_checkers_see_the_same_names():
     tree = ast.parse(Path(mbd.__file__).read_text())
     block = next(node for node in tree.body if isinstance(node, ast.If))
     seen = {(alias.name, alias.asname, node.module) for node in block.body for alias in node.names}
-    wanted = {(name, name, mbd._HOME[name]) for name in NAMES}
+    wanted = {(name, name, mbd._HOME[name]) for name in NAMES} | {(name, name, "mbd") for name in ("parts", "testing")}
     assert seen == wanted, f"mbd/__init__.py imports for type checkers what it lists; these differ: {seen ^ wanted}"
 
 
