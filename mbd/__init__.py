@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         PenaltyParameters as PenaltyParameters,
         Plane as Plane,
         Rolling as Rolling,
+        SampledLaw as SampledLaw,
         Transition as Transition,
         Unilateral as Unilateral,
         When as When,
@@ -192,7 +193,7 @@ _HOMES = {
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Ball Bilateral Controller Event KnifeEdge Mode Nonholonomic Penalty PenaltyParameters Plane "
-    "Rolling Transition Unilateral When cone disk_touchdown distance extension flexion height measure "
+    "Rolling SampledLaw Transition Unilateral When cone disk_touchdown distance extension flexion height measure "
     "penalty_parameters profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.laboratory.balance_result": "InverseDynamics",

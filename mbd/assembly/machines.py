@@ -11,11 +11,10 @@ __all__ = ["first_anchors", "store_first"]
 
 
 def first_anchors(mechanism: Mechanism) -> Vector:
-    """Anchors of which machines hold the states that they start in, and zeros elsewhere."""
+    """Anchors of which machines hold what they do before a start, and zeros elsewhere."""
     anchors = np.zeros(mechanism.layout.n_anchors)
     for machine in mechanism.equations.machines:
-        for anchor, value in zip(machine.anchors, machine.initial, strict=True):
-            anchors[anchor] = 0.0 if value is None else value
+        anchors[list(machine.anchors)] = machine.initial
     return anchors
 
 
@@ -26,6 +25,4 @@ def store_first(mechanism: Mechanism, time: float, q: Vector, y: Vector, paramet
         return
     captured = mechanism.acceleration_terms(time, q, y, parameters, anchors).captured
     for machine in machines:
-        for anchor, value in zip(machine.anchors, machine.initial, strict=True):
-            if value is None:
-                anchors[anchor] = captured[anchor]
+        anchors[list(machine.first)] = captured[list(machine.first)]

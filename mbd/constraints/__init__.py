@@ -17,6 +17,7 @@ from mbd.constraints.penalty_parameters import PenaltyParameters, penalty_parame
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.rolling_touchdown import profile_touchdown, rolling_touchdown
 from mbd.constraints.rules import When
+from mbd.constraints.sampled_law import SampledLaw
 from mbd.constraints.sphere_touchdown import sphere_touchdown
 from mbd.constraints.surfaces import Plane
 from mbd.constraints.touchdown import touchdown
@@ -26,9 +27,8 @@ from mbd.constraints.user_measure import measure
 
 __all__ = [
     "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law",
-    "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "Transition", "Unilateral",
-    "VelocityConstraint",
-    "When", "cone", "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
-    "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown",
-    "twist",
+    "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "SampledLaw", "Transition",
+    "Unilateral", "VelocityConstraint", "When", "cone", "disk_touchdown", "distance", "extension", "flexion", "height",
+    "measure", "penalty_parameters", "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown",
+    "touchdown", "twist",
 ]  # fmt: skip

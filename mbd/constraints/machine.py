@@ -77,8 +77,11 @@ class Machine(Constraint):
         return ()
 
     @abstractmethod
-    def initial(self) -> tuple[float | None, ...]:
-        """What it holds at the start; None for what it stores then."""
+    def initial(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        """What it holds before the start, at which it stores `first_values`; instants are that of the start.
+
+        values : of the model's parameters
+        """
 
     @property
     @abstractmethod

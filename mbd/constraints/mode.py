@@ -222,9 +222,9 @@ class Mode(Machine):
         """When its state began."""
         return (SINCE,)
 
-    def initial(self) -> tuple[float | None, ...]:
-        """The state that it starts in; the rest is stored then."""
-        return (float(self.states.index(str(self.start))), *(None for _ in self.fields[1:]))
+    def initial(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        """The state that it starts in."""
+        return (float(self.states.index(str(self.start))), *(0.0 for _ in self.fields[1:]))
 
     def quantities(self, scope: Scope, held: Sequence[Node]) -> Mapping[str, Scalar]:
         """Its state, the time in it, what it remembers, and its parameters."""

@@ -107,7 +107,9 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     always = [*model.bilaterals, *model.nonholonomic]
     constraints = laws(scope, dynamics, joints, always, model.contacts, model.events, gathered, written=written)
     with gathered.catch():
-        constraints.take_machines(*machine_guards(scope, model.machines, model.contacts, model.events))
+        constraints.take_machines(
+            *machine_guards(scope, model.machines, model.contacts, model.events, model.parameters)
+        )
     rests: list[Node] = []
     with gathered.catch():
         rests = state_balance(scope, [*(pair for cause in found for pair in cause.rates), *constraints.rates])

@@ -223,7 +223,7 @@ class Machine:
 
     states : their names; anchors : the numbers that it holds, that of the state first; fields : their names
     times : which of these anchors are instants [s]
-    initial : what they are at the start, None for what is stored then
+    initial : what they are before the start; first : those that are stored then
     captured : what is stored into each anchor, on the tape; the anchor itself where nothing is
     """
 
@@ -232,7 +232,8 @@ class Machine:
     anchors: tuple[int, ...]
     fields: tuple[str, ...]
     times: tuple[int, ...]
-    initial: tuple[float | None, ...]
+    initial: tuple[float, ...]
+    first: tuple[int, ...]
     captured: tuple[Node, ...]
 
 

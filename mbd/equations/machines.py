@@ -62,9 +62,15 @@ def declare_machines(scope: DerivationScope, words: Sequence[Machine], quantitie
 
 
 def machine_guards(
-    scope: DerivationScope, words: Sequence[Machine], contacts: Sequence[Constraint], events: Sequence[Event]
+    scope: DerivationScope,
+    words: Sequence[Machine],
+    contacts: Sequence[Constraint],
+    events: Sequence[Event],
+    values: Mapping[str, float],
 ) -> tuple[list[records.Machine], list[Guard]]:
     """The machines, and their changes as guards behind those of users' events.
+
+    values : of the model's parameters
 
     Raises
     ------
@@ -75,9 +81,8 @@ def machine_guards(
     changes = [(m, change) for m, word in enumerate(words) for change in word.changes(scope, held[word.name])]
     causes = _Causes(words, contacts, events, changes)
     machines, guards, faults = list[records.Machine](), list[Guard](), list[str]()
-    stored: list[dict[int, Node]] = [
-        {k: scope.real(value) for k, value in word.first_values(scope, held[word.name]).items()} for word in words
-    ]
+    first = [word.first_values(scope, held[word.name]) for word in words]
+    stored: list[dict[int, Node]] = [{k: scope.real(value) for k, value in each.items()} for each in first]
     for number, (m, change) in enumerate(changes):
         title = f"'{change.name}'"
         for k, value in change.stored.items():
@@ -113,7 +118,7 @@ def machine_guards(
                 )
         machines.append(records.Machine(
             word.name, word.state_names, tuple(node.data[1] for node in own), word.fields,
-            tuple(own[k].data[1] for k in word.times), word.initial(),
+            tuple(own[k].data[1] for k in word.times), word.initial(values), tuple(own[k].data[1] for k in first[m]),
             tuple(stored[m].get(k, node) for k, node in enumerate(own)),
         ))  # fmt: skip
     if faults:

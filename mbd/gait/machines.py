@@ -25,6 +25,7 @@ __all__ = [
     "image_faults",
     "in_state",
     "images",
+    "instants_stored",
     "remembered",
     "state_anchors",
     "stored_by",
@@ -62,6 +63,26 @@ def times_since(equations: Equations) -> set[int]:
     tape = equations.tape
     instants = [anchor for machine in equations.machines for anchor in machine.times]
     return {tape.sub(tape.input("t"), tape.input("anchor", anchor)).index for anchor in instants}
+
+
+def instants_stored(equations: Equations) -> list[Node]:
+    """What machines store into instants, where that is the time, or so much later."""
+    found = [
+        node for machine in equations.machines for anchor, node in zip(machine.anchors, machine.captured, strict=True)
+        if anchor in machine.times
+    ]  # fmt: skip
+    return [node for node in found if _counts_from_now(node)]
+
+
+def _counts_from_now(node: Node) -> bool:
+    if node.op == "add":
+        one, other = (_has_time(each) for each in node.args)
+        return one != other and all(_counts_from_now(each) for each in node.args if _has_time(each))
+    return bool(node.op == "input" and node.data[0] == "t")
+
+
+def _has_time(node: Node) -> bool:
+    return any(each.op == "input" and each.data[0] == "t" for each in live([node]))
 
 
 def remembered(equations: Equations) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.constraints.expressions import is_expression
 from mbd.equations import programs
 from mbd.equations.equations import Equations
-from mbd.gait.machines import in_state, times_since
+from mbd.gait.machines import in_state, instants_stored, times_since
 from mbd.tape.derivatives import jvps, live
 
 __all__ = ["depends_on_time", "moving_on", "reset_names"]
@@ -136,8 +136,7 @@ def depends_on_time(mechanism: Mechanism) -> bool:
     known = equations.memory.get("depends on time")
     if known is None:
         with equations.tape.lock:
-            first = equations.tape.input("t").index  # as an instant that machines store it begins at 0 again
-            stored = {node.index for machine in equations.machines for node in machine.captured if node.index == first}
+            stored = {node.index for node in instants_stored(equations)}  # they begin at 0 again
             outputs = [node for node in programs.accelerations(equations) if node.index not in stored]
             given = times_since(equations)
             live_nodes = live([*outputs, *programs.guards(equations)], given)

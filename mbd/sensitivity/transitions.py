@@ -13,6 +13,9 @@ from mbd.sensitivity.programs import Programs
 
 __all__ = ["stored_at_start", "with_transitions"]
 
+ROUND_OFF = 1e-12
+"""Difference of what a start holds from what it stores, relative, which two programs may make of one expression [-]."""
+
 
 def with_transitions(programs: Programs, motion: Motion, mode: Mode, events: Sequence[EventRecord]) -> Motion:
     """The motion with what machines store by the transitions among some events, in their order.
@@ -44,9 +47,13 @@ def stored_at_start(programs: Programs, motion: Motion, mode: Mode) -> Motion:
     if not machines:
         return motion
     zero = np.zeros(programs.columns.n), np.zeros(programs.columns.rows)
-    values, slopes = programs.stored(motion.at(mode, *zero))
-    of_anchors, count = motion.tangent.anchors.copy(), len(values)
-    fresh = np.flatnonzero(values == motion.anchors[:count])
-    fresh = np.setdiff1d(fresh, [machine.anchors[0] for machine in machines])
+    before, first = motion.anchors.copy(), [anchor for machine in machines for anchor in machine.first]
+    for machine in machines:
+        before[list(machine.anchors)] = machine.initial
+        before[list(machine.times)] = motion.t
+    values, slopes = programs.stored(replace(motion, anchors=before).at(mode, *zero))
+    of_anchors = motion.tangent.anchors.copy()
+    apart = np.abs(values[first] - motion.anchors[first])
+    fresh = np.array(first, dtype=int)[apart <= ROUND_OFF * np.maximum(1.0, np.abs(values[first]))]
     of_anchors[fresh] = slopes[fresh] @ motion.tangent.stacked(programs.columns)
     return motion.with_tangent(anchors=of_anchors)

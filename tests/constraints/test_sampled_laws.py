@@ -1,0 +1,157 @@
+"""Sampled feedback: difference equations, hold, delay and resolution against an integration beside it; gaits of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import mbd
+from mbd.errors import ModelError
+
+PERIOD, INERTIA, END = 0.01, 0.11, 0.505
+
+
+def law(q: Any, v: Any, total: Any) -> Any:
+    return -60.0 * (q - 1.0) - 6.0 * v - 20.0 * total
+
+
+def arm(**more: Any) -> tuple[mbd.Model, mbd.State]:
+    """A pendulum held up by a sampled PID."""
+    model = mbd.Model("arm")
+    rod = mbd.Link("rod", mass=2.0, length=0.4, center=0.2, inertia=0.03)
+    hinge = mbd.Revolute("hinge", model.ground.origin, rod.start)
+    model.connect(hinge)
+    model.apply(
+        mbd.Motor("motor", hinge, torque=0.5),
+        mbd.SampledLaw(
+            "PID", PERIOD, {"motor.torque": law}, arguments=("hinge.angle", "hinge.rate", "PID.sum"),
+            states={"sum": lambda q, v, total: total + PERIOD * (q - 1.0)}, **more,
+        ),
+    )  # fmt: skip
+    return model, mbd.assemble(model, {"hinge.angle": 0.2})
+
+
+def oracle(delay: float = 0.0, resolution: float = 0.0) -> tuple[float, float, float, float]:
+    """The same by scipy at 1e-13 between the instants: q, v, sum and torque at the end."""
+    t, y, total, torque, sample, coming = 0.0, np.array([0.2, 0.0]), 0.0, 0.5, 0, list[tuple[float, float]]()
+    while t < END:
+        while coming and coming[0][0] <= t + 1e-12:
+            torque = coming.pop(0)[1]
+        if abs(t - PERIOD * sample) < 1e-12:
+            q = resolution * np.floor(y[0] / resolution + 0.5) if resolution else y[0]
+            computed, total, sample = law(q, y[1], total), total + PERIOD * (q - 1.0), sample + 1
+            if delay:
+                coming.append((t + delay, computed))
+            else:
+                torque = computed
+        after = min([PERIOD * sample, END, *(instant for instant, _ in coming)])
+
+        def rate(t: float, y: Any, u: float = torque) -> list[float]:
+            return [y[1], (u - 2.0 * 9.81 * 0.2 * np.sin(y[0])) / INERTIA]
+
+        y = solve_ivp(rate, (t, after), y, rtol=1e-13, atol=1e-14, method="DOP853").y[:, -1]
+        t = after
+    return float(y[0]), float(y[1]), total, torque
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004, 0.01, 0.02, 0.023])
+@pytest.mark.parametrize("backend", ["auto", "python"])
+def test_samples_are_held_and_late_as_in_an_integration_beside_it(delay: float, backend: str) -> None:
+    model, start = arm(delay=delay)
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=PERIOD, until=END, backend=backend)
+    found = [run[name][-1] for name in ("hinge.angle", "hinge.rate", "PID.sum", "motor.torque")]
+    np.testing.assert_allclose(found, oracle(delay), rtol=1e-9, atol=1e-11)
+    samples = [event.time for event in run.events if event.name == "PID: sample"]
+    np.testing.assert_allclose(samples, PERIOD * np.arange(1, 51), rtol=0.0, atol=1e-15)
+
+
+def test_values_are_rounded_to_their_resolution() -> None:
+    model, start = arm(resolution={"hinge.angle": 0.01})
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=PERIOD, until=END)
+    np.testing.assert_allclose([run.final.q[0], run.final.v[0]], oracle(resolution=0.01)[:2], rtol=1e-9)
+    model, start = arm(resolution={"motor.torque": 0.5})
+    torque = mbd.simulate(model, start, mbd.RungeKutta853(), dt=PERIOD, until=END)["motor.torque"]
+    np.testing.assert_allclose(torque, 0.5 * np.round(torque / 0.5), atol=1e-12)
+
+
+def test_a_run_that_goes_on_samples_as_the_whole_one_to_the_bit() -> None:
+    model, start = arm(delay=0.013)
+    whole = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.004, until=0.3)
+    first = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.004, until=0.127)
+    second = mbd.simulate(model, first.final, mbd.RungeKutta853(), dt=0.004, until=0.3)
+    for name in ("q", "v", "anchors"):
+        np.testing.assert_array_equal(getattr(second.final, name), getattr(whole.final, name))
+
+
+def test_derivatives_go_through_samples() -> None:
+    model, start = arm(delay=0.0035)
+    names, of = ["hinge.angle", "PID.period", "PID.delay", "rod.mass"], ["hinge.angle", "hinge.rate", "PID.sum"]
+    found = mbd.sensitivities(model, start, mbd.RungeKutta853(), dt=PERIOD, until=0.105, wrt=names, of=of)
+
+    def ends(name: str, change: float) -> Any:
+        angle = 0.2 + (change if name == "hinge.angle" else 0.0)
+        values = {} if name == "hinge.angle" else {name: model.parameters[name] + change}
+        begun = mbd.assemble(model, {"hinge.angle": angle}, parameters=values)
+        run = mbd.simulate(model, begun, mbd.RungeKutta853(), dt=PERIOD, until=0.105, parameters=values)
+        return np.array([run[each][-1] for each in of])
+
+    for name in names:
+        h = 1e-5 if name.startswith("PID") else 1e-3
+        near, far = (ends(name, step) - ends(name, -step) for step in (h, 2.0 * h))
+        wanted = (8.0 * near - far) / (12.0 * h)
+        np.testing.assert_allclose([found[each, name] for each in of], wanted, rtol=2e-7, atol=1e-8)
+
+
+def test_an_output_of_its_own_is_a_quantity_and_samples_restart_with_a_contact() -> None:
+    model = mbd.Model("ball")
+    ball = mbd.PointMass("ball", mass=1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, ball.origin, axis="y")
+    model.connect(rail)
+    model.constrain(mbd.Unilateral("floor", mbd.height(ball.origin), restitution=0.8))
+    model.apply(
+        mbd.SampledLaw("brake", 0.1, {"u": lambda v: -0.5 * v}, arguments=("rail.rate",), restart_on="floor"),
+        mbd.Motor("drive", rail, force=lambda u: u, arguments=("brake.u",)),
+    )
+    start = mbd.assemble(model, {"rail.displacement": 1.0})
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.02, until=1.2)
+    struck = run.events[[event.name for event in run.events].index("floor")]
+    after = run.at(struck.time)
+    np.testing.assert_allclose(after["brake.u"], -0.5 * after["rail.rate"], rtol=1e-14)
+    nexts = [event.time for event in run.events if event.name == "brake: sample" and event.time > struck.time]
+    np.testing.assert_allclose(nexts[0], struck.time + 0.1, atol=1e-15)
+    model = model.without("brake")
+    model.apply(mbd.SampledLaw("brake", 0.1, {"u": lambda v: -0.5 * v}, arguments=("rail.rate",)))
+    with pytest.raises(ModelError, match="samples of 'brake' continue from one step to the next.*give restart_on="):
+        mbd.limit_cycle(model, mbd.assemble(model, {"rail.displacement": 1.0}), section="floor")
+
+
+L = mbd.SampledLaw
+
+
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: L("s", 0.0, {"u": law}), "period of SampledLaw 's', 0 s, is not positive"),
+    (lambda: L("s", 0.1, {"u": law}, delay=-0.1), "is negative"),
+    (lambda: L("s", 0.1, {}), "has no outputs"),
+    (lambda: L("s", 0.1, {"u": 3.0}), "'u' is given by 3.0; give a function"),
+    (lambda: L("s", 0.1, {"u": law}, start={"x": 1.0}), "no state named 'x'"),
+    (lambda: L("s", 0.1, {"u": law}, resolution={"x": 1.0}), "no output or argument named 'x'"),
+    (lambda: L("s", 0.1, {"u": law}, states={"u": law}), "'u' names two things"),
+])  # fmt: skip
+def test_bad_sampled_laws_are_errors_by_name(make: Any, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(("more", "message"), [
+    ({"outputs": {"motor.trque": law}}, "sets 'motor.trque'"),
+    ({"outputs": {"rod.mass": law}}, "which bodies are made of"),
+    ({"outputs": {"u": law}, "restart_on": "foot"}, "no contact, event or mode named 'foot'"),
+])  # fmt: skip
+def test_bad_names_of_sampled_laws_are_errors_at_build(more: Any, message: str) -> None:
+    model, _ = arm()
+    model.apply(L(**{"name": "s", "period": 0.1, "arguments": ("hinge.angle", "hinge.rate", "PID.sum"), **more}))
+    with pytest.raises(ModelError, match=message):
+        mbd.assemble(model, {"hinge.angle": 0.2})
