@@ -12,8 +12,8 @@ GROUPS = {
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Spherical Free Weld "
     "Viscous Quadratic Coulomb Stribeck AffineFriction PinFriction Tabulated Valves Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
-    "Nonholonomic Event Mode Transition SampledLaw Controller When touchdown rolling_touchdown profile_touchdown disk_touchdown "
-    "sphere_touchdown Plane Ball height flexion extension cone twist distance separation measure",
+    "Nonholonomic Event Mode Transition SampledLaw Controller When touchdown rolling_touchdown profile_touchdown "
+    "disk_touchdown sphere_touchdown Plane Ball height flexion extension cone twist distance separation measure",
     "Forces": "Spring Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Applied Potential Samples",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",

@@ -291,6 +291,15 @@ def _resets(equations: Equations, record: Any, rows: int) -> Any:
     """Where a user's event set values or a controller changed parameters, (R,) booleans."""
     found = np.zeros(rows, dtype=bool)
     setting = {guard.name for guard in equations.guards if guard.reset is not None}
+    if equations.machines:  # which may move what springs store their energy by
+        from mbd.tape.derivatives import live
+
+        with equations.tape.lock:
+            inputs = [node.data for node in live([equations.potential]) if node.op == "input"]
+        held = {number for kind, number in inputs if kind == "anchor"}
+        moved = {m for m, machine in enumerate(equations.machines) if held & set(machine.anchors)}
+        taken = ((guard.name, guard.transition) for guard in equations.guards)
+        setting |= {name for name, each in taken if each is not None and each.machine in moved}
     places = [event.row for event in record.events if event.kind == "event" and event.name in setting]
     places += [row for row, _ in record.parameter_changes if row < rows]
     found[places] = True

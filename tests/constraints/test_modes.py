@@ -109,6 +109,25 @@ def test_schemes_keep_their_order_across_transitions() -> None:
     assert np.all(np.abs(orders - 2.0) < 0.15), orders
 
 
+def test_energy_is_balanced_though_a_clutch_moves_what_a_spring_stores() -> None:
+    model = mbd.Model("clutch")
+    rod = mbd.Link("rod", mass=2.0, length=0.4, center=0.2, inertia=0.03)
+    hinge = mbd.Revolute("hinge", model.ground.origin, rod.start)
+    model.connect(hinge)
+    model.apply(
+        mbd.TorsionSpring("spring", hinge, stiffness=5.0, rest=0.3),
+        mbd.Mode("clutch", ("on", "off"), transitions=[
+            mbd.Transition("on", "off", when="hinge.rate", direction=1), mbd.Transition("off", "on", after=0.2),
+        ], sets={"spring.stiffness": {"off": 0.0}, "spring.rest": {"off": 0.8}}),
+    )  # fmt: skip
+    run = mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 1.0}), mbd.RungeKutta853(), dt=0.01, until=1.0)
+    assert len(run.events) >= 2
+    assert np.max(np.abs(run.energy.numerical)) < 1e-9
+    row = run.events[0].row
+    off = run["spring.energy"][row]
+    assert off == 0.0 < run["spring.energy"][row - 1]
+
+
 def test_a_run_that_goes_on_or_was_saved_is_the_same_to_the_bit(tmp_path: Any) -> None:
     model = knee()
     start = mbd.assemble(model, {"knee.angle": 0.8})
