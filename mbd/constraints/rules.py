@@ -21,7 +21,7 @@ class When:
 
     Parameters
     ----------
-    other : name of the other contact
+    other : name of the other contact; or the state of a mode, 'leg: flight', as which is entered this contact opens
     after_impact : False: it opens before the impact of the other and takes no impulse from it (McGeer's rule);
         True: it stays shut through the impact and opens after it
     may_pull : what happens before that where its force would pull. None: it holds as a latch does, and a note tells how

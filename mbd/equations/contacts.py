@@ -197,9 +197,11 @@ def _by_rows(
     condition = at.only_while
     gap = scope.tape.lift(at.gap)
     gap, rate = scope.views.real([gap, *scope.rates([gap])])
+    others = [rule for rule in at.releases if state_of(rule.other, scope.modes) is None]
     return Contact(
         word.name, word.kind, gap, rate, acting, tuple(holding.captured), holding.anchors, opens_on=at.opens_on,
-        when=tuple((rule.other, rule.after_impact) for rule in at.releases),
+        when=tuple((rule.other, rule.after_impact) for rule in others),
+        released_in=tuple(rule.other for rule in at.releases if rule not in others),
         only_while=_watched(condition, scope),
         restitution=at.restitution, unit=at.unit, may_pull=any(rule.may_pull for rule in at.releases), drags=drags,
         undefined=_undefined(word),

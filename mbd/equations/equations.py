@@ -109,6 +109,7 @@ class Contact:
     force : penalty force, ≥ 0 pushing; generalized : its contribution to f while it acts (length n_v + n_z)
     opens_on : 'pull' (multiplier or force would attract), 'gap' (penalty: g > 0 again) or 'when'
     when : (name of the other contact, after_impact) pairs that open it as the other closes
+    released_in : states of modes ('leg: flight') that open it as they are entered
     only_while : name of a contact that must be closed, or a node that must be positive, or None
     restitution : e of Newton's law
     unit : of the gap
@@ -137,6 +138,7 @@ class Contact:
     drags: tuple[tuple[str, Node, Node], ...] = ()
     is_velocity: bool = False
     undefined: str = ""
+    released_in: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -152,6 +152,11 @@ class ActiveSetManager:
             stored += [] if each is None else each.stored
             cause_starts.append(len(causes))
             store_starts.append(len(stored))
+        releases, release_starts = list[int](), [0]
+        for contact in self.contacts:
+            for name in contact.released_in:
+                releases += [begin["taken"] + e for e in self.instants.get(name, ())]
+            release_starts.append(len(releases))
         own = [(e, guard.transition) for e, guard in enumerate(self.guards)]
         return {
             "machine_start": [machine.anchors[0] for machine in self.machines],
@@ -162,5 +167,6 @@ class ActiveSetManager:
             "guard_timed": [int(each is not None and guard.is_timer) for guard, (_, each) in zip(
                 self.guards, own, strict=True)],
             "guard_contact": [-1 if each is None else each.contact for _, each in own],
+            "release_start": release_starts, "release_mark": releases,
             "cause_start": cause_starts, "cause_mark": causes, "store_start": store_starts, "store_anchor": stored,
         }  # fmt: skip

@@ -8,7 +8,7 @@ marks of the next one, until a round takes none.
 
 from __future__ import annotations
 
-from mbd.kernel.codes import ENDLESS_TRANSITIONS, EPS, LOG_EVENT
+from mbd.kernel.codes import ENDLESS_TRANSITIONS, EPS, LOG_EVENT, LOG_OPENED
 from mbd.kernel.contact_modes import NO_IMPULSE, log_event
 from mbd.kernel.guard_round_off import guard_round_off
 from mbd.kernel.guards import watch
@@ -81,6 +81,7 @@ def take_transitions(K: Switching) -> int:
         if K.n_rounds > MAX_ROUNDS:
             return ENDLESS_TRANSITIONS
         store_taken(K)
+        open_released(K)
         watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
     return 0
 
@@ -120,6 +121,16 @@ def store_taken(K: Switching) -> None:
         K.happened[2 * K.n_contacts + K.n_guards + e] = 1
     for e in range(K.n_guards):
         K.happened[2 * K.n_contacts + e] = 0
+
+
+def open_released(K: Switching) -> None:
+    """Open the contacts whose rule names a state that is entered now."""
+    for c in range(K.n_contacts):
+        for place in range(K.release_start[c], K.release_start[c + 1]):
+            if K.closed[c] == 1 and K.happened[K.release_mark[place]] == 1:
+                K.closed[c] = 0
+                K.armed[c] = 0
+                log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
 
 
 def settle_fresh(K: Switching) -> None:

@@ -255,6 +255,27 @@ def test_contacts_are_watched_only_in_a_state() -> None:
         mbd.assemble(model, {"rail.displacement": 0.5})
 
 
+def test_a_contact_opens_as_a_state_is_entered() -> None:
+    model, start = hopper()
+    ceiling = mbd.measure(lambda y: y - 0.1, "rail.displacement")
+    release = mbd.When("leg: flight")
+    model.constrain(mbd.Unilateral("latch", ceiling, only_while="leg: flight", release=release))
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=1.0)
+    assert [event.name for event in run.events] == ["latch"]  # which holds it above the floor, whatever its force
+    model = model.without("leg")
+    cycle = [mbd.Transition("wait", "flight", after=0.4), mbd.Transition("flight", "wait", when="rail.rate")]
+    model.constrain(mbd.Mode("leg", ("wait", "flight", "thrust"), transitions=[
+        *cycle, mbd.Transition("wait", "thrust", on="floor")], numbers={"push time": 0.1}))  # fmt: skip
+    model = model.without("latch")
+    model.constrain(mbd.Unilateral("latch", ceiling, release=release))
+    start = mbd.assemble(model, {"rail.displacement": 0.1 + 0.5 * G * 0.3**2})
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.5)
+    wanted = [(0.3, "latch", "closed"), (0.4, "leg: wait to flight", "event"), (0.4, "latch", "opened")]
+    assert [event[1:] for event in wanted] == [(event.name, event.kind) for event in run.events[:3]]
+    np.testing.assert_allclose([event.time for event in run.events[:3]], [time for time, _, _ in wanted], atol=1e-12)
+    assert run.final["rail.displacement"] < 0.1 - 0.4 * G * 0.1**2
+
+
 T = mbd.Transition
 
 

@@ -78,6 +78,8 @@ class Events(SchemeAbilities):
     guard_contact: Integers = integers()  # that must be closed for it, −1 for none
     cause_start: Integers = integers()  # what makes a transition happen
     cause_mark: Integers = integers()
+    release_start: Integers = integers()  # transitions that open each contact
+    release_mark: Integers = integers()
     store_start: Integers = integers()  # anchors that are stored with it
     store_anchor: Integers = integers()
     happened: Integers = integers(lambda s: s.n_marks, kept=True)  # contacts closed, opened, guards crossed, taken
