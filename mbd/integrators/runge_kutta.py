@@ -116,7 +116,7 @@ class RungeKutta853(ExplicitRungeKutta):
     """The explicit Runge–Kutta scheme of order 8 with embedded error estimates of orders 5 and 3.
 
     See `ExplicitRungeKutta`; it takes twelve accelerations a step. It suits smooth motion and tight tolerances. Stiff
-    springs and dampers bound its step: with ω the largest frequency, ω dt < 6.
+    springs and dampers bound its step: with ω the largest frequency, ω dt < 5.96.
 
     It has no parameters: ``mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-9, until=10.0)``.
     """

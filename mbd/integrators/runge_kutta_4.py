@@ -18,7 +18,7 @@ class RungeKutta4(ExplicitRungeKutta):
 
     See `ExplicitRungeKutta`; it takes four accelerations a step, a third of those of `RungeKutta853`, and is the faster
     of the two where errors of about 1e-3 are small enough, as in pictures and searches. Stiff springs and dampers bound
-    its step: with ω the largest frequency, ω dt < 2.7.
+    its step: with ω the largest frequency, ω dt < 2.82.
 
     It has no parameters: ``mbd.simulate(model, start, mbd.RungeKutta4(), dt=0.005, until=10.0)``.
     """

@@ -2,47 +2,40 @@
 
 A step has found *a* solution of its equations, which need not be the motion: beyond a pole of the forces, or where a
 Newton iterate was thrown far away, there are others. A cheap look compares the estimated error of each rate with the
-rate. Where that is large, accelerations are asked for again, by two tests that stiff forces pass at any step:
+rate. Where that is large, accelerations are asked for again, by tests that implicit steps in stiff forces pass:
 
-- *growth*: the change D of (v, z) that the previous accelerations did not predict, and what accelerations a owe to it,
-  ``ζ = h D·M (a(y₁) − a(y₁ − D)) / D·M D``. A force that depends on time has ζ = 0, a stiff spring or damper ζ < 0,
-  ``v̇ = c v`` has ζ = c h: more than `GROWTH` grows by more than e in a step, which no scheme of order 2 follows;
+- *growth*: whether a change that was not predicted feeds itself (`growth`);
 - *gain*: along the way from the old to the new state the forces do at most the work W⁺ = Σ_i ∫ max(v_i (M a)_i, 0) dt.
-  Where more than half of the new kinetic energy is neither the old one nor that, it comes from nowhere.
+  Where more than half of the new kinetic energy is neither the old one nor that, it comes from nowhere;
+- *stability*: whether forces are so stiff along a change that was not predicted that an explicit step amplifies it.
 """
 
 from __future__ import annotations
 
 from mbd.kernel.candidate import carry
 from mbd.kernel.charts import whole_step
-from mbd.kernel.codes import COMPOSE, GAINED, LEAPT, NOT_FINITE, OUTGROWN
-from mbd.kernel.hooks import call, scheme_error
+from mbd.kernel.codes import GAINED, LEAPT, NOT_FINITE, OUTGROWN, UNSTABLE
+from mbd.kernel.growth import is_unstable, leave_rows_alone, note_unforeseen, outgrows
+from mbd.kernel.hooks import scheme_error
 from mbd.kernel.poles import leaps
-from mbd.kernel.records import Equations, Guards, Kernel, SchemeAbilities, Steps, Switching
+from mbd.kernel.records import Equations, Guards, Kernel, State, Steps, Switching
 from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import compose, consistent, evaluate, fill_block, stepping_rows
-from mbd.kernel.saddle import solve_rows
+from mbd.kernel.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.scales import still_energy
 from mbd.kernel.schemes.iteration import BENT, BYSTANDER, LOOK_TWICE, is_small
 
 __all__ = ["judge_change"]
 
-GROWTH = 0.8
-"""ζ in a whole step that the trapezoidal rule still follows; less where the error of a scheme is larger [-]."""
-TRAPEZOID = 1.0 / 12.0
-"""Constant of its error, in h³ times the rate of accelerations [-]."""
 COARSE = 0.2
 """Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
 UNEXPLAINED = 0.5
 """Part of the kinetic energy at the end of a step that may be neither old nor work of forces [-]."""
 LEAST_GAIN = 0.085
 """Energy of the change of velocities over the kinetic one below which less than `UNEXPLAINED` is new, (1 − √½)² [-]."""
-FEWEST = 1.0 / 4096.0
-"""Least part of D that is tried where accelerations are not finite at its other end [-]."""
 
 
 def judge_change(K: Kernel, h: float, t1: float) -> int:
-    """0 where the candidate may be a continuation of the motion, OUTGROWN, GAINED or LEAPT where it cannot."""
+    """0 where the candidate may be a continuation of the motion; OUTGROWN, UNSTABLE, GAINED or LEAPT elsewhere."""
     whole = whole_step(K)
     if K.turning_step > 0.0:
         whole = min(whole, K.turning_step)
@@ -94,8 +87,12 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     at_y = carry(K.q1, K.inside, 0, K.n_q, True)
     at_D = carry(K.y1, K.inside, at_y, K.n, True)
     status = 0
-    if rough_enough and outgrows(K, h, t1, stretch, at_y, at_D):
+    stiff = K.explicit == 1 and (rough_enough or may_amplify(K, h))
+    known = (rough_enough or stiff) and note_unforeseen(K, h, t1, at_y, at_D)
+    if rough_enough and known and outgrows(K, h, t1, stretch, at_y, at_D):
         status = OUTGROWN
+    elif stiff and known and is_unstable(K, h, t1, at_y, at_D):
+        status = UNSTABLE
     elif rough_enough and rough > COARSE and gains(K, h, t1, at_y, at_D):
         status = GAINED
     elif leaps(K, h, at_y):
@@ -117,6 +114,21 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
         K.failure_time = t1
         K.failure_step = h
     return status
+
+
+def may_amplify(K: State, h: float) -> bool:
+    """Whether rates have doubled, or changed as by forces too stiff for an explicit step: beyond its stability either.
+
+    An estimated error may vanish by chance where a step multiplies all that there is.
+    """
+    old = 0.0
+    new = 0.0
+    most = 0.0
+    for i in range(K.n_v):
+        old = max(old, abs(K.y[i]))
+        new = max(new, abs(K.y1[i]))
+        most = max(most, abs(K.rate1[i] - K.rate[i]))
+    return new > 2.0 * old or h * most > K.stability * new
 
 
 def uncertainty(K: Kernel, h: float, t1: float, at_D: int) -> float:
@@ -193,69 +205,6 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
         K.failure_index = who
         K.failure_size = worst
     return worst * cube
-
-
-def outgrows(K: Kernel, h: float, t1: float, stretch: float, at_y: int, at_D: int) -> bool:
-    """Whether the change that was not predicted feeds itself by more than `GROWTH`; (q₁, y₁) are in K.inside."""
-    n = K.n
-    if consistent(K, t1, K.q1, K.y1) != 0:
-        return False
-    for i in range(n):
-        K.trial_jump[i] = K.jump[i]  # as exact as can be: the step's own rates err by its tolerance
-        K.inside[at_D + i] = K.inside[at_y + i] - K.y[i] - h * (K.rate[i] + 0.5 * h * K.slope[i])
-    if K.n_active > 0:
-        leave_rows_alone(K, at_D)
-    part = 1.0
-    while part >= FEWEST:
-        for i in range(n):
-            K.y1[i] = K.inside[at_y + i] - part * K.inside[at_D + i]
-        if K.vector == 1:
-            for i in range(K.n_q):
-                K.q1[i] = K.inside[i] - 0.5 * h * part * K.inside[at_D + i]
-        else:
-            K.block[K.o_q : K.o_q + K.n_q] = K.inside[: K.n_q]
-            for i in range(K.n_v):
-                K.block[K.o_x + i] = -0.5 * h * part * K.inside[at_D + i]
-            call(K, COMPOSE, K.q1)
-        if consistent(K, t1, K.q1, K.y1) == 0:
-            moved = growth_between(K, h, stretch, part, at_D, 0, K.n_v)
-            states = growth_between(K, h, stretch, part, at_D, K.n_v, n)
-            K.unforeseen_change = max(moved, states)
-            return max(moved, states) > resolved_growth(K)
-        part *= 0.0625
-    return False
-
-
-def leave_rows_alone(K: Switching, at_D: int) -> None:
-    """Take from D what moves rows: no motion, but what index 3 leaves of velocities; K.acc is at the candidate."""
-    K.force[: K.n] = 0.0
-    for k in range(K.n_rows):
-        K.bias[k] = 0.0
-        for j in range(K.n):
-            K.bias[k] += K.acc[K.acc_B + k * K.n + j] * K.inside[at_D + j]
-    if solve_rows(K, stepping_rows(K), False) == 0:
-        for i in range(K.n):
-            K.inside[at_D + i] += K.jump[i]
-
-
-def resolved_growth(K: SchemeAbilities) -> float:
-    """`GROWTH`, less where the error of the scheme is larger than that of the trapezoidal rule."""
-    error = abs(K.error_constant)
-    return GROWTH * TRAPEZOID / error if error > TRAPEZOID else GROWTH
-
-
-def growth_between(K: Switching, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
-    """ζ of the module's text over some components, over a whole step; K.trial_jump has a(y₁), K.jump a(y₁ − part D)."""
-    fed = 0.0
-    size = 0.0
-    for i in range(first, last):
-        for j in range(first, last):
-            weight = K.inside[at_D + i] * K.acc[i * K.n + j]
-            fed += weight * (K.trial_jump[j] - K.jump[j])
-            size += weight * K.inside[at_D + j]
-    if size <= (2.0 * still_energy(K) if first < K.n_v else 0.0):  # in a mechanism at rest round-off feeds itself
-        return 0.0
-    return float(h * stretch * fed / (part * size))
 
 
 def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:

@@ -118,6 +118,7 @@ class SchemeAbilities(Settings):
     n_nodes: int
     look_twice: float
     error_constant: float
+    stability: float
     most_growth: float
     middle: float
     far_look: float

@@ -59,6 +59,7 @@ class Abilities:
         follows them at all (`resolution`); larger for schemes of high order, whose estimates are pessimistic
     error_constant : C of the local error C h³ d³q/dt³ of positions: `newmark_error` multiplies by it, and `resolution`
         allows less growth in a step where |C| > 1/12; 0 for schemes of higher order
+    stability : largest ω dt at which an explicit scheme is stable: `stability` refuses steps beyond it that are rough
     most_growth : factor from one step to the next where steps follow a tolerance (`control`); below the limit of
         stability of multistep schemes, such as 1 + √2 of BDF2
     singular_size : 1: where constraint Jacobians lose rank, steps are sized so that none has a node close by
@@ -77,6 +78,7 @@ class Abilities:
     stretches: int = 0
     look_twice: float = 0.01
     error_constant: float = 0.0
+    stability: float = np.inf
     most_growth: float = 2.0
     middle: float = 0.5
     far_look: float = 14.0
@@ -120,7 +122,6 @@ class Scheme:
     programs : the model code that steps call (`Stepper.add_mode`): 'mode': residual and tangent, factored here;
         'stepping': the same, factored in straight-line code where that pays, as `solve_step` takes it; 'explicit': none
         but accelerations, rows and their Jacobian
-    stability : largest ω dt at which it is stable, infinite for implicit schemes (a note of a failed run)
     memory : lengths of "stages" (work), "past_stages" (kept from step to step) and "tableau" by the sizes of the
         mechanism (`Stepper`); an array that is used without a length is refused as the kernel is built
     coefficients : what these arrays begin with
@@ -135,7 +136,6 @@ class Scheme:
     abilities: Abilities = Abilities()
     nodes: tuple[float, ...] = ()
     programs: Literal["mode", "stepping", "explicit"] = "mode"
-    stability: float = np.inf
     memory: Callable[[Kernel], dict[str, int]] = _nothing
     coefficients: Callable[[], dict[str, Vector]] = dict
 

@@ -378,19 +378,19 @@ def runge_kutta_accept(K: SingularSteps, h: float) -> None:
 
 
 def explicit_scheme(name: str, tableau: Tableau, middle: float, stability: float) -> Scheme:
-    """The entry of a formula; middle, stability : see `Abilities`, `Scheme`."""
+    """The entry of a formula; middle, stability : see `Abilities`."""
     return Scheme(
         name, runge_kutta_start, runge_kutta_step, runge_kutta_accept,
         abilities=Abilities(
-            explicit=1, estimates=1, singular_size=1, look_twice=0.1, most_growth=5.0, middle=middle
+            explicit=1, estimates=1, singular_size=1, look_twice=0.1, most_growth=5.0, middle=middle,
+            stability=stability,
         ),
         nodes=tuple(tableau.nodes),
         programs="explicit",
-        stability=stability,
         memory=lambda K: {"stages": (tableau.stages + 1) * (K.n_v + K.n), "tableau": len(tableau.flat())},
         coefficients=lambda: {"tableau": tableau.flat()},
     )  # fmt: skip
 
 
-SCHEME = explicit_scheme("runge-kutta", EIGHTH_ORDER, 0.46666666666666667, 6.0)
+SCHEME = explicit_scheme("runge-kutta", EIGHTH_ORDER, 0.46666666666666667, 5.96)
 """Its middle lies between the nodes at 1/3 and 3/5."""

@@ -23,5 +23,5 @@ FOURTH_ORDER = Tableau(
 )
 """Four stages."""
 
-SCHEME = explicit_scheme("runge-kutta-4", FOURTH_ORDER, 0.75, 2.7)
+SCHEME = explicit_scheme("runge-kutta-4", FOURTH_ORDER, 0.75, 2.828)
 """Its middle lies between the nodes at 1/2 and 1."""

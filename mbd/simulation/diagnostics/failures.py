@@ -122,7 +122,7 @@ def _what(
         return f"{_not_finite(stepper, places)}{closed}; nothing after the last accepted step is kept"
     if status in (codes.NOT_CONVERGED, codes.STAGNATED, codes.TOO_TIGHT):
         return _no_end(stepper, status, closed, rushing)
-    if status in (codes.OUTGROWN, codes.GAINED, codes.LEAPT):
+    if status in (codes.OUTGROWN, codes.GAINED, codes.LEAPT, codes.UNSTABLE):
         return _unresolved(stepper, status, closed)
     if status in (codes.SINGULAR, codes.TOO_NEAR):
         return f"the Newton matrix is singular at {_unknown(stepper)}{closed}; {_why_singular(stepper)}"
@@ -223,6 +223,12 @@ def _unresolved(stepper: Stepper, status: int, closed: str) -> str:
             f"{change}, by forces that grow with the motion: in a step of dt a change that nothing predicted grows by "
             f"{growth:.2g} of itself. dt does not resolve the motion, or a force lets it run away; try a smaller dt, "
             f"such as {0.1 * dt / max(growth, 1.0):.1g} s"
+        )
+    if status == codes.UNSTABLE:
+        scheme, limit = type(stepper.integrator).__name__, stepper.own.abilities.stability
+        return (
+            f"{change}, by forces that are stiff there: ω dt = {growth:.3g}, but {scheme} is stable up to {limit:g}; "
+            "beyond that errors grow from step to step; use a smaller dt, tol= or mbd.RadauIIA()"
         )
     if status == codes.LEAPT:
         return (

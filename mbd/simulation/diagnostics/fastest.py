@@ -113,9 +113,9 @@ def stability(run: RunData, record: Record) -> str:
     if run.kernel.n > LARGEST:
         return "; steps of an explicit scheme may be above its limit of stability: try dt/4, tol=, or mbd.RadauIIA()"
     rate = fastest(run, record, sane_rows(run))
-    if rate * run.dt <= run.stepper.own.stability:
+    if rate * run.dt <= run.stepper.own.abilities.stability:
         return ""
     return (
         f"; its fastest motion has {rate:.3g} rad/s, where an explicit scheme is stable for dt below "
-        f"{run.stepper.own.stability / rate:.2g} s only: use less, tol=, or mbd.RadauIIA()"
+        f"{run.stepper.own.abilities.stability / rate:.2g} s only: use less, tol=, or mbd.RadauIIA()"
     )

@@ -19,6 +19,7 @@ STEP_FAILURES = frozenset(
         codes.NOT_FINITE, codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.DEPENDENT, codes.CONFLICT,
         codes.NO_LOCATION, codes.TOO_TIGHT,
         codes.TOO_NEAR, codes.TOO_SMALL, codes.SINGULAR_ROWS_MOVE, codes.OUTGROWN, codes.GAINED, codes.LEAPT,
+        codes.UNSTABLE,
     }
 )  # fmt: skip
 """What steps fail with next to such a limit."""

@@ -29,7 +29,7 @@ def bounded_by_stability(run: RunData, record: Record) -> list[str]:
     died away. |s| is the spectral radius of the equations of motion ẋ = f(x), found by the power method from
     differences of f (Hairer & Wanner, Solving Ordinary Differential Equations II, IV.2), when the run is over.
     """
-    limit, steps = run.stepper.own.stability, int(run.kernel.n_steps)
+    limit, steps = run.stepper.own.abilities.stability, int(run.kernel.n_steps)
     if not (run.kernel.explicit and run.kernel.adaptive) or steps < MANY or len(record.time) < 3:
         return []
     sizes = np.diff(record.time) * (len(record.time) - 1) / steps  # some rows may not be stored
