@@ -131,7 +131,9 @@ if TYPE_CHECKING:
         Valves as Valves,
         Viscous as Viscous,
     )
+    from mbd.laboratory.assignment import assign_plates as assign_plates
     from mbd.laboratory.balance_result import InverseDynamics as InverseDynamics
+    from mbd.laboratory.force_plate import ForcePlate as ForcePlate
     from mbd.laboratory.inverse_dynamics import inverse_dynamics as inverse_dynamics
     from mbd.laboratory.inverse_kinematics import inverse_kinematics as inverse_kinematics
     from mbd.laboratory.kinematics_result import InverseKinematics as InverseKinematics
@@ -196,6 +198,8 @@ _HOMES = {
     "Rolling SampledLaw Transition Unilateral When cone disk_touchdown distance extension flexion height measure "
     "penalty_parameters profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
+    "mbd.laboratory.assignment": "assign_plates",
+    "mbd.laboratory.force_plate": "ForcePlate",
     "mbd.laboratory.balance_result": "InverseDynamics",
     "mbd.laboratory.inverse_dynamics": "inverse_dynamics",
     "mbd.laboratory.inverse_kinematics": "inverse_kinematics",

@@ -22,6 +22,7 @@ UPPER = mbd.Link("upper", mass=1.0, length=1.0, center=0.5, inertia=0.1)
 HINGE = mbd.Revolute("hinge", MODEL.ground.origin, UPPER.start)
 MODEL.connect(HINGE)
 START = mbd.assemble(MODEL, position={"hinge.angle": 0.3}, backend="python")
+PLATE = mbd.PlateRecord.at("plate 1", [0.0, 0.1], [(0.0, 50.0, 0.0)] * 2, [(0.0, 0.0, 0.0)] * 2)
 ORIGIN, END, ANGLE = MODEL.ground.origin, UPPER.end, mbd.flexion(HINGE)
 
 KICK = {"pivot.angle.rate": 2.0}
@@ -109,6 +110,10 @@ OWN: dict[tuple[str, str], Any] = {
     ("rolling_touchdown", "center"): END, ("disk_touchdown", "center"): END,
     ("sphere_touchdown", "center"): END, ("Ball", "center"): END,
     ("disk_touchdown", "axis"): (0.0, 0.0, 1.0),
+    ("ForcePlate", "recording"): PLATE, ("ForcePlate", "during"): None, ("ForcePlate", "threshold"): 10.0,
+    ("ForcePlate", "foot"): END, ("assign_plates", "recording"): mbd.Recording([0.0, 0.1], plates=(PLATE,)),
+    ("assign_plates", "motion"): mbd.simulate(MODEL, START, dt=0.1, until=0.1, backend="python"),
+    ("assign_plates", "feet"): [END], ("assign_plates", "threshold"): 20.0,
     ("inverse_kinematics", "recording"): mbd.Recording([0.0], {"mark": [(1.0, 0.0, 0.0)]}),
     ("inverse_kinematics", "markers"): {"mark": END}, ("inverse_kinematics", "weights"): {"mark": 1.0},
     ("inverse_kinematics", "coordinates"): {"hinge.angle": [0.1]}, ("inverse_kinematics", "cutoff"): None,

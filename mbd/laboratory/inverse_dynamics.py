@@ -22,6 +22,7 @@ from mbd.joints.base import Joint
 from mbd.joints.free import Free
 from mbd.joints.planar import Planar
 from mbd.laboratory.balance_result import InverseDynamics
+from mbd.laboratory.force_plate import ForcePlate, all_plates, loaded_model, wrenches
 from mbd.laboratory.least_norm import balanced
 from mbd.laboratory.motion import Motion, motion_of, parameters_of, record_of
 from mbd.results.columns import ModelColumns
@@ -38,6 +39,7 @@ def inverse_dynamics(
     motion: Any,
     joints: Sequence[str] | None = None,
     *,
+    plates: Sequence[ForcePlate] = (),
     parameters: Mapping[str, float] | None = None,
     backend: str = "auto",
 ) -> InverseDynamics:
@@ -65,6 +67,8 @@ def inverse_dynamics(
         ('left hip.angle.rate'), coordinates that closed loops determine may be left out
     joints : names of the joints that are driven; by default all but those with which a body floats over the ground
         (`Free`, in the plane `Planar`)
+    plates : force plates with the feet that stand on them, in the place of all contacts (`mbd.ForcePlate`,
+        `mbd.assign_plates`)
     parameters : values that differ from those of the model
     backend : 'auto', 'llvm' or 'python'
 
@@ -89,10 +93,20 @@ def inverse_dynamics(
     """
     if faults := named_number_faults(parameters, "parameters"):
         raise ModelError(faults)
-    mechanism = mechanism_of(model, backend, parameters)
-    found = motion_of(model, mechanism, motion, parameters or {})
-    values = parameters_of(mechanism, found, parameters or {}, model)
-    return dynamics_of(model, mechanism, found, values, joints)
+    plates = all_plates(plates)
+    loaded = loaded_model(model, plates)
+    mechanism = mechanism_of(loaded, backend, parameters)
+    found = motion_of(loaded, mechanism, motion, parameters or {})
+    if plates:
+        found = replace(found, run=None)
+    values = parameters_of(mechanism, found, parameters or {}, loaded)
+    if plates:
+        values = np.tile(values, (len(found.time), 1))
+        places = {each.name: k for k, each in enumerate(mechanism.equations.parameters)}
+        for name, column in wrenches(plates, found.time).items():
+            if name in places:  # those that push sideways are in no equation of the plane
+                values[:, places[name]] = column
+    return dynamics_of(loaded, mechanism, found, values, joints, outside=[plate.name for plate in plates])
 
 
 def dynamics_of(

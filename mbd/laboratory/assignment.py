@@ -1,0 +1,102 @@
+"""Which foot stood on which plate, by where and when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbd.bodies.base import Frame
+from mbd.bodies.values import number, shown
+from mbd.errors import ModelError
+from mbd.laboratory.force_plate import ForcePlate
+from mbd.laboratory.recording import LOADED, PlateRecord, Recording
+from mbd.notes import doubt, note
+
+__all__ = ["assign_plates"]
+
+REACH = 0.35
+"""Farthest that a center of pressure lies from a point of the foot that stands there, along the ground [m]."""
+BRIEF = 0.03
+"""Loads that last less are taken for noise [s]."""
+
+
+def assign_plates(
+    motion: Any, recording: Recording, feet: Sequence[Frame], threshold: float = 20.0
+) -> tuple[ForcePlate, ...]:
+    """Force plates with the feet that stood on them.
+
+    Each span in which a plate is loaded belongs to the foot whose point is nearest to the center of pressure, on
+    average over the span. What was found is logged, as ``plate 1 from 0.21 to 0.93 s: left foot``. Spans in which two
+    feet take turns, or none is near, are doubted by a warning: a plate under two feet at once cannot be told apart.
+
+    Parameters
+    ----------
+    motion : the result of `mbd.inverse_kinematics`, or a run
+    recording : with the plates
+    feet : a point of each foot, near its middle
+    threshold : vertical force below which a plate counts as unloaded [N]
+
+    Raises
+    ------
+    ModelError
+        where the recording has no plate, or no foot is given.
+    """
+    number(threshold, "threshold of assign_plates")
+    if not hasattr(motion, "time") or not hasattr(motion, "names"):
+        raise ModelError(
+            f"assign_plates: motion is what mbd.inverse_kinematics gives, or a run; got {shown(motion)[:80]}"
+        )
+    if not isinstance(recording, Recording) or not recording.plates:
+        raise ModelError(f"assign_plates: a recording with force plates is expected, got {shown(recording)[:80]}")
+    if not isinstance(feet, list | tuple) or not feet or not all(isinstance(foot, Frame) for foot in feet):
+        raise ModelError(f"assign_plates: feet are points such as [left.origin, right.origin], got {shown(feet)[:80]}")
+    found: list[ForcePlate] = []
+    for plate in recording.plates:
+        spans = _loaded(plate, threshold)
+        owners: dict[int, list[tuple[float, float]]] = {}
+        for first, last in spans:
+            distance = _distances(motion, plate, feet, first, last)
+            mean = np.nanmean(distance, axis=1)
+            best = int(np.argmin(mean))
+            title = f"{plate.name} from {first:.3g} to {last:.3g} s"
+            if mean[best] > REACH:
+                doubt(f"{title}: no foot is nearer than {mean[best]:.2g} m to the center of pressure; left out")
+                continue
+            nearest = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=0)
+            other = float(np.mean(nearest != best))
+            if other > 0.2:
+                doubt(
+                    f"{title}: another foot than {feet[best].body.name!r} is nearer during {100 * other:.0f} % of it; "
+                    "two feet on one plate cannot be told apart"
+                )
+            note(f"{title}: {feet[best].body.name!r}")
+            owners.setdefault(best, []).append((first, last))
+        for best, own in owners.items():
+            name = f"{plate.name} {feet[best].body.name}"
+            found.append(ForcePlate(name, feet[best], plate, during=own, threshold=threshold))
+    return tuple(found)
+
+
+def _loaded(plate: PlateRecord, threshold: float) -> list[tuple[float, float]]:
+    acts = np.concatenate([[0], (plate.force[:, 1] > max(threshold, LOADED * 0.1)).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(acts))
+    spans = [(float(plate.time[a]), float(plate.time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [(a, b) for a, b in spans if b - a >= BRIEF]
+
+
+def _distances(
+    motion: Any, plate: PlateRecord, feet: Sequence[Frame], first: float, last: float
+) -> NDArray[np.float64]:
+    """Distances along the ground (feet, frames) between points of feet and the center of pressure within a span."""
+    time = np.asarray(motion.time)
+    inside = (time >= first) & (time <= last)
+    if not inside.any():
+        inside[int(np.argmin(np.abs(time - 0.5 * (first + last))))] = True
+    center = plate.center()
+    seen = np.isfinite(center).all(axis=1)
+    x, z = (np.interp(time[inside], plate.time[seen], center[seen, k]) for k in (0, 2))
+    places = [motion[foot.full_name][inside] for foot in feet]
+    return np.array([np.hypot(place[:, 0] - x, place[:, 2] - z) for place in places])
