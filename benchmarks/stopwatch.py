@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import thread_time
 
-from mbd.kernel import build
+from mbd.kernel import entry
 
 __all__ = ["Stopwatch", "kernel_watched", "processor_seconds"]
 
@@ -39,10 +39,10 @@ class Stopwatch:
 @contextmanager
 def kernel_watched() -> Iterator[Stopwatch]:
     """While this lasts, every call of the compiled kernel is timed."""
-    watch, original = Stopwatch(), build.entry
+    watch, original = Stopwatch(), entry.entry
     timed = watch.around(original())
-    build.entry = lambda: timed  # type: ignore[assignment]
+    entry.entry = lambda: timed  # type: ignore[assignment]
     try:
         yield watch
     finally:
-        build.entry = original
+        entry.entry = original

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from mbd.later import register
+
 if TYPE_CHECKING:
     from mbd import parts as parts, testing as testing
     from mbd.analysis.accuracy import Accuracy as Accuracy, Known as Known, accuracy as accuracy
@@ -240,9 +242,41 @@ _HOMES = {
 }
 """The public names, by the module they live in; the block above tells the same to editors and type checkers."""
 
+_LATER = {
+    "Accuracy.page": "mbd.view.accuracy_page.write",
+    "Accuracy.plot": "mbd.view.accuracy.work_precision",
+    "Basin.plot": "mbd.view.basins.basin",
+    "Branch.plot": "mbd.view.gaits.branch",
+    "Criteria.plot": "mbd.view.spectra.spectra",
+    "Effects.page": "mbd.view.effects_page.write",
+    "Effects.plot": "mbd.view.effects.bars",
+    "Fit.plot": "mbd.view.fits.fitted",
+    "GaitReport.page": "mbd.view.gait_report.write",
+    "GaitReport.plot": "mbd.view.gait_report.picture",
+    "Ledger.plot": "mbd.view.plots.energy",
+    "LimitCycle.plot": "mbd.view.gaits.cycle",
+    "Linearization.plot_modes": "mbd.view.modes.modes",
+    "PointCurve.plot": "mbd.view.gaits.point_curve",
+    "State.instant": "mbd.results.at_state.instant",
+    "State.keys": "mbd.results.at_state.answered",
+    "State.plot": "mbd.view.posture.drawn",
+    "State.result": "mbd.results.at_state.quantity",
+    "State.unit": "mbd.results.units.unit_of",
+    "Trajectory.animate": "mbd.view.animation.Animation",
+    "Trajectory.page": "mbd.view.page.write",
+    "Trajectory.plot": "mbd.view.plots.histories",
+    "Trajectory.sensitivities": "mbd.sensitivity.result.read",
+    "Trajectory.summary": "mbd.analysis.ending.summary",
+    "simulate: derivatives": "mbd.sensitivity.sensitivities.derivatives_of",
+    "simulate: inputs": "mbd.sensitivity.sensitivities.with_inputs",
+}
+"""Functions that methods of results call, by the method; see `mbd.later`."""
+
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
 
 __all__ = ["__version__", *_HOME]
+
+register(_LATER)
 
 
 if not TYPE_CHECKING:  # type checkers know the names above, and that there are no others

@@ -12,6 +12,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.later import later
 from mbd.notebook import table
 
 if TYPE_CHECKING:
@@ -152,21 +153,17 @@ class State:
 
     def _result(self, name: str) -> tuple[Any, Sequence[str]]:
         """What a run would tell of it, and names of results; nothing of a state that knows no model."""
-        from mbd.results.at_state import quantity
-
         run = self._instant() if isinstance(name, str) else None
-        return (None, ()) if run is None else (quantity(run, name), run.names)
+        return (None, ()) if run is None else (later("State.result")(run, name), run.names)
 
     def _instant(self) -> Any:
         """A run of this one row; None of a state that knows no model, or whose model was changed since."""
-        from mbd.results.at_state import instant
-
         known = _MODELS.get(self)
         model = known() if known is not None else None
         if model is None:
             return None
         try:
-            return instant(model, self)
+            return later("State.instant")(model, self)
         except ModelError:
             return None
 
@@ -175,10 +172,10 @@ class State:
 
         `names` are those of the coordinates alone, in the order of `q`.
         """
-        from mbd.results.at_state import answered
-
         run = self._instant()
-        return list(dict.fromkeys([*self.names, *self.velocity_names, *(answered(run) if run is not None else ())]))
+        return list(
+            dict.fromkeys([*self.names, *self.velocity_names, *(later("State.keys")(run) if run is not None else ())])
+        )
 
     _ipython_key_completions_ = keys
 
@@ -217,17 +214,15 @@ class State:
             without a model, for a state that is none of the model, for a mechanism without bodies, and for a view that
             is none.
         """
-        from mbd.view.posture import drawn
-
         known = _MODELS.get(self)
         of = model if model is not None else known() if known is not None else None
         if of is None:
             raise ModelError("this state does not know its model any more: give it, as in state.plot(model=model)")
-        return drawn(of, self, path, view)
+        axes: Axes = later("State.plot")(of, self, path, view)
+        return axes
 
     def _repr_html_(self) -> str:
-        from mbd.results.units import unit_of
-
+        unit_of = later("State.unit")
         title = f"State at t = {self.time:g} s, closed: {', '.join(sorted(self.mode.closed)) or 'none'}"
         rows = [
             (name, f"{value:.10g}", unit_of(name))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import shown
 from mbd.errors import TrajectoryError
+from mbd.later import later
 from mbd.notebook import Values, folded, table
 from mbd.results.columns import Columns, ModelColumns, gather
 from mbd.results.facts import Facts
@@ -213,12 +214,10 @@ class Trajectory:
     @cached_property
     def sensitivities(self) -> Any:
         """Derivatives of the final state and its instant, of a run by ``mbd.simulate(…, wrt=[…])``."""
-        from mbd.sensitivity.result import Sensitivities
-
         words = self.record.stats.get("sensitivities")
         if words is None:
             raise TrajectoryError("this run has no derivatives; give what they are by: mbd.simulate(…, wrt=[…])")
-        return Sensitivities.read(words, self)
+        return later("Trajectory.sensitivities")(words, self)
 
     @property
     def final(self) -> State:
@@ -253,9 +252,8 @@ class Trajectory:
 
         Contacts that are closed at the end are named. Of runs that fail the message says why.
         """
-        from mbd.analysis.ending import summary
-
-        return summary(self)
+        text: str = later("Trajectory.summary")(self)
+        return text
 
     # pictures and files -----------------------------------------------------------------------------------------
     def plot(self, *names: str, path: str | Path | None = None, degrees: bool = True) -> Figure:
@@ -265,15 +263,13 @@ class Trajectory:
         results are in radians whatever is drawn. Returns the matplotlib figure, also saved when a path is given: SVG
         follows the reader's light or dark page, others the paper of matplotlib's present style.
         """
-        from mbd.view.plots import histories
-
-        return histories(self, *names, path=path, degrees=degrees)
+        figure: Figure = later("Trajectory.plot")(self, *names, path=path, degrees=degrees)
+        return figure
 
     def page(self, path: str | Path) -> Path:
         """One self-contained HTML file with the animated mechanism, its contacts, energies and events."""
-        from mbd.view.page import write
-
-        return write(self, path)
+        written: Path = later("Trajectory.page")(self, path)
+        return written
 
     def save(self, path: str | Path, names: Sequence[str] | None = None) -> Path:
         """The run as one ``.npz`` file, with every named quantity (or those listed), readable without the model.
@@ -289,9 +285,7 @@ class Trajectory:
 
         Shown by Jupyter, VS Code and Colab without an extension; `page` writes the same as a file.
         """
-        from mbd.view.animation import Animation
-
-        return Animation(self, height)
+        return later("Trajectory.animate")(self, height)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """To another process it travels as the file that `save` writes."""

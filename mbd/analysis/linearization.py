@@ -16,6 +16,7 @@ from mbd.analysis.ports import Input, Output, port_terms
 from mbd.analysis.state_space import StateSpace
 from mbd.arrays import ComplexArray, Matrix, Vector
 from mbd.configuration import Configuration
+from mbd.later import later
 from mbd.notes import doubt
 
 if TYPE_CHECKING:
@@ -257,9 +258,8 @@ class Linearization:
 
     def plot_modes(self, path: str | Path | None = None, most: int = 6) -> Figure:
         """Mode shapes as bars, one panel for each of the `most` slowest motions that move a coordinate; the figure."""
-        from mbd.view.modes import modes
-
-        return modes(self, path, most)
+        figure: Figure = later("Linearization.plot_modes")(self, path, most)
+        return figure
 
     def __str__(self) -> str:
         from mbd.analysis.tables import linear_table

@@ -19,6 +19,7 @@ from mbd.analysis.spectrum import Spectrum, argument_faults, spectrum
 from mbd.arrays import Vector
 from mbd.errors import CapabilityError, ModelError
 from mbd.integrators.base import Integrator
+from mbd.later import later
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -147,9 +148,8 @@ def criteria(integrator: Integrator, damping: float = 0.0, turns: Sequence[float
 
 def plot(*found: Criteria, path: str | Path | None = None) -> Figure:
     """Spectral radius, algorithmic damping and period elongation of several integrators over ω dt; the figure."""
-    from mbd.view.spectra import spectra
-
-    return spectra(found, path)
+    figure: Figure = later("Criteria.plot")(found, path)
+    return figure
 
 
 def _spectra(integrator: Integrator, turns: Sequence[float], damping: float) -> tuple[Spectrum, ...]:

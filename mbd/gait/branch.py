@@ -20,6 +20,7 @@ from mbd.gait.map_derivative import Measured, map_derivative, measured
 from mbd.gait.margins import Margin, Margins, least_margins, margin_points, watched_feet
 from mbd.gait.special_points import KINDS, SpecialPoint, special_points
 from mbd.gait.switching import doubled
+from mbd.later import later
 from mbd.notebook import table
 
 if TYPE_CHECKING:
@@ -165,9 +166,8 @@ class Branch:
 
     def plot(self, path: str | Path | None = None, quantity: str = "speed") -> Figure:
         """A quantity of `columns` over the parameter: stable gaits solid, others dashed, special points marked."""
-        from mbd.view.gaits import branch as drawn
-
-        return drawn(self, quantity, path)
+        figure: Figure = later("Branch.plot")(self, quantity, path)
+        return figure
 
 
 def branch(

@@ -19,6 +19,7 @@ from mbd.gait.map_derivative import MapDerivative, Measured, measured
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart
+from mbd.later import later
 from mbd.notebook import table
 from mbd.sensitivity.tangent_names import place_names
 from mbd.simulation.simulate import simulate
@@ -276,9 +277,8 @@ class LimitCycle:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The cycle in the phase plane of each angle, and the multipliers beside the unit circle; the figure."""
-        from mbd.view.gaits import cycle
-
-        return cycle(self, path)
+        figure: Figure = later("LimitCycle.plot")(self, path)
+        return figure
 
 
 def _complex(value: complex) -> str:

@@ -20,6 +20,7 @@ from mbd.gait.derivatives import parameter_value
 from mbd.gait.limits import changed_events, limit_between
 from mbd.gait.margins import least_margins, watched_feet
 from mbd.gait.special_points import TESTS, SpecialPoint, polished
+from mbd.later import later
 from mbd.notebook import table
 
 if TYPE_CHECKING:
@@ -97,9 +98,8 @@ class PointCurve:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The first parameter over the second."""
-        from mbd.view.gaits import point_curve
-
-        return point_curve(self, path)
+        figure: Figure = later("PointCurve.plot")(self, path)
+        return figure
 
 
 def follow(branch: Any, point: Any, parameter: str, to: float, steps: int) -> PointCurve:

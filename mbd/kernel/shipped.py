@@ -13,6 +13,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from mbd.compile.host import Host, host
+from mbd.errors import CapabilityError
+from mbd.kernel import build
 
 __all__ = ["OBJECT", "is_suitable", "load", "write"]
 
@@ -48,22 +50,17 @@ def write() -> Path:
     CapabilityError
         on other machines than x86-64 under Linux, for whose kernels no place is known.
     """
-    from mbd.errors import CapabilityError
-    from mbd.kernel.build import compiled, kernel_text
-
     here = host()
     if not here.triple.startswith("x86_64") or "linux" not in here.triple:
         raise CapabilityError(f"the kernel of a wheel is built on x86-64 under Linux; this machine is {here.triple}")
-    code = compiled(kernel_text(), replace(here, cpu="x86-64-v3", features=""), 2)
+    code = build.compiled(build.kernel_text(), replace(here, cpu="x86-64-v3", features=""), 2)
     OBJECT.parent.mkdir(exist_ok=True)
     OBJECT.write_bytes(_sealed(code) + code)
     return OBJECT
 
 
 def _sealed(code: bytes) -> bytes:
-    from mbd.kernel.build import source_digest
-
-    return sha256(source_digest().encode() + code).digest()
+    return sha256(build.source_digest().encode() + code).digest()
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector, read_only
 from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.later import later
 from mbd.notebook import table
 
 if TYPE_CHECKING:
@@ -203,9 +204,8 @@ class Ledger:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The energies over time, and where they went; returns the matplotlib figure, saved if a path is given."""
-        from mbd.view.plots import energy
-
-        return energy(self, path=path)
+        figure: Figure = later("Ledger.plot")(self, path=path)
+        return figure
 
 
 def _number(value: float | None) -> str:

@@ -16,7 +16,7 @@ from mbd.trajectory import Trajectory
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["Sensitivities"]
+__all__ = ["Sensitivities", "read"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,3 +144,8 @@ def _place(name: str, names: tuple[str, ...], kind: str) -> int | list[int]:
             return parts
         raise UnknownNameError(nearest(name, names, kind, "There are"))
     return names.index(name)
+
+
+def read(words: Mapping[str, Any], run: Trajectory) -> Sensitivities:
+    """`Sensitivities.read`."""
+    return Sensitivities.read(words, run)

@@ -19,6 +19,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
+from mbd.later import later
 from mbd.notes import called_from_outside, doubt, is_heard, note
 from mbd.progress import run_bar
 from mbd.simulation.arguments import check_arguments, end_of
@@ -154,12 +155,10 @@ def _differentiable(
     model: Any, start: State, changed: Mapping[str, float], wrt: Any, options: dict[str, Any], controllers: Any
 ) -> tuple[Any, State]:
     """The model with what it is differentiated by as inputs, the start without memory; contacts by events."""
-    from mbd.sensitivity.sensitivities import with_inputs
-
     if options["contact"] == "nonsmooth" or options["store"] != 1 or options["locate"] != "root":
         raise CapabilityError("wrt= needs contact='events', locate='root' and store=1; leave these out")
     options["contact"] = "events"
-    model = with_inputs(model, options["backend"], changed, wrt, controllers)
+    model = later("simulate: inputs")(model, options["backend"], changed, wrt, controllers)
     if any(callable(rate) for each in wrt if not isinstance(each, str) for by in each.values() for rate in by.values()):
         raise ModelError("wrt takes rates of parameters here, such as 9.8; mbd.sensitivities(…, at=…) takes functions")
     return model, replace(start, memory=None)
@@ -167,10 +166,8 @@ def _differentiable(
 
 def _differentiate(run: Trajectory, wrt: Any, controllers: Sequence[Any]) -> None:
     """Give a run its derivatives."""
-    from mbd.sensitivity.sensitivities import derivatives_of
-
     try:
-        run.record.stats["sensitivities"] = derivatives_of(run, wrt, controllers=controllers).as_words()
+        run.record.stats["sensitivities"] = later("simulate: derivatives")(run, wrt, controllers=controllers).as_words()
     except CapabilityError as error:
         error.run = run
         raise

@@ -21,7 +21,7 @@ from mbd.compile.host import host
 from mbd.compile.ir import module
 from mbd.compile.llvm import Library, Machine, call, emit_object
 from mbd.compile.pieces import pieces
-from mbd.kernel.build import entry
+from mbd.kernel.entry import entry
 from mbd.simulation.run.stepper import Stepper
 from tests.compile.chains import chain
 from tests.compile.graphs import by_llvm, graphs, run

@@ -22,7 +22,7 @@ model = mbd.Model("pendulum")
 model.connect(mbd.Revolute("hinge", model.ground.origin, mbd.Link("rod", mass=1.0, length=1.0, center=0.5).start))
 start = mbd.assemble(model, position={"hinge.angle": 0.5})
 ends = [float(mbd.simulate(model, start, dt=1e-3, until=2.0)["hinge.angle"][-1])]
-from mbd.kernel.build import entry
+from mbd.kernel.entry import entry
 quick, limit = entry(), time.monotonic() + 300.0
 while entry() is quick and time.monotonic() < limit:
     time.sleep(0.1)

@@ -11,6 +11,7 @@ import pytest
 import mbd
 from mbd.errors import CapabilityError
 from mbd.kernel import build
+from mbd.kernel.entry import entry
 from mbd.kernel.schemes import contract
 from mbd.state import Mode, State
 from mbd.testing import check_scheme
@@ -25,9 +26,9 @@ def listed():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "object_of", partial(build.object_of, level=0))
         patch.setattr(contract, "SCHEMES", (*contract.SCHEMES, "tests.kernel.midpoint", "tests.kernel.bdf2"))
-        build.entry.cache_clear()
+        entry.cache_clear()
         yield
-    build.entry.cache_clear()
+    entry.cache_clear()
 
 
 def swing():

@@ -12,6 +12,7 @@ from mbd.analysis.accuracy.advice import advice
 from mbd.analysis.accuracy.points import Point
 from mbd.analysis.accuracy.published import Published
 from mbd.analysis.rows import Rows
+from mbd.later import later
 from mbd.notebook import paragraphs, table
 
 if TYPE_CHECKING:
@@ -130,15 +131,13 @@ class Accuracy(Rows):
 
         Returns the matplotlib figure, also saved when a path is given.
         """
-        from mbd.view.accuracy import work_precision
-
-        return work_precision(self, path)
+        figure: Figure = later("Accuracy.plot")(self, path)
+        return figure
 
     def page(self, path: str | Path) -> Path:
         """One self-contained HTML file: the plot for any quantity, with every point's figures, and the table."""
-        from mbd.view.accuracy_page import write
-
-        return write(self, path)
+        written: Path = later("Accuracy.page")(self, path)
+        return written
 
 
 def cells(point: Point) -> list[str]:

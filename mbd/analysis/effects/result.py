@@ -12,6 +12,7 @@ from mbd.analysis.effects.advice import advice
 from mbd.analysis.effects.contribution import Contribution, Together
 from mbd.analysis.rows import Rows
 from mbd.errors import UnknownNameError, nearest
+from mbd.later import later
 from mbd.notebook import folded, paragraphs, table
 
 if TYPE_CHECKING:
@@ -139,15 +140,13 @@ class Effects(Rows):
 
         Returns the matplotlib figure, also saved when a path is given.
         """
-        from mbd.view.effects import bars
-
-        return bars(self, path)
+        figure: Figure = later("Effects.plot")(self, path)
+        return figure
 
     def page(self, path: str | Path) -> Path:
         """One self-contained HTML file: bars for any output, sorted as one likes, with all figures, and the table."""
-        from mbd.view.effects_page import write
-
-        return write(self, path)
+        written: Path = later("Effects.page")(self, path)
+        return written
 
 
 def cells(each: Contribution) -> tuple[str, ...]:

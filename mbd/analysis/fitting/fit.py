@@ -16,6 +16,7 @@ from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
+from mbd.later import later
 from mbd.notebook import table
 from mbd.sensitivity.along import along
 from mbd.sensitivity.starts import unknown_name
@@ -87,9 +88,8 @@ class Fit:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Residuals over time, each in its own panel, beside measured and computed values; the figure."""
-        from mbd.view.fits import fitted
-
-        return fitted(self, path)
+        figure: Figure = later("Fit.plot")(self, path)
+        return figure
 
     def _lines(self) -> list[list[str]]:
         found = []

@@ -15,6 +15,7 @@ from mbd.analysis.gait_report.strides import Side, sides_of
 from mbd.analysis.gait_report.symmetry import symmetry_of
 from mbd.bodies.values import names_of, number, printable
 from mbd.errors import ModelError
+from mbd.later import later
 from mbd.notebook import table
 from mbd.results.archive import named_file, write_whole
 from mbd.results.opensim import write_storage
@@ -193,15 +194,13 @@ class GaitReport:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Curves of joints and ground over the stride and energies, as gait laboratories draw them."""
-        from mbd.view import gait_report as view
-
-        return view.picture(self, path)
+        figure: Figure = later("GaitReport.plot")(self, path)
+        return figure
 
     def page(self, path: str | Path) -> Path:
         """Write one self-contained page with tables and pictures."""
-        from mbd.view import gait_report as view
-
-        return view.write(self, path)
+        written: Path = later("GaitReport.page")(self, path)
+        return written
 
 
 def gait_report(

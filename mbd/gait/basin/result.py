@@ -17,6 +17,7 @@ from mbd.gait.basin.axes import Grid
 from mbd.gait.basin.balls import Ball
 from mbd.gait.basin.kinds import KINDS
 from mbd.gait.basin.walks import Decided
+from mbd.later import later
 from mbd.notebook import table
 from mbd.state import State
 
@@ -188,9 +189,8 @@ class Basin:
             raise ModelError(
                 f"a picture shows one or two axes, this grid has {len(self.shape)}; make a study of two of them"
             )
-        from mbd.view.basins import basin
-
-        return basin(self, path)
+        figure: Figure = later("Basin.plot")(self, path)
+        return figure
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{count} × {what}" for what, count in self.counts.items())

@@ -291,7 +291,7 @@ class Stepper:
             return int(march_many(self.kernel) if self.kernel.many else advance(self.kernel))
 
     def _advance_compiled(self) -> int:
-        from mbd.kernel.build import entry
+        from mbd.kernel.entry import entry
 
         if self._table is None or self._provisional:
             self._provisional = self.provisional  # before the addresses: whoever settles in between is looked at again
