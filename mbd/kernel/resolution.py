@@ -87,13 +87,15 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     at_y = carry(K.q1, K.inside, 0, K.n_q, True)
     at_D = carry(K.y1, K.inside, at_y, K.n, True)
     status = 0
-    stiff = K.explicit == 1 and (rough_enough or may_amplify(K, h))
+    coarse = rough_enough and rough > COARSE
+    # friction in a plane is stiff where it turns at a slow γ, for an instant only
+    stiff = K.explicit == 1 and K.n_cones == 0 and (coarse or may_amplify(K, h))
     known = (rough_enough or stiff) and note_unforeseen(K, h, t1, at_y, at_D)
     if rough_enough and known and outgrows(K, h, t1, stretch, at_y, at_D):
         status = OUTGROWN
     elif stiff and known and is_unstable(K, h, t1, at_y, at_D):
         status = UNSTABLE
-    elif rough_enough and rough > COARSE and gains(K, h, t1, at_y, at_D):
+    elif coarse and gains(K, h, t1, at_y, at_D):
         status = GAINED
     elif leaps(K, h, at_y):
         status = LEAPT

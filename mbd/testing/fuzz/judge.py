@@ -82,7 +82,8 @@ def _motion(found: Faults, run: mbd.Trajectory, told: Readings, smooth: bool) ->
     if tol and len(told) < FEW:
         return
     scheme, tied = run.settings["integrator"], bool(run.record.lam.shape[1])
-    uncertain, share = int(run.stats["singular_steps"]), steps.error_share(scheme)
+    jumps = sum("beyond half a turn" in str(note) for note in run.stats["notes"])  # of a torque within a step
+    uncertain, share = int(run.stats["singular_steps"]) + jumps, steps.error_share(scheme)
     steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share, tol)
 
 
