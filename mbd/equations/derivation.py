@@ -29,6 +29,7 @@ from mbd.equations.sizes import require_room
 from mbd.equations.solids import offer_solids, solids_of
 from mbd.equations.states import state_balance
 from mbd.equations.switching_times import table_faults
+from mbd.equations.whole_body import offer_whole_body
 from mbd.errors import ModelError
 from mbd.joints.reflected import signs_in_a_mirror
 from mbd.tape.derivatives import live
@@ -145,6 +146,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         return _derived(model, plan, seen)
     whole = work + _closed(scope, constraints)
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
+    offer_whole_body(outputs, scope, masses)
     offer_observations(outputs, scope, model.observations)
     offer_shapes(outputs, scope, model)
     if not plan.planar:
