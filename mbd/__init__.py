@@ -141,6 +141,7 @@ if TYPE_CHECKING:
     from mbd.laboratory.kinematics_result import InverseKinematics as InverseKinematics
     from mbd.laboratory.read import read as read
     from mbd.laboratory.recording import PlateRecord as PlateRecord, Recording as Recording
+    from mbd.laboratory.scale import scale as scale
     from mbd.lagrangian import Lagrangian as Lagrangian
     from mbd.model import Model as Model
     from mbd.optimization.optimize import optimize as optimize
@@ -208,6 +209,7 @@ _HOMES = {
     "mbd.laboratory.kinematics_result": "InverseKinematics",
     "mbd.laboratory.read": "read",
     "mbd.laboratory.recording": "PlateRecord Recording",
+    "mbd.laboratory.scale": "scale",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",

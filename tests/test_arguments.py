@@ -95,7 +95,7 @@ BESIDE = {
         mbd.limit_cycle, mbd.linearize,
         mbd.load, mbd.mobility, mbd.project, mbd.replay, mbd.sensitivities, mbd.simulate, mbd.sweep,
         mbd.branch, mbd.find_gait, mbd.optimize, mbd.inverse_dynamics, mbd.read,
-        mbd.inverse_kinematics, mbd.assign_plates, mbd.ForcePlate,
+        mbd.inverse_kinematics, mbd.assign_plates, mbd.ForcePlate, mbd.scale,
     ),
     "of numbers and traced values": (
         mbd.acos, mbd.asin, mbd.atan, mbd.atan2, mbd.clip, mbd.cos, mbd.cosh, mbd.exp, mbd.floor, mbd.hypot, mbd.log,

@@ -110,6 +110,8 @@ OWN: dict[tuple[str, str], Any] = {
     ("rolling_touchdown", "center"): END, ("disk_touchdown", "center"): END,
     ("sphere_touchdown", "center"): END, ("Ball", "center"): END,
     ("disk_touchdown", "axis"): (0.0, 0.0, 1.0),
+    ("scale", "person"): mbd.human(75.0, 1.8), ("scale", "lengths"): {"left thigh": 0.4},
+    ("scale", "recording"): None,
     ("ForcePlate", "recording"): PLATE, ("ForcePlate", "during"): None, ("ForcePlate", "threshold"): 10.0,
     ("ForcePlate", "foot"): END, ("assign_plates", "recording"): mbd.Recording([0.0, 0.1], plates=(PLATE,)),
     ("assign_plates", "motion"): mbd.simulate(MODEL, START, dt=0.1, until=0.1, backend="python"),

@@ -1,0 +1,69 @@
+"""A person scaled to a patient: lengths from markers, masses by the table, everything else in proportion."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+import mbd
+
+
+def test_segments_have_the_lengths_that_markers_show(caplog):
+    person = mbd.human(75.0, 1.80)
+    rng = np.random.default_rng(0)
+    hip = np.array([0.0, 0.9, -0.1]) + 0.001 * rng.normal(size=(40, 3))
+    static = mbd.Recording(
+        np.arange(40) / 100.0, {"LHIP": hip, "LKNE": hip - [0.0, 0.41, 0.0], "LANK": hip - [0.0, 0.80, 0.0]}
+    )
+    with caplog.at_level(logging.INFO, logger="mbd"):
+        patient = mbd.scale(
+            person, {"left thigh": ("LHIP", "LKNE"), "left shank": 0.39, "pelvis": 0.19}, static, mass=62.0
+        )
+    bodies = patient.bodies
+    assert bodies["left thigh"].length == pytest.approx(0.41) and bodies["right thigh"].length == pytest.approx(0.41)
+    assert bodies["right shank"].length == pytest.approx(0.39)
+    assert patient.mass == pytest.approx(62.0)
+    hips = [frame.offset[2] for frame in bodies["pelvis"].points.values() if frame.name.endswith("hip")]
+    assert abs(hips[0] - hips[1]) == pytest.approx(0.19)
+    said = " ".join(record.message for record in caplog.records)
+    assert "'right thigh' as 'left thigh'" in said and "'head' by the mean" in said
+
+
+def test_masses_are_shared_as_before_and_inertia_follows():
+    person = mbd.human(75.0, 1.80)
+    patient = mbd.scale(person, {"left shank": 1.1 * person.bodies["left shank"].length}, mass=90.0)
+    for name, body in person.bodies.items():
+        old, new = body.fields(), patient.bodies[name].fields()
+        assert new["mass"] == pytest.approx(1.2 * old["mass"])
+        for axis in ("xx", "yy", "zz"):
+            assert new[f"inertia.{axis}"] == pytest.approx(1.2 * 1.21 * old[f"inertia.{axis}"])
+
+
+def test_a_prosthesis_stays_as_it_is():
+    foot = mbd.RigidBody("right foot", mass=0.8, inertia=(0.001, 0.002, 0.002))
+    person = mbd.human(75.0, 1.80).replaced("right foot", foot)
+    patient = mbd.scale(person, {"left thigh": 0.45}, mass=70.0)
+    assert patient.bodies["right foot"] is foot and patient.mass == pytest.approx(70.0)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "more", "words"),
+    [
+        ({"left tigh": 0.4}, {}, "did you mean 'left thigh'"),
+        ({"left thigh": -0.4}, {}, "must be positive"),
+        ({"left thigh": ("A", "B")}, {}, "give the recording"),
+        ({"left thigh": ("A", "C")}, {"recording": mbd.Recording([0.0], {"A": [(0, 0, 0)], "B": [(0, 1, 0)]})}, "'C'"),
+        ({}, {}, "lengths must map"),
+        ({"left thigh": 0.4}, {"mass": -1.0}, "must be positive"),
+    ],
+)
+def test_what_does_not_fit_is_named(lengths, more, words):
+    with pytest.raises(mbd.ModelError, match=words):
+        mbd.scale(mbd.human(75.0, 1.80), lengths, **more)
+
+
+def test_lengths_in_millimeters_are_doubted():
+    with pytest.warns(mbd.MbdWarning, match="are the lengths in meters"):
+        mbd.scale(mbd.human(75.0, 1.80), {"left thigh": 430.0})
