@@ -27,8 +27,10 @@ __all__ = ["is_shortened", "part_end", "step_end", "tried_step"]
 
 SHORTEST = 0.1
 """Part of a step below which a failing step is not shortened any further [-]."""
+SHORTEST_TURN = 1e-3
+"""The same of a step that is too long for how friction in a plane turns with a slow γ [-]."""
 SHORTENING = 0.6180339887498949
-"""Golden ratio: what is left of a step whose Newton iteration failed, for the next try (at most five) [-].
+"""Golden ratio: what is left of a step whose Newton iteration failed, for the next try [-].
 
 No power of it is a simple fraction, so that tries do not meet a configuration that repeats with the grid again.
 """
@@ -124,7 +126,7 @@ def step_while_turning(K: Kernel, h: float) -> int:
 
     What it would do in a whole step of dt says nothing: soon γ is another, or nothing slides.
     """
-    shortest = SHORTEST * h
+    shortest = SHORTEST_TURN * h
     status = OUTGROWN
     if h > 0.999 * K.step:
         h *= SHORTENING

@@ -10,10 +10,17 @@ from __future__ import annotations
 from mbd.kernel.charts import find_chart_end
 from mbd.kernel.codes import PASSING
 from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
+from mbd.kernel.cones import HELD
 from mbd.kernel.mass_ratios import excuses_much, is_uneven
 from mbd.kernel.records import Balance, Kernel, Steps
 from mbd.kernel.restart import compose, consistent, fill_block, lower_to_step, measure_accepted, take_consistent
 from mbd.kernel.schemes.contract import Scheme
+from mbd.kernel.schemes.direction_continuation import (
+    FOLLOWS,
+    begin_continuation,
+    continue_directions,
+    wants_continuation,
+)
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
@@ -78,15 +85,26 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
     tangents = 0
-    while True:  # at most three times; called from one place, the iteration stays in one piece with the step
-        predict(K, h, t1, c_C, c_K)
+    hold = FOLLOWS
+    while True:  # called from one place, the iteration stays in one piece with the step
+        if hold == FOLLOWS or hold == HELD:
+            predict(K, h, t1, c_C, c_K)
         status = solve_step(K, h, t1, c_C, c_K, tangents)
-        if status == UNSOUND:
+        if status == UNSOUND and hold == FOLLOWS:
             tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search
+        elif hold == FOLLOWS and wants_continuation(K, status):
+            tangents = SEARCHED
+            hold = begin_continuation(K)
+        elif hold > 0.0:
+            hold = continue_directions(K, hold, status)
+            if status != 0:
+                return status
         elif not (status == 0 and K.scales_of_start == 1 and lower_to_step(K)):
             if status == 0 and K.driven == 1 and K.n_active > 0:
                 balance_end(K, t1)
             return status
+        else:
+            hold = FOLLOWS
 
 
 def balance_end(K: Balance, t1: float) -> None:

@@ -9,6 +9,7 @@ acceleration level, which makes them as accurate as positions and velocities.
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT
+from mbd.kernel.cones import HELD
 from mbd.kernel.records import Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.redundancy import sharing
 from mbd.kernel.restart import (
@@ -22,6 +23,12 @@ from mbd.kernel.restart import (
 from mbd.kernel.scales import ROUGH, add_force_floors
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
+from mbd.kernel.schemes.direction_continuation import (
+    FOLLOWS,
+    begin_continuation,
+    continue_directions,
+    wants_continuation,
+)
 from mbd.kernel.schemes.iteration import roughly, runs_away, weigh_by_accelerations
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
@@ -106,7 +113,17 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
     if m > 0 and spans_singularity(K, h):
         return singular_stages_step(K, h, t1)
     K.near_singular = 0
-    status = plain_step(K, h, t1, m)
+    hold = FOLLOWS
+    while True:
+        status = plain_step(K, h, t1, m, hold == FOLLOWS or hold == HELD)
+        if hold == FOLLOWS and wants_continuation(K, status):
+            hold = begin_continuation(K)
+        elif hold > 0.0:
+            hold = continue_directions(K, hold, status)
+            if status != 0:
+                break
+        else:
+            break
     if (
         (status == NOT_CONVERGED or status == STAGNATED or status == TOO_TIGHT)
         and m > 0
@@ -116,11 +133,12 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
     return status
 
 
-def plain_step(K: Kernel, h: float, t1: float, m: int) -> int:
-    """The same with one pair of matrices for all stages."""
+def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
+    """The same with one pair of matrices for all stages, from a prediction or from the stages that are there."""
     c = K.stages[MU_REAL] * h
     hold_block(K)
-    predict_stages(K, h, m)
+    if predicts:
+        predict_stages(K, h, m)
     tolerance = 1e-3 * K.tolerance
     before = 1e300
     left = 1e300  # the error where the last correction started
