@@ -3,11 +3,14 @@
 ``M w + force + R λ = 0`` with ``B w + bias = 0`` on held rows, ``0 ≤ B w + bias ⟂ −λ ≥ 0`` on contacts that may choose,
 ``|λ_T| ≤ limit`` where a friction sticks and ``λ_T = limit · sign`` where it slides along w.
 
-A semismooth Newton method: every contact and friction takes the branch of its law that the last solution asks for, and
-the linear equations of these branches are solved again (Alart & Curnier 1991; Hintermüller, Ito & Kunisch 2002). Where
-a set of branches returns, single changes follow, the worst first and then the first, which cannot cycle where the
-Delassus matrix is a P-matrix; then Lemke's method (`pivoting`), or of friction in a plane a method of cones
-(`cone_contacts`); at last every choice is tried while there are few. Non-smooth steps begin with the cones.
+1. A semismooth Newton method: every contact and friction takes the branch of its law that the last solution asks for,
+   and the linear equations of these branches are solved again (Alart & Curnier 1991; Hintermüller, Ito & Kunisch 2002).
+2. Where that does not end, all laws are solved together as one problem over cones (`cone_contacts`), and 1 goes on from
+   its branches; then only the branch that breaks its law most changes. Multipliers of least norm of dependent rows, by
+   which steps judge, may leave limits that other multipliers keep: then a friction slides that need not.
+3. In impacts, whose impulses nothing judges again, those of the cones stand where 2 finds none and no rows conflict.
+
+Non-smooth steps with friction in space begin with the cones.
 """
 
 from __future__ import annotations
@@ -16,33 +19,24 @@ from mbd.kernel.branches import is_on, solve_directed
 from mbd.kernel.codes import CONFLICT, NO_IMPACT
 from mbd.kernel.cone_contacts import solve_cones
 from mbd.kernel.cone_directions import misses, turn_directions
+from mbd.kernel.cone_problem import CONE_TOLERANCE
 from mbd.kernel.cones import aim, follows
-from mbd.kernel.pivoting import pivoted
-from mbd.kernel.records import (
-    Balance,
-    Complementarity,
-    ContactForces,
-    Contacts,
-    DependentRows,
-    Frictions,
-    Motion,
-)
+from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, DependentRows, Motion
 from mbd.kernel.restart import active_rows, refresh_scales
 from mbd.kernel.roots import sqrt
-from mbd.kernel.slide_guess import guess_slides
 
 __all__ = ["complementarity"]
 
-MOST_NEWTON = 12
-"""Changes of all branches at once before single ones follow [-]."""
-GUESSES = 3
-"""Changes of all branches from one look at all cones at once to the next [-]."""
+MAX_NEWTON = 12
+"""Changes of all branches at once before and after the solution over cones [-]."""
+MAX_SINGLE = 4
+"""Changes of the worst branch that follow, for each contact and friction [-]."""
+NEARLY_SOLVED = 0.1
+"""Part of the largest impulse that cones may miss laws by for their branches to be tried [-]."""
 ROUND_OFF = 1e-11
 """What multipliers and velocities or accelerations may miss of their laws, relative to their terms [-]."""
 SURE = 1e-6
 """The same for a friction that an event has found to slide: its acceleration is still round-off [-]."""
-MOST_CHOICES = 6561
-"""Sets of branches that are tried one after the other when nothing else has led to a solution [-]."""
 
 
 def complementarity(K: Balance, level: int) -> int:
@@ -52,50 +46,37 @@ def complementarity(K: Balance, level: int) -> int:
     K.loose = 2 a friction slides unless that is clearly wrong. Two that slide together choose as one.
     level 0: accelerations, force and bias are those of K.acc; 1: velocities, bias and impulses K.given are in place.
     """
-    choices = 0
-    sets = 1
-    for c in range(K.n_contacts):
-        if K.free[c] > 0:
-            choices += 1
-            sets = min(sets * 2, 2 * MOST_CHOICES)
-    for f in range(K.n_frictions):
-        if K.loose[f] > 0 and not follows(K, f):
-            choices += 1
-            sets = min(sets * 3, 2 * MOST_CHOICES)
     measure_free(K, level)
-    if K.n_cones > 0 and K.strategy == 1 and level < 2 and solve_cones(K, level) == 1:
+    if K.n_cones > 0 and K.strategy == 1 and level < 2 and solve_cones(K, level, CONE_TOLERANCE) == 1:
         return 0
-    nothing = NO_IMPACT
-    for attempt in range(4 * choices * min(choices, 16) + MOST_NEWTON + 16):
-        if attempt == MOST_NEWTON + 4 * min(choices, 4) + 8:
-            choose_at_once(K, level)
+    status = change_branches(K, level, 0)
+    if status == CONFLICT or status == NO_IMPACT:
+        solve_cones(K, level, NEARLY_SOLVED)  # else from the last branches
+        again = change_branches(K, level, MAX_SINGLE * (K.n_contacts + K.n_frictions))
+        if again != CONFLICT and again != NO_IMPACT:
+            return again
+        if level == 1 and status == NO_IMPACT and again == NO_IMPACT and solve_cones(K, level, CONE_TOLERANCE) == 1:
+            return 0
+        if again == CONFLICT:
+            return again
+    return status
+
+
+def change_branches(K: Balance, level: int, single: int) -> int:
+    """Solve, and change all branches that the solution contradicts, then up to `single` times the worst; a status.
+
+    Where that does not end: CONFLICT if held rows contradicted each other on the way, else NO_IMPACT.
+    """
+    failed = NO_IMPACT
+    for attempt in range(MAX_NEWTON + single):
         status = solve_branches(K, level)
         if status == CONFLICT:
-            nothing = CONFLICT  # what held rows contradict is said rather than that no forces were found
-        if status == CONFLICT and (give_way(K) == 1 or choose_at_once(K, level) == 1):
-            continue
-        if status != 0:
+            failed = CONFLICT
+            if give_way(K) == 0:
+                break
+        elif status != 0 or (change_all(K) if attempt < MAX_NEWTON else change_worst(K)) == 0:
             return status
-        if attempt < MOST_NEWTON:
-            if change_all(K) == 0:
-                return status
-            if K.n_cones > 1 and K.strategy == 0 and attempt % GUESSES == 0:
-                guess_slides(K, level)
-        elif change_one(K, attempt <= MOST_NEWTON + choices + 1) == 0:
-            return status
-    if sets > MOST_CHOICES:
-        return nothing
-    for number in range(sets):
-        choose(K, number)
-        status = solve_branches(K, level)
-        if status == 0 and worst(K, False) == 0:
-            return status
-    return nothing
-
-
-def choose_at_once(K: Balance, level: int) -> int:
-    """1 if a method that looks at all laws together has chosen the branches, 0 if it has not found any."""
-    return int(solve_cones(K, level) if K.n_cones > 0 else pivoted(K, level))
+    return failed
 
 
 def solve_branches(K: Balance, level: int) -> int:
@@ -233,57 +214,23 @@ def change_all(K: ContactForces) -> int:
     return count
 
 
-def worst(K: ContactForces, first: bool) -> int:
-    """1 + number of the contact or friction that must change (frictions after contacts), 0 if none."""
+def change_worst(K: ContactForces) -> int:
+    """The contact or friction that breaks its law most takes its other branch; 0 if none breaks it."""
     largest = largest_impulse(K)
-    found = 0
+    found = -1
     most = 0.0
     for place in range(K.n_contacts + K.n_frictions):
         f = place - K.n_contacts
         fault = 0.0
         if f < 0:
-            if K.free[place] > 0:
-                fault = contact_fault(K, place, largest)
+            fault = contact_fault(K, place, largest) if K.free[place] > 0 else 0.0
         elif K.loose[f] > 0 and is_on(K, f):
             fault = friction_fault(K, f, largest)
         if fault > most:
-            found = place + 1
-            if first:
-                return found
+            found = place
             most = fault
-    return found
-
-
-def change_one(K: ContactForces, the_worst: bool) -> int:
-    """One contact or friction takes its other branch; 0 if none needs to."""
-    place = worst(K, not the_worst)
-    if place == 0:
-        return 0
-    if place <= K.n_contacts:
-        toggle(K, place - 1)
-    else:
-        turn(K, place - 1 - K.n_contacts)
-    return 1
-
-
-def choose(K: Frictions, number: int) -> None:
-    """The set of branches of that number."""
-    for c in range(K.n_contacts):
-        if K.free[c] == 1:
-            K.active[c] = number % 2
-            number //= 2
-        elif K.free[c] == 2:
-            K.parting[c] = number % 2
-            number //= 2
-    for f in range(K.n_frictions):
-        if K.loose[f] > 0 and not follows(K, f):
-            branch = number % 3
-            number //= 3
-            K.sticks[f] = 1 if branch == 0 else 0
-            K.slip[f] = 0.0 if branch == 0 else (1.0 if branch == 1 else -1.0)
-            if K.partner[f] >= 0:
-                K.sticks[K.partner[f]] = K.sticks[f]
-                K.slip[K.partner[f]] = 0.0
-                if branch != 0:
-                    way = K.slip[f]
-                    aim(K, f, way * K.lean[f], way * K.lean[K.partner[f]])
+    if found >= K.n_contacts:
+        turn(K, found - K.n_contacts)
+    elif found >= 0:
+        toggle(K, found)
+    return found + 1

@@ -1,4 +1,4 @@
-"""Contacts with friction in space solved as one problem over cones: impulses over a step, or forces at an instant.
+"""Contacts and friction solved as one problem over cones: impulses over a step, or forces at an instant.
 
 Everything that may not choose is held, and with one solution of the held KKT matrix for each row that may,
 
@@ -11,12 +11,11 @@ smooth part included, so that what was closed may push less than it did there, b
 
 from __future__ import annotations
 
-from mbd.kernel.cone_problem import EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
+from mbd.kernel.cone_problem import CONE_TOLERANCE, EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
 from mbd.kernel.cones import aim
-from mbd.kernel.linear import solve
-from mbd.kernel.pivoting import factor_held
+from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Balance, ContactForces, Frictions
-from mbd.kernel.redundancy import find_dependence
+from mbd.kernel.redundancy import find_dependence, shared, sharing
 from mbd.kernel.restart import active_rows, evaluate, evaluate_loaded, limit_of, load_accelerations, stepping_rows
 from mbd.kernel.saddle import solve_at
 
@@ -26,10 +25,11 @@ STANDS = 1e-9
 """Velocity, as the impulse that would stop it over the largest impulse, below which nothing slides or parts [-]."""
 
 
-def solve_cones(K: Balance, level: int) -> int:
+def solve_cones(K: Balance, level: int, allowed: float) -> int:
     """1 if all that may choose obeys its law, with K.jump, K.impulse and branches in place; 0 if nothing was found.
 
-    Then everything is as it was. The levels, and what may choose, are those of `complementarity`.
+    Then everything is as it was. The levels, and what may choose, are those of `complementarity`; laws may be missed by
+    the part `allowed` of the largest impulse: `CONE_TOLERANCE`, or more where branches alone are asked for.
     """
     if K.loaded == 1:
         return 0
@@ -42,14 +42,15 @@ def solve_cones(K: Balance, level: int) -> int:
     held = load_held(K, level, count)
     if held >= 0:
         fill_cones(K, held, count)
-        status = cone_solve(
+        cone_solve(
             K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
             K.cone_work, K.cone_pivot,
         )  # fmt: skip
         residual = K.cone_work[0]
-        if status == 0 and take_impulses(K, level, count):
+        if residual <= allowed and take_impulses(K, level, count):
             take_cone_branches(K, level, count)
-            K.cone_residual = max(K.cone_residual, residual)
+            if residual <= CONE_TOLERANCE:
+                K.cone_residual = max(K.cone_residual, residual)
             return 1
     keep_branches(K, False)
     return 0
@@ -176,6 +177,35 @@ def load_held(K: Balance, level: int, count: int) -> int:
     return factor_held(K, level)
 
 
+def factor_held(K: Balance, level: int) -> int:
+    """The KKT matrix of all rows that act, in factors, and K.jump and K.impulse with it; how many rows, −1: none.
+
+    Rows that depend on others are not among them.
+    """
+    o_R = K.acc_R
+    m = active_rows(K, K.active)
+    K.n_dropped = 0
+    if solve_at(K, m, level) != 0:
+        return -1
+    held = 0
+    for k in range(m):
+        if K.n_dropped == 0 or K.dropped[K.rows[k]] == 0:
+            K.rows[held] = K.rows[k]
+            held += 1
+    n = K.n
+    size = n + held
+    together = sharing(K)
+    K.kkt[: size * size] = 0.0
+    for i in range(n):
+        K.kkt[i * size : i * size + n] = K.acc[i * n : i * n + n]
+        for k in range(held):
+            K.kkt[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
+            if together:
+                K.kkt[i * size + n + k] += shared(K, i, K.rows[k])
+            K.kkt[(n + k) * size + i] = K.acc[K.acc_B + K.rows[k] * n + i]
+    return held if factor(K.kkt, size, K.pivots) == 0 else -1
+
+
 def fill_cones(K: Balance, held: int, count: int) -> None:
     """G and shift, column by column, of unit impulses."""
     n = K.n
@@ -244,7 +274,7 @@ def take_friction(K: ContactForces, u: int, f: int, small: float, o_w: int, coun
     c = K.friction_contact[f]
     on = c < 0 or K.active[c] == 1
     slides = on and rho * (abs(own) + abs(other)) > small
-    K.sticks[f] = 1 if (on and not slides) else 0
+    K.sticks[f] = 0 if slides else 1  # that of a contact that parts begins stuck if it closes after all
     K.slip[f] = 0.0
     K.limit[f] = cone_limit(count, K.cone_found, K.cone_owner, K.cone_limit, K.cone_mu, K.cone_work, u)
     if p >= 0:
@@ -272,7 +302,7 @@ def all_hold(K: Balance, t1: float) -> bool:
     count = K.n_dropped
     K.cone_dropped[: K.n_rows] = K.dropped[: K.n_rows]
     evaluate(K, t1, K.q1, K.y1)
-    holds = solve_cones(K, 0) == 1
+    holds = solve_cones(K, 0, CONE_TOLERANCE) == 1
     K.n_dropped = count
     K.dropped[: K.n_rows] = K.cone_dropped[: K.n_rows]
     for c in range(K.n_contacts):

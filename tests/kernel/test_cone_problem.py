@@ -122,6 +122,71 @@ def test_held_contacts_may_pull_and_other_frictions_have_limits_of_their_own():
     assert np.allclose(z, [-2.0, 0.0, 0.7, 1.0, -9.0, 0.0, 0.0], atol=1e-13)
 
 
+def planar(normal, tangent, mu):
+    """Rows, owner, twin, limit and slope of contacts with friction along one direction."""
+    count = len(mu)
+    H = np.stack([normal, tangent], axis=1).reshape(2 * count, -1)
+    owner = [each for c in range(count) for each in (PUSH, 2 * c)]
+    return H, (owner, [-1] * (2 * count), np.zeros(2 * count), np.column_stack([np.zeros(count), mu]).ravel())
+
+
+def obeys_coulomb(z, w, mu, bound=1e-7):
+    """Signorini's and Coulomb's laws of contacts with friction along one direction."""
+    push, drag, gap, slip = z[::2], z[1::2], w[::2], w[1::2]
+    size = bound * (1.0 + np.abs(z).max() + np.abs(w).max())
+    assert np.all(push >= -size) and np.all(gap >= -size) and np.all(np.minimum(push, gap) <= size)
+    assert np.all(np.abs(drag) <= mu * push + size)
+    slides = np.abs(slip) > 30 * size
+    assert np.all(np.abs(drag + np.sign(slip) * mu * push)[slides] <= 30 * size)
+
+
+@settings(max_examples=20)
+@given(bodies=st.integers(1, 4), count=st.integers(2, 12), seed=seeds)
+def test_stacked_boxes_of_very_different_mass(bodies, count, seed):
+    """Contacts at the same few places of boxes one on the other: nearly all rows depend on each other."""
+    rng = np.random.default_rng(seed)
+    normal, tangent = np.zeros((count, 3 * bodies)), np.zeros((count, 3 * bodies))
+    for k in range(count):
+        x, first = rng.choice([-1.0, -0.5, 0.0, 0.5, 1.0]), 3 * rng.integers(0, bodies)
+        normal[k, first : first + 3], tangent[k, first : first + 3] = (0.0, 1.0, x), (1.0, 0.0, 0.5)
+        if first:
+            normal[k, first - 3 : first], tangent[k, first - 3 : first] = (0.0, -1.0, -x), (-1.0, 0.0, 0.5)
+    root_mass = 10.0 ** (0.5 * rng.integers(-2, 3, 3 * bodies))
+    mu = rng.choice([0.0, 0.3, 0.5, 1.0], count)
+    H, laws = planar(normal / root_mass, tangent / root_mass, mu)
+    shift = H @ (rng.choice([0.0, 1.0, -1.0, -0.5], 3 * bodies) * root_mass)
+    status, _, z = solved(compiled(), H @ H.T, shift, *laws)
+    assert status == 0
+    obeys_coulomb(z, H @ H.T @ z + shift, mu)
+
+
+@settings(max_examples=8)
+@given(seed=seeds)
+def test_a_box_of_fifteen_feet_on_three_degrees_of_freedom(seed):
+    """A rigid body in the plane, every foot at rest, pushed and pulled."""
+    rng = np.random.default_rng(seed)
+    feet = np.linspace(-1.0, 1.0, 15)
+    normal = np.column_stack([np.zeros(15), np.ones(15), 2.0 * feet])
+    tangent = np.column_stack([np.ones(15), np.zeros(15), np.full(15, 0.6)])
+    v = rng.choice([np.array([0.0, -1.0, 0.0]), np.array([0.2, -1.0, 0.0]), np.array([3.0, -1.0, 0.5])])
+    H, laws = planar(normal, tangent, np.full(15, 0.5))
+    status, _, z = solved(compiled(), H @ H.T, H @ v, *laws)
+    assert status == 0
+    obeys_coulomb(z, H @ H.T @ z + H @ v, 0.5)
+
+
+@settings(max_examples=30)
+@given(n=st.integers(1, 12), rank=st.integers(1, 12), seed=seeds)
+def test_stops_without_friction_complement_however_redundant(n, rank, seed):
+    rng = np.random.default_rng(seed)
+    H = np.abs(rng.normal(size=(n, rank)))
+    shift = H @ rng.choice([-1.0, 0.0, 0.5], rank)
+    status, _, z = solved(compiled(), H @ H.T, shift, [PUSH] * n, [-1] * n, np.zeros(n), np.zeros(n))
+    w = H @ H.T @ z + shift
+    size = 1e-8 * (1.0 + np.abs(z).max() + np.abs(shift).max())
+    assert status == 0 and np.all(z >= -size) and np.all(w >= -size) and np.all(np.minimum(z, w) <= size)
+
+
 def test_what_is_not_finite_or_has_no_solution_is_told():
     problem = cones([0.5])
     assert solved(compiled(), np.full((3, 3), np.nan), np.zeros(3), *problem)[0] == 1

@@ -35,10 +35,7 @@ class Sizes(Record):
     event_capacity: int
 
     n_kkt: int = formula(lambda s: s.n + s.n_rows)  # unknowns of balance and rows together
-    n_lcp: int = formula(
-        lambda s: (s.n_contacts + 3 * s.n_frictions) * (s.n_cones == 0)
-    )  # unknowns of the linear complementarity problem, of contacts in space those over cones
-    n_unknowns: int = formula(lambda s: s.n_rows * (s.n_cones > 0))
+    n_unknowns: int = formula(lambda s: s.n_rows * (s.n_contacts + s.n_frictions > 0))  # of a problem over cones
     n_discs: int = formula(lambda s: min(s.n_cones, 1) * (s.n_contacts + s.n_frictions))  # see `mbd.kernel.discs`
     n_disc_unknowns: int = formula(lambda s: min(s.n_cones, 1) * (s.n_rows + 1))
     n_tangent: int = formula(

@@ -38,15 +38,6 @@ class Complementarity(SchemeAbilities):
     past_limit: Reals = reals(lambda s: s.n_frictions)  # and largest frictions
     past_time: float = place("detail")  # that they cover
     n_repeats: int = place("state")  # of a non-smooth step
-    lcp_matrix: Reals = reals(lambda s: s.n_lcp * s.n_lcp)  # Lemke's method
-    lcp_shift: Reals = reals(lambda s: s.n_lcp)
-    lcp_found: Reals = reals(lambda s: s.n_lcp)
-    lcp_work: Reals = reals(lambda s: s.n_lcp * (2 * s.n_lcp + 4))
-    lcp_limit: Reals = reals(lambda s: s.n_frictions)
-    lcp_slope: Reals = reals(lambda s: s.n_frictions)
-    lcp_rows: Integers = integers(lambda s: s.n_contacts + s.n_frictions)
-    lcp_who: Integers = integers(lambda s: s.n_contacts + s.n_frictions)
-    lcp_basis: Integers = integers(lambda s: s.n_lcp)
     cone_who: Integers = integers(lambda s: s.n_frictions)  # pairs of frictions whose direction is looked for
     cone_pivots: Integers = integers(lambda s: s.n_frictions)
     cone_miss: Reals = reals(lambda s: s.n_frictions)  # of each, part of γ across its direction
@@ -73,9 +64,6 @@ class Complementarity(SchemeAbilities):
     freedom: Reals = reals(lambda s: s.n_rows * s.n_disc_unknowns)  # multipliers without forces
     null_vectors: Reals = reals(lambda s: s.n_rows * s.n_rows)  # all of them, line by line
     null_way: Reals = reals(lambda s: s.n_rows * s.n_rows)  # combinations of these
-    drag: Reals = reals(lambda s: s.n_frictions)  # frictions that may choose, as `mbd.kernel.slide_guess` finds them
-    free_speed: Reals = reals(lambda s: s.n_frictions)  # their velocities without them
-    response: Reals = reals(lambda s: s.n_frictions * s.n_frictions)  # and what they do to these
     disc_map: Reals = reals(lambda s: 3 * s.n_discs * s.n_disc_unknowns)  # two t_i and ℓ_i of each disc
     disc_at: Reals = reals(lambda s: 3 * s.n_discs)
     disc_weight: Reals = reals(lambda s: s.n_discs)
