@@ -71,6 +71,12 @@ class Inputs:
         columns = jvps(self.chart.rates, [{v: 1.0} for v in self.v])
         return [{x: entry for x, entry in zip(self.x, column, strict=True) if not entry.is_zero} for column in columns]
 
+    @cached_property
+    def turning(self) -> list[list[tuple[int, Node]]]:
+        """D column by column: numbers and entries of what is not zero."""
+        lines = [] if self.chart is None else self.chart.velocities
+        return [[(i, line[j]) for i, line in enumerate(lines) if not line[j].is_zero] for j in range(len(self.x))]
+
     def along_velocities(self, slopes: Sequence[Node]) -> list[Node]:
         """Derivatives along v_j of what has the derivatives ∂/∂x_i (n_v): D⁻ᵀ slopes."""
         return list(slopes) if self.chart is None else vjp(self.chart.rates, slopes, self.v)
@@ -95,10 +101,11 @@ class Inputs:
         if self.chart is None:
             return list(row)
         slopes: list[Node] = []
-        for j in range(len(self.x)):
+        for column in self.turning:
             total = 0.0 * row[0]
-            for entry, line in zip(row, self.chart.velocities, strict=True):
-                total = total + entry * line[j]
+            for i, slope in column:
+                if not row[i].is_zero:
+                    total = total + row[i] * slope
             slopes.append(total)
         return slopes
 
