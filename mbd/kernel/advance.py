@@ -50,6 +50,7 @@ from mbd.kernel.singular.leave import leave_singularity
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, SECOND
 from mbd.kernel.starting import find_mode, restart, still_dependent
 from mbd.kernel.step_retry import is_shortened, part_end, step_end, tried_step
+from mbd.kernel.tangent_rules import follow_event
 from mbd.kernel.transitions import find_due, has_happened, is_due, settle_fresh, take_transitions
 from mbd.kernel.trial_step import try_step
 
@@ -437,7 +438,11 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             within = True
             cut = False
             event = TURNS_AWAY if K.strategy == 0 and slides_on(K) else find_event(K, h, t1)
-        if event > 0:
+        if event < 0:
+            status = follow_event(K)
+            if status != 0:
+                return status
+        elif event > 0:
             return event
     ends = K.n_machines > 0 and event == 0 and is_due(K, t1)
     pulls = K.n_judged > 0 and not ends and event == 0 and not quiet and has_spurious_reaction(K)

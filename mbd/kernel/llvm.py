@@ -10,7 +10,7 @@ from mbd.errors import CapabilityError
 from mbd.kernel import tree
 from mbd.kernel.records import TABLE
 
-__all__ = ["llvm_text"]
+__all__ = ["HEAD", "LLVM", "TAGS", "Body", "Value", "llvm_text", "tags"]
 
 LLVM = {"bool": "i1", "int": "i64", "real": "double", "ints": "ptr", "reals": "ptr", "kernel": "ptr", "none": "void"}
 HEAD = """\
@@ -24,7 +24,7 @@ PLACES: dict[str, int] = {field: place for place, field in enumerate(TABLE.addre
 TAGS = {
     what: 2 * place + 3 for place, what in enumerate(("real", "int", *TABLE.real_arrays, *TABLE.integer_arrays, "code"))
 }
-"""Numbers of LLVM's tags of memory, see `_tags`."""
+"""Numbers of LLVM's tags of memory, see `tags`."""
 WITHIN_ANOTHER = {"shift1": "block"}
 """Fields that lie in the array of another, whose tag they have."""
 TAGS |= {part: TAGS[whole] for part, whole in WITHIN_ANOTHER.items()}
@@ -45,13 +45,13 @@ def llvm_text(functions: Sequence[tree.Function], entry: str) -> str:
     What is called in one place only becomes part of its caller at once: LLVM would do the same, but would simplify it
     again at every level of the calls, which takes a third of its time.
     """
-    bodies = [_Body(function) for function in functions]
+    bodies = [Body(function) for function in functions]
     calls = Counter(symbol for body in bodies for symbol in body.called)
-    whole = "\n".join([HEAD, _tags(), *(body.text(calls[body.function.symbol] == 1) for body in bodies)])
+    whole = "\n".join([HEAD, tags(), *(body.text(calls[body.function.symbol] == 1) for body in bodies)])
     return whole.replace(f"internal i64 @{functions[-1].symbol}(", f"i64 @{entry}(")
 
 
-def _tags() -> str:
+def tags() -> str:
     """What cannot share a place, in LLVM's words: reals and integers, and the arrays of any two fields of the kernel.
 
     An array that is an argument or a local name may be that of any field of its kind.
@@ -65,7 +65,7 @@ def _tags() -> str:
     return "\n".join(lines)
 
 
-class _Body:
+class Body:
     """One function: its lines as they grow."""
 
     def __init__(self, function: tree.Function) -> None:
@@ -75,10 +75,14 @@ class _Body:
         self.slots: list[str] = []
         self.count = 0
         self.loops: list[tuple[str, str]] = []
-        for name, kind in function.arguments.items():
-            self.lines.append(f"store {LLVM[kind]} %in.{name}, ptr %own.{name}")
+        self.begin_arguments()
         self.block(function.body)
         self.lines.append("ret void" if self.result == "none" else "unreachable")
+
+    def begin_arguments(self) -> None:
+        """Arguments become local names."""
+        for name, kind in self.function.arguments.items():
+            self.lines.append(f"store {LLVM[kind]} %in.{name}, ptr %own.{name}")
 
     def text(self, once: bool) -> str:
         """The function; `once`: it is called in one place."""
@@ -289,10 +293,14 @@ class _Body:
         value = self.value(node.value)
         if node.operator == "not":
             return self.emit(f"xor i1 {self.cast(value, 'bool')}, true")
-        operand, real = self.cast(value, node.kind), node.kind == "real"
-        if node.operator == "-":
+        return self.unary(node.operator, self.cast(value, node.kind), node.kind)
+
+    def unary(self, operator: str, operand: str, kind: str) -> str:
+        """'-', 'abs' or 'sqrt' of a number of this kind."""
+        real = kind == "real"
+        if operator == "-":
             return self.emit(f"fneg double {operand}" if real else f"sub nsw i64 0, {operand}")
-        if node.operator == "sqrt":
+        if operator == "sqrt":
             return self.emit(f"call double @llvm.sqrt.f64(double {operand})")
         return self.emit(
             f"call double @llvm.fabs.f64(double {operand})"

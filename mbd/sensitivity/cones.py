@@ -21,7 +21,7 @@ from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.held_directions import Way, along_ways, first_of_pair
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs, paired
-from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.run_data import RunRows, unknown
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 
 __all__ = [
@@ -89,7 +89,7 @@ def ended_in_rest(
     matrix = change[:, -2:]
     name = equations.frictions[f].name
     if not is_at(steps.rows, end, row) or not abs(np.linalg.det(matrix)) > 0.0:
-        raise refused(f"how {name!r} comes to rest at t = {time:.9g} s is not known to the pass")
+        raise unknown(f"how {name!r} comes to rest at t = {time:.9g} s is not known to the pass")
     along = -np.linalg.solve(matrix, change[:, :-2])
     turned = end.tangent.combined(np.append(along[1], 0.0)).combined(along[0])
     of_rate, of_lam = (
@@ -141,7 +141,7 @@ def held_rows(rows: RunRows) -> NDArray[np.intp]:
         before[1:] = np.abs(x[:-1] * b[1:] - y[:-1] * a[1:]) <= ALONG * speed[:-1] * pull[1:]
         if np.any(own & ~before):
             time = record.time[np.flatnonzero(own & ~before)[0]]
-            raise refused(
+            raise unknown(
                 f"which way {equations.frictions[f].name!r} slides at t = {time:.9g} s is not known to the pass"
             )
         found |= own

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.run_data import RunRows, Source, UnknownForm
 from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
-from mbd.sensitivity.walk import Passed, Walk
+from mbd.sensitivity.tangent.passing import AnotherRun, is_compiled, tangent_run
+from mbd.sensitivity.walk import Walk
 from mbd.trajectory import Trajectory
 
 __all__ = ["Differentiated", "final_state_derivative", "passed"]
@@ -64,11 +66,26 @@ class Differentiated:
 
 def passed(
     run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = (),
-    periods: Sequence[float] | None = None,
+    source: Source | None = None,
 ) -> tuple[Differentiated, list[Direction]]:  # fmt: skip
-    """The pass over a run, and its directions; periods : see `RunRows`."""
-    rows = RunRows(run, periods)
+    """The pass over a run, and its directions.
+
+    The rows of the run serve where the forms of its steps and impacts are known; else it is made once more, by the
+    kernel with derivatives (`mbd.sensitivity.tangent`).
+
+    source : what made the run, where that is known
+    """
+    rows = RunRows(run, source)
     wanted = directions(rows, wrt)
     programs = programs_of(rows, wanted)
-    walked = Walk(rows, programs, restitutions_of(wanted)).whole(start_tangent(rows, programs, wanted, held))
+    start, restitutions = start_tangent(rows, programs, wanted, held), restitutions_of(wanted)
+    try:
+        walked = Walk(rows, programs, restitutions).whole(start)
+    except UnknownForm as why:
+        if not is_compiled(rows):
+            raise
+        try:
+            walked = tangent_run(rows, programs, start, restitutions)
+        except AnotherRun:
+            raise why from None
     return Differentiated(rows, programs, walked), wanted

@@ -14,13 +14,14 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.equations.equations import Equations
+from mbd.errors import CapabilityError
 from mbd.results.record import EventRecord
 from mbd.sensitivity.balance import consistent_rates
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import refused, sided
 
-__all__ = ["Trigger", "shift_of_end", "trigger"]
+__all__ = ["GRAZE", "Trigger", "refused_graze", "shift_of_end", "trigger"]
 
 Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped", "watched"]
 
@@ -129,8 +130,13 @@ def shift_of_end(
         terms = float(np.abs(slopes) @ np.abs(Z[:, -1]))
     rate = float(change[-1])
     if not abs(rate) > max(GRAZE * terms, slowest if fired.kind == "closed" else 0.0):
-        raise refused(
-            f"{fired.name!r} only grazes at t = {motion.t:.9g} s: its guard changes at {rate:.3g} per second there, by "
-            f"terms of {terms:.3g}, and its instant has no derivative"
-        )
+        raise refused_graze(fired, motion.t, rate, terms)
     return np.asarray(-change[:-1] / rate)
+
+
+def refused_graze(fired: Trigger, time: float, rate: float, terms: float) -> CapabilityError:
+    """The error for a guard that hardly changes as it fires: its rate, and the terms that this is made of."""
+    return refused(
+        f"{fired.name!r} only grazes at t = {time:.9g} s: its guard changes at {rate:.3g} per second there, by "
+        f"terms of {terms:.3g}, and its instant has no derivative"
+    )

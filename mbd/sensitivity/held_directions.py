@@ -18,7 +18,7 @@ from mbd.kernel.cones import HELD, LEAST, MOVING, ONSET
 from mbd.kernel.contact_modes import STILL
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs, paired
-from mbd.sensitivity.run_data import refused
+from mbd.sensitivity.run_data import unknown
 
 __all__ = ["HELD", "ONSET", "Way", "along_ways", "first_of_pair", "pull_of", "slow_ways", "with_held_directions"]
 
@@ -87,7 +87,7 @@ def slow_ways(programs: Programs, motion: Motion, mode: Mode, rates: Rates, know
         elif pair[0] in known:
             found[pair[0]] = known[pair[0]]
         else:
-            raise refused(
+            raise unknown(
                 f"{programs.equations.frictions[pair[0]].name!r} begins to slide at t = {motion.t:.9g} s, in a "
                 "direction that the pass does not know"
             )

@@ -21,7 +21,7 @@ from mbd.sensitivity.held_directions import with_held_directions
 from mbd.sensitivity.kernel.newmark_prediction import FOLLOWED
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent, solved
 from mbd.sensitivity.programs import Columns, Programs
-from mbd.sensitivity.run_data import refused
+from mbd.sensitivity.run_data import unknown
 from mbd.sensitivity.schemes import Memory
 
 __all__ = ["NewmarkSteps"]
@@ -106,7 +106,7 @@ class NewmarkSteps:
             where coordinates do not add: least solutions are known only where they do.
         """
         if not self.programs.charts.is_vector:
-            raise refused(f"the equations of the step to t = {end[0]:.9g} s are singular")
+            raise unknown(f"the equations of the step to t = {end[0]:.9g} s are singular")
         c, h = self.programs.columns, end[0] - motion.t
         guess = self._predicted(motion, memory, h, rates.rate, dh)
         a0, a1 = self._averages(memory, h, rates.rate)

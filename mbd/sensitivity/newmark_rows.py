@@ -18,7 +18,7 @@ from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.newmark_kernel import ended, taken
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import Rows, RunRows, refused
+from mbd.sensitivity.run_data import Rows, RunRows, unknown
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 
 __all__ = ["NewmarkRows"]
@@ -89,7 +89,7 @@ class NewmarkRows(SchemeSteps):
     def _check_growth(self, time: float, h: float, following: float, mode: Mode) -> None:
         """Refuse a step much longer than one that a sample cut, from which position corrections are extrapolated."""
         if self.stabilized and mode.rows and following > GROWTH * h:
-            raise refused(
+            raise unknown(
                 f"the sample at t = {time:.9g} s, at which nothing was written, cut a step to less than half of the "
                 "next one: of position corrections that are extrapolated so far derivatives lose their digits",
                 "take mbd.RungeKutta853() or mbd.RadauIIA(), or mbd.HHT(formulation='index3')",

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.sensitivity.motion import Mode, Motion, Rates
-from mbd.sensitivity.run_data import Rows, refused
+from mbd.sensitivity.run_data import Rows, unknown
 from mbd.sensitivity.schemes import Memory, SchemeSteps
 
 __all__ = ["OneStepMethod"]
@@ -69,5 +69,5 @@ class OneStepMethod(SchemeSteps):
         rows[0][1] = time
         done, end, found = self.taken(motion, memory.rates, mode, rows, dh, False)
         if not (done or self.programs.charts.is_vector):
-            raise refused(f"the equations of the step to t = {time:.9g} s are singular")
+            raise unknown(f"the equations of the step to t = {time:.9g} s are singular")
         yield (end, found) if done else self.least(motion, memory, mode, time, dh, row)

@@ -12,9 +12,9 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.cones import force_in_plane
 from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
-from mbd.sensitivity.walk import Passed
 
 __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
 

@@ -24,7 +24,7 @@ from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.trajectory import Trajectory
 
-__all__ = ["HELD", "Rows", "RunRows", "refused", "sided"]
+__all__ = ["HELD", "Rows", "RunRows", "Source", "UnknownForm", "refused", "sided", "unknown"]
 
 Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
 """Times, q, y, rates and multipliers of rows that follow each other."""
@@ -37,9 +37,26 @@ def refused(why: str, instead: str = "") -> CapabilityError:
     return CapabilityError(f"no derivatives of this run: {why}" + (f"; {instead}" if instead else ""))
 
 
+class UnknownForm(CapabilityError):
+    """What the pass over the rows of a run does not know; the kernel with derivatives may."""
+
+
+def unknown(why: str, instead: str = "") -> UnknownForm:
+    """The error for a run of a kind that the pass over its rows does not know."""
+    return UnknownForm(str(refused(why, instead)))
+
+
 def sided(why: str, instead: str = "") -> OneSidedError:
     """The error for a run that has derivatives on one side only; `why` says what a change decides."""
     return OneSidedError(str(refused(f"{why}: the run has a derivative on one side only", instead)))
+
+
+@dataclass(frozen=True)
+class Source:
+    """What made a run: its model, and its integrator, None for the usual one."""
+
+    model: Any
+    scheme: Integrator | None = None
 
 
 @dataclass
@@ -49,11 +66,11 @@ class RunRows:
     Parameters
     ----------
     run : as `mbd.simulate` returned it
-    periods : of its sampled controllers [s], where what controllers wrote is held as it was; None refuses them
+    source : what made it; None where only the run is known. What controllers wrote is then refused, else held as it was
     """
 
     run: Trajectory
-    periods: Sequence[float] | None = None
+    source: Source | None = None
 
     def __post_init__(self) -> None:
         record = self.run.record
@@ -62,16 +79,17 @@ class RunRows:
         settings = record.settings
         if not self.run.success:
             raise refused(f"it failed: {record.message}")
-        if settings.get("contact") == "nonsmooth":
-            raise refused("its contacts were treated by non-smooth steps", "take contact='events'")
         if settings.get("locate") == "linear":
             raise refused("its events were located by linear interpolation", "take locate='root'")
-        if settings.get("store", 1) != 1:
-            raise refused(f"it kept one row in {settings['store']}", "take store=1")
         memory = getattr(record.final, "memory", None)
         sampled = memory is not None and memory.controllers.get("samples")
-        if self.periods is None and (record.parameter_changes or sampled):
+        if not self.controllers and (record.parameter_changes or sampled):
             raise refused("controllers decide in it, whose feedback is not differentiated", HELD)
+
+    @cached_property
+    def controllers(self) -> Sequence[Any]:
+        """Controllers of the model, what they wrote being held."""
+        return getattr(self.source.model, "controllers", ()) if self.source is not None else ()
 
     @cached_property
     def record(self) -> Record:
@@ -91,14 +109,16 @@ class RunRows:
 
     @cached_property
     def integrator(self) -> Integrator:
-        """The scheme, from how its settings print it."""
+        """The scheme, which is known or as its settings print it."""
+        if self.source is not None and self.source.scheme is not None:
+            return self.source.scheme
         text = str(self.record.settings["integrator"])
         call = ast.parse(text, mode="eval").body
         if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
-            raise refused(f"its integrator {text} is none of mbd's")
+            raise unknown(f"its integrator {text} is none of mbd's")
         made = getattr(integrators, call.func.id, None)
         if made is None:
-            raise refused(f"its integrator {text} is none of mbd's")
+            raise unknown(f"its integrator {text} is none of mbd's")
         values = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
         found: Integrator = made(*(ast.literal_eval(each) for each in call.args), **values)
         return found
@@ -135,6 +155,11 @@ class RunRows:
         length = 1.0 if isinstance(until, str | tuple | list) else (float(until) - start) or 1.0
         return 1e-3 * min(length, 1.0)
 
+    @cached_property
+    def anchors(self) -> Matrix:
+        """What contacts hold at every row."""
+        return StoredStates(self.record, self.mechanism.equations).anchors
+
     @property
     def is_adaptive(self) -> bool:
         """Whether steps follow their error."""
@@ -164,7 +189,7 @@ class RunRows:
     def _samples(self) -> frozenset[int]:
         """Rows at samples of controllers and where forces jump in time: steps end there whatever their grid is."""
         time, found = self.record.time, set[int]()
-        for period in self.periods or ():
+        for period in (each.period for each in self.controllers if each.period is not None):
             sample = time[0] + np.round((time - time[0]) / period) * period
             found.update(map(int, np.flatnonzero(np.abs(sample - time) <= 2e-12 * self.full)))
         equations, near = self.mechanism.equations, 2e-12 * self.full

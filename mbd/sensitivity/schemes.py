@@ -11,7 +11,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.run_data import RunRows, unknown
 
 __all__ = ["Memory", "SchemeSteps", "is_at"]
 
@@ -110,7 +110,7 @@ class SchemeSteps(ABC):
         for end, rates in self.reached(motion, memory, mode, time, dh, row):
             if is_at(self.rows, end, row):
                 return end, rates
-        raise refused(
+        raise unknown(
             f"the step to t = {time:.9g} s is not one that the pass knows: it was shortened, or began in a way that "
             "the run does not store"
         )

@@ -16,7 +16,7 @@ from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.one_sided import with_both_sides
 from mbd.sensitivity.outputs import lines_of, taken_apart, usual
 from mbd.sensitivity.result import Sensitivities
-from mbd.sensitivity.run_data import HELD, RunRows, refused
+from mbd.sensitivity.run_data import HELD, RunRows, Source, refused
 from mbd.sensitivity.sequence import amounts_of, changed_sequences
 from mbd.sensitivity.starts import restitution_names
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names, whole_names
@@ -43,6 +43,7 @@ def sensitivities(
     hold: Sequence[str] | None = None,
     check_events: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
+    contact: Literal["events", "nonsmooth"] = "events",
     impact: Literal["newton", "poisson", "sequential"] = "newton",
     rest_speed: float = REST_SPEED,
     controllers: Literal["held"] | None = None,
@@ -58,8 +59,7 @@ def sensitivities(
 
     Parameters
     ----------
-    model, start, integrator, dt, tol, until, parameters, impact, rest_speed, backend : see `mbd.simulate`; the scheme
-        is of the Newmark family, `mbd.RungeKutta853` or `mbd.RadauIIA`
+    model, start, integrator, dt, tol, until, parameters, contact, impact, rest_speed, backend : see `mbd.simulate`
     wrt : coordinates ('hip.angle') and rates ('hip.rate') of the start; of joints that turn freely 'hip.turn.x', '.y',
         '.z', small rotations of the child about its own axes [rad], 'hip.orientation' for all three, and
         'hip.angular_velocity'; parameters ('left thigh.mass'), restitutions of
@@ -121,13 +121,13 @@ def sensitivities(
 
     def made(start: State, more: Mapping[str, float]) -> Trajectory:
         return simulate(
-            model, replace(start, memory=None), integrator, dt, tol, until=until, contact="events", impact=impact,
+            model, replace(start, memory=None), integrator, dt, tol, until=until, contact=contact, impact=impact,
             parameters={**(parameters or {}), **more} if more else parameters, rest_speed=rest_speed, backend=backend,
         )  # fmt: skip
 
     run = made(start, {})
     try:
-        found = derivatives_of(run, wrt, of, values, hold, own)
+        found = derivatives_of(run, wrt, of, values, hold, model, integrator)
     except OneSidedError as error:
         rows, single = RunRows(run), _names_in(wrt)[0]
         names, held = (
@@ -149,12 +149,18 @@ def derivatives_of(
     of: Sequence[str] | None = None,
     at: Mapping[str, float] | None = None,
     hold: Sequence[str] | None = None,
-    controllers: Sequence[Any] = (),
+    model: Any = None,
+    scheme: Integrator | None = None,
 ) -> Sensitivities:
-    """The derivatives of a run of a model that `with_inputs` made, which has these controllers; see `sensitivities`."""
+    """The derivatives of a run of a model that `with_inputs` made; see `sensitivities`.
+
+    scheme : the run's integrator; None: the usual one
+    """
     single, _ = _names_in(wrt)
     held = _held(run, single) if hold is None else hold
-    return _differentiated(run, _directions(run, wrt, at or {}), held, of, controllers)
+    return _differentiated(
+        run, _directions(run, wrt, at or {}), held, of, None if model is None else Source(model, scheme)
+    )
 
 
 def _directions(run: Trajectory, wrt: Sequence[Wanted], values: Mapping[str, float]) -> list[Any]:
@@ -170,11 +176,10 @@ def _directions(run: Trajectory, wrt: Sequence[Wanted], values: Mapping[str, flo
 
 
 def _differentiated(
-    run: Trajectory, directions: list[Any], held: Sequence[str], of: Sequence[str] | None, controllers: Sequence[Any]
-) -> Sensitivities:
+    run: Trajectory, directions: list[Any], held: Sequence[str], of: Sequence[str] | None, source: Source | None
+) -> Sensitivities:  # fmt: skip
     """The derivatives of a run as a table."""
-    periods = [each.period for each in controllers if each.period is not None]
-    found, wanted = passed(run, directions, held, periods if controllers else None)
+    found, wanted = passed(run, directions, held, source)
     names = usual(found.rows) if of is None else taken_apart(found.rows, of)
     lines = lines_of(found.rows, found.programs, found.walked, names)
     facts, columns = run.facts, tuple(each.name for each in wanted)
@@ -182,7 +187,7 @@ def _differentiated(
         lines.names, columns, lines.matrix, lines.values, run,
         tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in lines.names),
         tuple("rad" if ".turn." in name else unit(name, facts) for name in columns),
-        written=tuple(dict.fromkeys(name for each in controllers for name in each.writes)),
+        written=tuple(dict.fromkeys(name for each in found.rows.controllers for name in each.writes)),
     )  # fmt: skip
 
 

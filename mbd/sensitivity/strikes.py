@@ -16,9 +16,9 @@ from mbd.sensitivity.impact_laws import Struck, poisson, sequential
 from mbd.sensitivity.motion import Mode, Motion
 from mbd.sensitivity.phases import MOVES, OneSided, Unknown
 from mbd.sensitivity.programs import Programs, State
-from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.run_data import RunRows, refused, unknown
 
-__all__ = ["captured", "struck"]
+__all__ = ["captured", "refuse_touching_by_chance", "struck"]
 
 ACCOUNTED = 1e-7
 """Misfit of velocities after an impact up to which its rows are the right ones [-]."""
@@ -38,7 +38,7 @@ def struck(
     after, contacts = rows.y[row], programs.equations.contacts
     impulses = impulses_by_row(programs, events)
     closing = {event.name for event in events if event.kind == "closed"}
-    tried, law, why = list[float](), str(rows.record.settings.get("impact", "newton")), ""
+    tried, law, why, chance = list[float](), str(rows.record.settings.get("impact", "newton")), "", False
     names = " and ".join(repr(name) for name in sorted(closing))
     which = f"the impact of {names} at t = {before.t:.9g} s (law {law!r}): "
     who = _partners(rows, programs, mode, closing, restitutions)
@@ -50,7 +50,7 @@ def struck(
             if tried[0] <= ACCOUNTED:
                 return replace(moved, y=after)
         except Unknown as reason:
-            why = str(reason)
+            why, chance = str(reason), isinstance(reason, OneSided)
             if isinstance(reason, OneSided) and not any(contacts[c].restitution for c in who.closing):
                 raise OneSidedError(str(refused(which + why))) from None
     if law == "newton":
@@ -67,7 +67,9 @@ def struck(
         if found.misfit <= ACCOUNTED:
             return moved
     instead = "" if law == "newton" or why else "take impact='newton'"
-    raise refused(which + (why or f"its velocities differ by {min(tried):.2g} from those of its law"), instead)
+    if chance:
+        raise refused(which + why)
+    raise unknown(which + (why or f"its velocities differ by {min(tried):.2g} from those of its law"), instead)
 
 
 def _partners(
@@ -82,6 +84,20 @@ def _partners(
     }  # fmt: skip
     of_e = {c: restitutions[each.name] for c, each in contacts if each.name in restitutions}
     return Struck(touched, closed, of_e, rows.manager.trivial)
+
+
+def refuse_touching_by_chance(
+    rows: RunRows, programs: Programs, before: Motion, mode: Mode, events: Sequence[EventRecord], fired: int
+) -> None:
+    """Raise a `OneSidedError` for contacts that close with the one that fired, and a direction moves them apart."""
+    closing = {event.name for event in events if event.kind == "closed"}
+    try:
+        _refuse_chance(programs, before, mode, _partners(rows, programs, mode, closing, {}), fired)
+    except OneSided as reason:
+        names = " and ".join(repr(name) for name in sorted(closing))
+        law = str(rows.record.settings.get("impact", "newton"))
+        which = f"the impact of {names} at t = {before.t:.9g} s (law {law!r}): "
+        raise OneSidedError(str(refused(which + str(reason)))) from None
 
 
 def _refuse_chance(programs: Programs, before: Motion, mode: Mode, who: Struck, fired: int) -> None:

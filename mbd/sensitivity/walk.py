@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,10 +31,11 @@ from mbd.sensitivity.held_directions import (
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
 from mbd.sensitivity.newmark_rows import NewmarkRows
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_start
+from mbd.sensitivity.passed import Instant, Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.radau import RadauSteps
 from mbd.sensitivity.resets import after_reset
-from mbd.sensitivity.run_data import RunRows, refused, sided
+from mbd.sensitivity.run_data import RunRows, refused, sided, unknown
 from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
 from mbd.sensitivity.shortened import Shortened
@@ -42,27 +43,7 @@ from mbd.sensitivity.strikes import captured, struck
 from mbd.sensitivity.transitions import with_transitions
 from mbd.sensitivity.watching import Watching
 
-__all__ = ["Instant", "Passed", "Walk"]
-
-
-@dataclass(frozen=True)
-class Instant:
-    """An event with its derivatives: the rows before and after it, and the motions there."""
-
-    row: int
-    fired: Trigger
-    before: Motion
-    after: Motion
-
-
-@dataclass
-class Passed:
-    """What the pass has found: the motion and rates at the end, and the events."""
-
-    motion: Motion
-    mode: Mode
-    rates: Rates
-    instants: list[Instant] = field(default_factory=list)
+__all__ = ["Walk"]
 
 
 def steps_of(rows: RunRows, programs: Programs) -> SchemeSteps:
@@ -80,7 +61,7 @@ def steps_of(rows: RunRows, programs: Programs) -> SchemeSteps:
         return RungeKuttaSteps(rows, programs, scheme.tableau)
     if isinstance(scheme, RadauIIA):
         return RadauSteps(rows, programs)
-    raise refused(f"steps of {scheme!r} are not differentiated", "take RungeKutta853(), RadauIIA() or HHT()")
+    raise unknown(f"steps of {scheme!r} are not differentiated", "take RungeKutta853(), RadauIIA() or HHT()")
 
 
 class Walk:
@@ -95,6 +76,11 @@ class Walk:
 
     def __init__(self, rows: RunRows, programs: Programs, restitutions: Mapping[str, Vector] | None = None) -> None:
         self.rows, self.programs, self.restitutions = rows, programs, restitutions or {}
+        settings = rows.record.settings
+        if settings.get("contact") == "nonsmooth":
+            raise unknown("its contacts were treated by non-smooth steps", "take contact='events'")
+        if settings.get("store", 1) != 1:
+            raise unknown(f"it kept one row in {settings['store']}", "take store=1")
         self.record = rows.record
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
@@ -178,7 +164,7 @@ class Walk:
                 self._ways = slow_ways(self.programs, motion, plain, memory.rates, self._ways)
                 mode, motion = along_ways(self.programs, motion, plain, self._ways, ONSET)
         if self._written:
-            raise refused(f"a controller wrote parameters at t = {record.time[min(self._written)]:.9g} s within a step")
+            raise unknown(f"a controller wrote parameters at t = {record.time[min(self._written)]:.9g} s within a step")
         rates = rates if fresh else memory.rates
         refuse_sided_end(rows, self.programs, motion, mode, rates, [(each.fired.name, each.before) for each in found])
         return Passed(motion, mode, rates, found)
@@ -311,7 +297,7 @@ class Walk:
             there = consistent_rates(self.programs, before, mode, rates)
             motion = after_reset(self.programs, before, mode, there, fired.number, row_after)
         if not is_at(self.rows, motion, row):
-            raise refused(f"the state after {fired.name!r} at t = {before.t:.9g} s is not the one that was expected")
+            raise unknown(f"the state after {fired.name!r} at t = {before.t:.9g} s is not the one that was expected")
         gripped = {
             row.contact for k, row in enumerate(equations.rows)
             if row.friction >= 0 and row.contact >= 0 and k in later.held and k not in mode.held

@@ -147,7 +147,7 @@ def simulate(
     if problem and on_failure == "raise":
         raise _failure(problem, trajectory, run.cause)
     if wrt is not None and not problem:
-        _differentiate(trajectory, wrt, getattr(model, "controllers", ()))
+        _differentiate(trajectory, wrt, model, scheme)
     return trajectory
 
 
@@ -155,19 +155,21 @@ def _differentiable(
     model: Any, start: State, changed: Mapping[str, float], wrt: Any, options: dict[str, Any], controllers: Any
 ) -> tuple[Any, State]:
     """The model with what it is differentiated by as inputs, the start without memory; contacts by events."""
-    if options["contact"] == "nonsmooth" or options["store"] != 1 or options["locate"] != "root":
-        raise CapabilityError("wrt= needs contact='events', locate='root' and store=1; leave these out")
-    options["contact"] = "events"
+    if options["locate"] != "root":
+        raise CapabilityError("wrt= needs locate='root'; leave it out")
+    if options["contact"] == "auto":
+        options["contact"] = "events"
     model = later("simulate: inputs")(model, options["backend"], changed, wrt, controllers)
     if any(callable(rate) for each in wrt if not isinstance(each, str) for by in each.values() for rate in by.values()):
         raise ModelError("wrt takes rates of parameters here, such as 9.8; mbd.sensitivities(…, at=…) takes functions")
     return model, replace(start, memory=None)
 
 
-def _differentiate(run: Trajectory, wrt: Any, controllers: Sequence[Any]) -> None:
+def _differentiate(run: Trajectory, wrt: Any, model: Any, scheme: Integrator) -> None:
     """Give a run its derivatives."""
     try:
-        run.record.stats["sensitivities"] = later("simulate: derivatives")(run, wrt, controllers=controllers).as_words()
+        found = later("simulate: derivatives")(run, wrt, model=model, scheme=scheme)
+        run.record.stats["sensitivities"] = found.as_words()
     except CapabilityError as error:
         error.run = run
         raise
@@ -263,6 +265,7 @@ def laid_out(
     changed: Mapping[str, float],
     options: Mapping[str, Any],
     watch: Callable[[Mechanism], Any] | None = None,
+    kind: type[Run] = Run,
 ) -> Run:
     """The same before its start is put into the kernel's arrays."""
     mechanism = mechanism_of(model, options["backend"], changed)
@@ -293,7 +296,7 @@ def laid_out(
     own["auto"] = auto
     own |= {name: value for name, value in adaptive.items() if value is not None}
     watched = mechanism if watch is None else watch(mechanism)
-    return Run(model, watched, manager, scheme, start, dt, end, stop, changed, own, settings)
+    return kind(model, watched, manager, scheme, start, dt, end, stop, changed, own, settings)
 
 
 @cache

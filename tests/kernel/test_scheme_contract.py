@@ -13,10 +13,12 @@ from mbd.errors import CapabilityError
 from mbd.kernel import build
 from mbd.kernel.entry import entry
 from mbd.kernel.schemes import contract
+from mbd.sensitivity.tangent import build as tangent_build
 from mbd.state import Mode, State
 from mbd.testing import check_scheme
 from tests.kernel.bdf2 import BDF2
 from tests.kernel.midpoint import Midpoint
+from tests.sensitivity.differences import differences, off
 from tests.simulation.mechanisms import G, ball, pendulum
 
 
@@ -26,6 +28,7 @@ def listed():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "object_of", partial(build.object_of, level=0))
         patch.setattr(contract, "SCHEMES", (*contract.SCHEMES, "tests.kernel.midpoint", "tests.kernel.bdf2"))
+        patch.setattr(tangent_build, "LEVEL", 0)
         entry.cache_clear()
         yield
     entry.cache_clear()
@@ -52,6 +55,16 @@ def test_a_ball_bounces_when_it_should():
     fall = math.sqrt(2.0 / G)
     times = [event.time for event in found.events if event.kind == "closed"]
     np.testing.assert_allclose(times[:2], [fall, 2.0 * fall], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("scheme", [Midpoint(), BDF2()], ids=repr)
+def test_a_listed_scheme_has_derivatives(scheme):
+    """Of a ball that bounces, beside differences of order 4; no line of the derivatives knows the scheme."""
+    model, names = ball(restitution=0.5), ["fall.displacement", "fall.displacement.rate"]
+    start = mbd.assemble(model, {"fall.displacement": 1.0}, {"fall.displacement": 0.3})
+    found = mbd.sensitivities(model, start, scheme, dt=0.01, until=1.0, wrt=names)
+    wanted, noise = differences(model, start, scheme, names, dt=0.01, until=1.0)
+    assert np.all(off(found.matrix, wanted) <= np.maximum(1e-8, 2.0 * noise))
 
 
 def test_what_it_cannot_do_is_refused_by_its_name():

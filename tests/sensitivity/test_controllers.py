@@ -141,8 +141,5 @@ def test_what_is_not_differentiated_through_controllers_is_named():
         final_state_derivative(mbd.simulate(model, start, **settings), names)
 
 
-def test_a_sample_that_cuts_a_step_on_constraints_short_is_named():
-    model, law, start, names, settings = stepped()
-    law.again = False
-    with pytest.raises(mbd.CapabilityError, match="the sample at t = 0.45 s, at which nothing was written"):
-        mbd.sensitivities(model, start, SCHEMES[1], wrt=names, controllers="held", **settings)
+def test_a_sample_that_cuts_a_step_on_constraints_short_keeps_all_digits():
+    assert judged(*stepped(), SCHEMES[1])[1] < 1e-8

@@ -215,8 +215,10 @@ def test_a_run_carries_its_derivatives(tmp_path):
         assert mbd.simulate(model, start, dt=0.01, until=0.1).sensitivities
     with pytest.raises(mbd.UnknownNameError, match="wrt: no coordinate.* 'hinge.angel'"):
         mbd.simulate(model, start, dt=0.01, until=0.1, wrt=["hinge.angel"])
-    with pytest.raises(mbd.CapabilityError, match="store=1"):
-        mbd.simulate(model, start, dt=0.01, until=0.1, wrt=["hinge.angle"], store=2)
+    with pytest.raises(mbd.CapabilityError, match="locate='root'"):
+        mbd.simulate(model, start, dt=0.01, until=0.1, wrt=["hinge.angle"], locate="linear")
+    sparse = mbd.simulate(model, start, dt=0.01, until=1.0, wrt=wrt, store=7).sensitivities
+    assert sparse.matrix == pytest.approx(found.matrix, rel=1e-8, abs=1e-12)
 
 
 def test_changes_that_make_other_events_are_named():

@@ -33,6 +33,7 @@ from mbd.kernel.schemes.iteration import (
 )
 from mbd.kernel.singular.newmark_step import WITHIN, misses, singular_newmark_step, steps_by_pivot, steps_to_singularity
 from mbd.kernel.singular.step_pairs import is_whole
+from mbd.kernel.tangent_rules import follow_matrix, further_corrections, note_matrix
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]
 
@@ -68,12 +69,14 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     first = 0.0  # what the first correction changed, the last and the one before, of the fastest rate
     moved = 1e300
     last = 0.0
+    further = 0
     for iteration in range(K.max_iterations):
         tangent = not fresh
         if together:
             share_loads(K, m)
         if tangent:
             straight = renew(K, m, tangents)
+            note_matrix(K)
             tangents += 1
         else:
             call(K, K.residual_program, K.out)
@@ -102,7 +105,9 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             if error < 0.0:
                 return no_candidate(K, h, t1, int(-error))
         if error <= 1.0 and (K.uneven_masses == 0 or has_settled(moved, last, 1e-4 * first)):
-            return conclude_step(K, h, t1)
+            if further == further_corrections():
+                return conclude_step(K, h, t1)
+            further += 1
         if not tangent and error > max(1.0, 0.3 * before):
             fresh = False  # the old tangent has done its work: renew it at the same iterate
             before = 1e300
@@ -130,7 +135,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             first = moved
             if K.exact == 0:  # the predictor's error measures that of the step: stay far below it
                 tolerance = min(K.tolerance, max(1e-4 * moved, tolerance))
-        fresh = tangent or error > 1.0 or moved <= 0.3 * last
+        fresh = tangent or error > 1.0 or moved <= 0.3 * last or further > 0
         last = last if fresh else 0.0
     return no_candidate(K, h, t1, NOT_CONVERGED)
 
@@ -294,6 +299,7 @@ def solve_corrections(K: Steps, m: int, c_C: float, tangent: bool, shifting: boo
     """The change of the position shift in K.work, the corrections of rates and multipliers in K.rhs."""
     if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
         solve_with_factors(K, m, K.work, straight)
+        follow_matrix(K, m, tangent)
         for i in range(K.n_v if tangent else 0):
             K.work[i] -= K.shift1[i]
         inverse = 1.0 / c_C

@@ -57,6 +57,7 @@ from mbd.kernel.singular.stages import (
     spans_singularity,
 )
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms
+from mbd.kernel.tangent_rules import further_corrections
 
 __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 
@@ -149,6 +150,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
     K.failure_step = h
     first = 0.0  # what the first correction changed, and the last
     moved = 0.0
+    further = 0
     for iteration in range(K.max_iterations):
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
         grown = error > FAR_OFF and error > 0.9 * left and not sharing(K)  # shares that follow loads change it as well
@@ -195,7 +197,9 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
             moved = correct_by_own_masses(K, m, h, t1, renew)
             renew = False
             if has_converged(moved, last, first):
-                return complete(K, h, t1, m, False, iteration >= PATIENT)
+                if further == further_corrections():
+                    return complete(K, h, t1, m, False, iteration >= PATIENT)
+                further += 1
             continue
         moved = correct_by_own_masses(K, m, h, t1, renew)
         if iteration == 0:  # the predictor is of order 3, the step of order 5: stay far below its error

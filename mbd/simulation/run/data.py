@@ -100,6 +100,10 @@ class Savepoint:
 class RunData:
     """What a run was asked for, the kernel's arrays, and what was stored until now."""
 
+    stepper_kind: type[Stepper] = Stepper
+    ends_exactly = False
+    """Whether a last step of the grid that ends with the run, but for round-off, ends there exactly."""
+
     def __init__(
         self,
         model: Any,
@@ -124,7 +128,7 @@ class RunData:
         parameters = self._parameters()
         self.first_parameters = parameters.copy()
         compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
-        self.stepper = Stepper(mechanism, manager, integrator, parameters, dt, compiled_options)
+        self.stepper = self.stepper_kind(mechanism, manager, integrator, parameters, dt, compiled_options)
         self.kernel = self.stepper.kernel
         self.kernel.chunk = _steps_at_once(self.stepper)
         width, capacity = self.kernel.width, self.kernel.capacity

@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from mbd.equations.equations import Guard
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.kernel import codes
 from mbd.results.columns import ModelColumns
@@ -243,8 +244,12 @@ class Run(RunData):
                 continue
             guard = guards[event.name] if event.kind == "event" else None
             if guard is not None and guard.reset is not None:
-                apply_reset(self, guard)
+                self.reset(guard)
             call_controllers(self, event.name)
             if (self.stop and self.manager.happens(self.stop, event.name)) or (guard is not None and guard.terminal):
                 ended = event.name if self.stop is None or guard is None or guard.terminal else self.stop
         return ended
+
+    def reset(self, guard: Guard) -> None:
+        """What a user's event sets."""
+        apply_reset(self, guard)

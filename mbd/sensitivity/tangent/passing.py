@@ -1,0 +1,227 @@
+"""The tangent pass over a run that is there: it is made once more with derivatives, some directions at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.equations.equations import Guard
+from mbd.errors import CapabilityError
+from mbd.kernel.records import TABLE
+from mbd.sensitivity.motion import Motion, Rates, Tangent
+from mbd.sensitivity.passed import Instant, Passed
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.resets import after_reset
+from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.tangent.margins import refuse_turning_points
+from mbd.sensitivity.tangent.run import DIRECTIONS, TangentRun
+from mbd.simulation.arguments import end_of
+from mbd.simulation.run import stepper
+from mbd.simulation.simulate import INSTANT
+
+__all__ = ["AnotherRun", "is_compiled", "tangent_run"]
+
+OWN = ("contact", "impact", "locate", "store", "rest_speed")
+FOLLOWING = ("allowed", "longest", "driven")
+CLOCK = TABLE.places["time"][1]
+STEP = 1e-4
+"""Size of an increment by which q ⊕ x is differentiated with an error of its sixth power [-]."""
+SAME = 1e-6
+"""Difference of the ends of the run and of that with derivatives, over the largest coordinate or 1, that is none."""
+
+
+class AnotherRun(CapabilityError):
+    """The same run with derivatives is not the run."""
+
+
+def is_compiled(rows: RunRows) -> bool:
+    """Whether there is machine code of the model and of the scheme."""
+    return stepper.is_compiled(rows.mechanism, rows.integrator)
+
+
+class Charted:
+    """Derivatives of coordinates number by number, and along velocities."""
+
+    def __init__(self, programs: Programs) -> None:
+        self.programs = programs
+
+    def base(self, q: Vector) -> Matrix:
+        """∂(q ⊕ x)/∂x (n_q, n_v) at x = 0."""
+        if self.programs.charts.is_vector:
+            return np.eye(len(q))
+        compose, units = self.programs.charts.compose, STEP * np.eye(self.programs.columns.n_v)
+        parts = [
+            sum(w * (compose(q, k * unit) - compose(q, -k * unit)) for k, w in ((1, 45.0), (2, -9.0), (3, 1.0)))
+            for unit in units
+        ]
+        return np.array(parts).T / (60.0 * STEP)
+
+    def along(self, q: Vector, of_q: Matrix) -> Matrix:
+        """Derivatives along velocities (n_v, D)."""
+        return np.asarray(np.linalg.lstsq(self.base(q), of_q, rcond=None)[0])
+
+
+def tangent_run(
+    rows: RunRows, programs: Programs, start: Tangent, restitutions: Mapping[str, Vector],
+    visit: Callable[[int, Motion, Any, Rates], None] | None = None,
+) -> Passed:  # fmt: skip
+    """The run from its start, with these derivatives, to its end.
+
+    restitutions : rates (D,) of those of contacts; visit : is called with every row
+
+    Raises
+    ------
+    CapabilityError
+        where the run has no derivative.
+    AnotherRun
+        where round-off makes the same run with derivatives another one.
+    """
+    charted, layout, count = Charted(programs), rows.mechanism.layout, len(start.t)
+    contacts = [contact.name for contact in programs.equations.contacts]
+    of_e = np.array([restitutions.get(name, np.zeros(count)) for name in contacts]).reshape(len(contacts), count)
+    of_q = charted.base(np.array(rows.record.q[0])) @ start.q
+    runs = list[tuple[TangentRun, int]]()
+    for first in range(0, count, DIRECTIONS):
+        some = slice(first, min(first + DIRECTIONS, count))
+        run = _again(rows)
+        run.every_row = visit is not None
+        run.differentiated_reset = _reset(rows, programs, charted, start.p[:, some], run)
+        run.begin_tangents(programs.places)
+        run.at_start()
+        run.seed(start.p[:, some], of_q[:, some], start.y[:, some], start.anchors[:, some], of_e[:, some])
+        _require_same(rows, run, *run.complete())
+        runs.append((run, some.stop - some.start))
+
+    def joined(parts: Sequence[Matrix]) -> Matrix:
+        return np.concatenate([part[..., :width] for part, (_, width) in zip(parts, runs, strict=True)], axis=-1)
+
+    states = [run.at_state() for run, _ in runs]
+    at_end = {name: (number, joined([each[name][1] for each in states])) for name, (number, _) in states[0].items()}
+    end = _motion(charted, at_end, start.p)
+    last, located = rows.mode(len(rows.record.time) - 1), rows.record.settings.get("contact") != "nonsmooth"
+    if not located and visit is None:
+        return Passed(end[0], last, end[1])
+    sizes = np.cumsum([0, 1, layout.n_q, layout.n, layout.n, layout.n_rows])
+    names, anchors = ("clock", "q", "y", "rate", "lam"), rows.anchors
+
+    def at_row(row: int) -> tuple[Motion, Rates]:
+        numbers = np.concatenate(
+            [[rows.ends[row]], rows.record.q[row], rows.y[row], rows.rate[row], rows.record.lam[row]]
+        )
+        lanes = joined([run.of_rows[row] for run, _ in runs])
+        found = {
+            name: (numbers[a:b], lanes[a:b]) for name, a, b in zip(names, sizes[:-1], sizes[1:], strict=True)
+        }  # fmt: skip
+        found["anchors"] = anchors[row], np.zeros((layout.n_anchors, count))
+        if row == 0:
+            found["anchors"] = anchors[row], start.anchors
+        return _motion(charted, found, start.p)
+
+    if visit is not None:
+        for row in range(len(rows.record.time)):
+            visit(row, *_with_mode(rows, row, at_row(row)))
+    if not located:
+        return Passed(end[0], last, end[1])
+    known = {row: at_row(row) for row in {0, *(each - 1 for each in rows.events)}}
+    fired = refuse_turning_points(rows, programs, known, end)
+    instants = [
+        Instant(row, trigger, known[row - 1][0], known[row - 1][0])
+        for row, trigger in zip(sorted(rows.events), fired, strict=True)
+    ]  # fmt: skip
+    return Passed(end[0], last, end[1], instants)
+
+
+def _with_mode(rows: RunRows, row: int, found: tuple[Motion, Rates]) -> tuple[Motion, Any, Rates]:
+    return found[0], rows.mode(row), found[1]
+
+
+def _motion(charted: Charted, numbers: Mapping[str, tuple[Vector, Matrix]], of_p: Matrix) -> tuple[Motion, Rates]:
+    """A motion and its rates from numbers with derivatives."""
+    (t, of_t), (q, of_q), (y, of_y), (rate, of_rate), (lam, of_lam), (anchors, of_anchors) = (
+        numbers[name] for name in ("clock", "q", "y", "rate", "lam", "anchors")
+    )
+    tangent = Tangent(of_t[0], charted.along(q, of_q), of_y, of_anchors, of_p)
+    return Motion(float(t[0]), q, y, anchors, tangent), Rates(rate, lam, of_rate, of_lam)
+
+
+def _again(rows: RunRows) -> TangentRun:
+    """The run once more, with the settings that it had."""
+    settings, start = dict(rows.record.settings), rows.record.start
+    own = {name: settings[name] for name in OWN} | {"auto": "nonsmooth_since" in settings}
+    if own["auto"]:
+        own["contact"] = "events"
+    dt, until = settings.get("dt"), settings["until"]
+    until = tuple(until) if isinstance(until, list) else until
+    if dt is None:
+        own |= {name: settings[name] for name in FOLLOWING}
+        length = 1.0 if isinstance(until, str | tuple) else (float(until) - float(start.time)) or 1.0
+        dt = INSTANT * min(length, 1.0)
+    end, stop = end_of(until, rows.manager, dt, start.time)
+    known = dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
+    model = SimpleNamespace(parameters=known)
+    if rows.source is not None:
+        check, held = rows.source.model.parameter_check, [_repeated(rows, each) for each in rows.controllers]
+        model = SimpleNamespace(parameters=known, parameter_check=check, controllers=held)
+    return TangentRun(
+        model,
+        rows.mechanism,
+        rows.manager,
+        rows.integrator,
+        replace(start, memory=None),
+        dt,
+        end,
+        stop,
+        known,
+        own,
+        settings,
+    )
+
+
+def _repeated(rows: RunRows, controller: Any) -> Any:
+    """A controller that writes what was written in the run, whatever it reads."""
+    changes = [(float(rows.record.time[row]), values) for row, values in rows.record.parameter_changes]
+    places = {name: k for k, name in enumerate(rows.record.parameter_names) if name in controller.writes}
+
+    def update(time: float, values: Any, state: Any) -> dict[str, float]:
+        found = [each for instant, each in changes if abs(instant - time) <= 1e-9 * max(1.0, abs(time))]
+        return {name: float(found[-1][k]) for name, k in places.items()} if found else {}
+
+    again = copy(controller)
+    for name, value in (("update", update), ("reads", ())):
+        object.__setattr__(again, name, value)
+    return again
+
+
+def _require_same(rows: RunRows, run: TangentRun, trajectory: Any, problem: str) -> None:
+    """Raise where the run with derivatives is another than the run."""
+    if problem:
+        raise AnotherRun(f"the same run with derivatives failed: {problem}")
+    if [(each.kind, each.name) for each in trajectory.events] != [(each.kind, each.name) for each in rows.run.events]:
+        raise AnotherRun("the same run with derivatives has other events, by round-off")
+    q, mine = rows.record.q[-1], trajectory.record.q[-1]
+    if len(rows.record.time) != len(trajectory.time) or not np.max(np.abs(q - mine), initial=0.0) <= SAME * max(
+        1.0, float(np.max(np.abs(q), initial=0.0))
+    ):
+        raise AnotherRun("the same run with derivatives ends elsewhere, by round-off")
+
+
+def _reset(rows: RunRows, programs: Programs, charted: Charted, of_p: Matrix, run: TangentRun) -> Any:
+    """What differentiates resets of users' events."""
+    numbers = {guard.name: e for e, guard in enumerate(programs.equations.guards)}
+
+    def differentiated(guard: Guard, before: Any, q: Vector, y: Vector) -> tuple[Matrix, Matrix]:
+        width = of_p.shape[1]
+        motion, rates = _motion(
+            charted, {name: (each, lanes[:, :width]) for name, (each, lanes) in before.items()}, of_p
+        )
+        mode = rows.mode(run.stored - 1)
+        after = after_reset(programs, motion, mode, rates, numbers[guard.name], (q, y)).tangent
+        return charted.base(q) @ after.q, after.y
+
+    return differentiated

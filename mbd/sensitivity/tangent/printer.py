@@ -1,0 +1,396 @@
+"""Typed trees of the kernel (`mbd.kernel.tree`) → LLVM IR in which every real carries its derivatives.
+
+A real is a value and a vector of `LANES` derivatives, one for each direction; an array of reals is two addresses, the
+array and one with a vector for each of its numbers; the kernel is two tables, whose fields have the same places. Rules
+(Griewank & Walther 2008, Evaluating Derivatives, ch. 2): those of + − × ÷, powers, roots and |x|; an extreme or a
+choice takes the derivatives of the value that it takes; integers, conditions and numbers of the record have none.
+Values are computed by the very operations of the kernel, so that a run with derivatives is the run without them.
+
+Functions in `HELD` are called as they stand, without derivatives: what they write keeps the derivatives it had. Model
+code is called for its values, then its exact derivatives are multiplied into the vectors of its inputs (`product`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+
+from mbd.kernel import tree
+from mbd.kernel.llvm import HEAD, LLVM, TAGS, Body, Value, tags
+from mbd.kernel.records import TABLE
+
+__all__ = ["LANES", "tangent_text"]
+
+LANES = 8
+"""Derivatives of a real; the last is kept for that by the size of a step, which an event needs."""
+VECTOR = f"<{LANES} x double>"
+WITH_TANGENT = {"real": VECTOR, "reals": "ptr", "kernel": "ptr"}
+ZERO = "zeroinitializer"
+HELD_ARRAYS = frozenset(
+    (
+        "scale", "known", "weight", "blurs", "typical", "largest", "error", "closing_gap", "deepest", "sinking",
+        "contact_step", "closing_rate", "largest_rate", "contact_steps", "least_contact_step", "doubt", "seen",
+        "row_bounds",
+    )
+)  # fmt: skip
+"""Arrays whose numbers have no derivatives: what only decides, and sizes of steps by their error."""
+HELD_PLACES = frozenset(TABLE.places[name] for name in ("step", "next_step", "substep", "turning_step", "begun_step"))
+"""The same of single numbers: steps that follow an error are held as they were."""
+BUNDLES = {kind: f"{{ {LLVM[kind]}, {more} }}" for kind, more in WITH_TANGENT.items()}
+"""What functions return that return reals, or the address of an array."""
+
+PRODUCT = f"""\
+define internal void @product(ptr %program, ptr %block, ptr %params, ptr %of.block, ptr %of.params, ptr %of.out) {{
+entry:
+  %code = load ptr, ptr %program
+  %p1 = getelementptr i64, ptr %program, i64 1
+  %entries = load i64, ptr %p1
+  %p2 = getelementptr i64, ptr %program, i64 2
+  %size = load i64, ptr %p2
+  %p3 = getelementptr i64, ptr %program, i64 3
+  %lines = load ptr, ptr %p3
+  %p4 = getelementptr i64, ptr %program, i64 4
+  %columns = load ptr, ptr %p4
+  %p5 = getelementptr i64, ptr %program, i64 5
+  %numbers = load ptr, ptr %p5
+  %p6 = getelementptr i64, ptr %program, i64 6
+  %found = load ptr, ptr %p6
+  %there = icmp ne ptr %code, null
+  br i1 %there, label %evaluate, label %clear
+evaluate:
+  call void %code(ptr %block, ptr %params, ptr %numbers)
+  br label %clear
+clear:
+  %k = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %k.next, %clear.one ]
+  %more = icmp slt i64 %k, %size
+  br i1 %more, label %clear.one, label %add
+clear.one:
+  %place = getelementptr {VECTOR}, ptr %found, i64 %k
+  store {VECTOR} zeroinitializer, ptr %place, align 8
+  %k.next = add i64 %k, 1
+  br label %clear
+add:
+  %e = phi i64 [ 0, %clear ], [ %e.next, %add.one ]
+  %left = icmp slt i64 %e, %entries
+  br i1 %left, label %add.from, label %copy
+add.from:
+  %line.at = getelementptr i64, ptr %lines, i64 %e
+  %line = load i64, ptr %line.at
+  %column.at = getelementptr i64, ptr %columns, i64 %e
+  %column = load i64, ptr %column.at
+  %entry.at = getelementptr double, ptr %numbers, i64 %e
+  %number = load double, ptr %entry.at
+  %of.state = icmp sge i64 %column, 0
+  %other = sub i64 -1, %column
+  %index = select i1 %of.state, i64 %column, i64 %other
+  %array = select i1 %of.state, ptr %of.block, ptr %of.params
+  br label %add.one
+add.one:
+  %source = getelementptr {VECTOR}, ptr %array, i64 %index
+  %input = load {VECTOR}, ptr %source, align 8
+  %first = insertelement {VECTOR} poison, double %number, i64 0
+  %factor = shufflevector {VECTOR} %first, {VECTOR} poison, <{LANES} x i32> zeroinitializer
+  %part = fmul {VECTOR} %factor, %input
+  %target = getelementptr {VECTOR}, ptr %found, i64 %line
+  %sum = load {VECTOR}, ptr %target, align 8
+  %total = fadd {VECTOR} %sum, %part
+  store {VECTOR} %total, ptr %target, align 8
+  %e.next = add i64 %e, 1
+  br label %add
+copy:
+  %c = phi i64 [ 0, %add ], [ %c.next, %copy.one ]
+  %rest = icmp slt i64 %c, %size
+  br i1 %rest, label %copy.one, label %end
+copy.one:
+  %from = getelementptr {VECTOR}, ptr %found, i64 %c
+  %moved = load {VECTOR}, ptr %from, align 8
+  %to = getelementptr {VECTOR}, ptr %of.out, i64 %c
+  store {VECTOR} %moved, ptr %to, align 8
+  %c.next = add i64 %c, 1
+  br label %copy
+end:
+  ret void
+}}
+"""
+"""Derivatives of a program at its inputs, entry by entry, times those of the inputs (see `programs.Derivative`)."""
+
+
+class Dual(str):
+    """An operand with the operand of its derivatives: a vector of a real, an address of an array or a table."""
+
+    tangent: str
+
+    def __new__(cls, value: str, tangent: str) -> Dual:
+        found = super().__new__(cls, value)
+        found.tangent = tangent
+        return found
+
+
+def of(operand: str) -> str:
+    """The operand of the derivatives; zero for what has none."""
+    return operand.tangent if isinstance(operand, Dual) else ZERO
+
+
+def tangent_text(functions: Sequence[tree.Function], entry: str, held: Collection[str]) -> str:
+    """The module of some functions with derivatives, of which the last is called from outside: ``entry(K, K')``.
+
+    held : functions that are called without derivatives, as ``module.function``
+    """
+    bodies = [TangentBody(function, held) for function in functions if not _is(function, held)]
+    plain = [Body(function) for function in functions]
+    calls = Counter(symbol for body in (*bodies, *plain) for symbol in body.called)
+    needed = _reached(functions[-1].symbol, {_name(each): each.called for each in (*bodies, *plain)})
+    texts = [body.text(calls[_name(body)] == 1) for body in (*plain, *bodies) if _name(body) in needed]
+    head = HEAD + "declare double @log(double) nounwind nobuiltin willreturn memory(none)\n"
+    whole = "\n".join([head, tags(), PRODUCT, *texts])
+    return whole.replace(f"internal i64 @{functions[-1].symbol}.d(", f"i64 @{entry}(")
+
+
+def _name(body: Body) -> str:
+    return body.function.symbol + (".d" if isinstance(body, TangentBody) else "")
+
+
+def _is(function: tree.Function, names: Collection[str]) -> bool:
+    return ".".join(function.symbol.split(".")[: -len(function.arguments) or None]) in names
+
+
+def _reached(entry: str, calls: dict[str, list[str]]) -> set[str]:
+    found, waiting = set[str](), [f"{entry}.d"]
+    while waiting:
+        symbol = waiting.pop()
+        if symbol not in found:
+            found.add(symbol)
+            waiting += calls[symbol]
+    return found
+
+
+class TangentBody(Body):
+    """One function with derivatives."""
+
+    def __init__(self, function: tree.Function, held: Collection[str]) -> None:
+        self.held = held
+        super().__init__(function)
+
+    def begin_arguments(self) -> None:
+        super().begin_arguments()
+        for name, kind in self.function.arguments.items():
+            if kind in WITH_TANGENT:
+                self.lines.append(f"store {WITH_TANGENT[kind]} %of.{name}, ptr %tangent.{name}{self.align(kind)}")
+
+    def text(self, once: bool) -> str:
+        function = self.function
+        given = [f"{LLVM[kind]} %in.{name}" for name, kind in function.arguments.items()]
+        given += [f"{WITH_TANGENT[k]} %of.{name}" for name, k in function.arguments.items() if k in WITH_TANGENT]
+        inlining = " noinline" if function.apart else " alwaysinline" if once else ""
+        result = BUNDLES.get(self.result, LLVM[self.result])
+        head = f"define internal {result} @{function.symbol}.d({', '.join(given)}) nounwind{inlining} align 64 {{"
+        own = [f"%own.{name} = alloca {LLVM[kind]}" for name, kind in function.locals.items()]
+        own += [f"%tangent.{n} = alloca {WITH_TANGENT[k]}" for n, k in function.locals.items() if k in WITH_TANGENT]
+        return "\n".join([head, "entry:", *own, *self.slots, *self.lines, "}"])
+
+    @staticmethod
+    def align(kind: str) -> str:
+        return ", align 8" if kind == "real" else ""
+
+    def vector_slot(self) -> str:
+        name = self.fresh()
+        self.slots.append(f"{name} = alloca {VECTOR}, align 8")
+        return name
+
+    def splat(self, operand: str) -> str:
+        first = self.emit(f"insertelement {VECTOR} poison, double {operand}, i64 0")
+        return self.emit(f"shufflevector {VECTOR} {first}, {VECTOR} poison, <{LANES} x i32> zeroinitializer")
+
+    def scaled(self, factor: str, tangent: str) -> str:
+        """A vector times a number; ZERO stays."""
+        return ZERO if tangent == ZERO else self.emit(f"fmul {VECTOR} {self.splat(factor)}, {tangent}")
+
+    def sum(self, a: str, b: str, word: str = "fadd") -> str:
+        if b == ZERO:
+            return a
+        if a == ZERO:
+            return b if word == "fadd" else self.emit(f"fneg {VECTOR} {b}")
+        return self.emit(f"{word} {VECTOR} {a}, {b}")
+
+    def dual(self, value: str, tangent: str) -> str:
+        return value if tangent == ZERO else Dual(value, tangent)
+
+    # statements -----------------------------------------------------------------------------------------------------
+    def assign(self, target: tree.Local | tree.Element, value: Value) -> None:
+        super().assign(target, value)
+        if isinstance(target, tree.Local) and target.kind in WITH_TANGENT:
+            operand = of(self.cast(value, target.kind))
+            kind = WITH_TANGENT[target.kind]
+            self.lines.append(f"store {kind} {operand}, ptr %tangent.{target.name}{self.align(target.kind)}")
+
+    def store(self, target: tree.Element, place: str, value: Value) -> None:
+        super().store(target, place, value)
+        if not self.is_held(target):
+            tangent = of(self.cast(value, "real"))
+            self.lines.append(f"store {VECTOR} {tangent}, ptr {of(place)}, align 8, !tbaa !{TAGS[target.what]}")
+
+    def _Return(self, node: tree.Return) -> None:
+        if node.value is None or self.result not in BUNDLES:
+            super()._Return(node)
+            return
+        bundle, kind = BUNDLES[self.result], self.result
+        value = self.as_kind(node.value, kind)
+        half = self.emit(f"insertvalue {bundle} poison, {LLVM[kind]} {value}, 0")
+        whole = self.emit(f"insertvalue {bundle} {half}, {WITH_TANGENT[kind]} {of(value)}, 1")
+        self.lines.append(f"ret {bundle} {whole}")
+        self.begin(self.label())
+
+    # expressions ----------------------------------------------------------------------------------------------------
+    def _Local(self, node: tree.Local) -> str:
+        value = super()._Local(node)
+        if node.kind not in WITH_TANGENT:
+            return value
+        tangent = self.emit(f"load {WITH_TANGENT[node.kind]}, ptr %tangent.{node.name}{self.align(node.kind)}")
+        return Dual(value, tangent)
+
+    def _Field(self, node: tree.Field) -> str:
+        record = self.value(node.record)[0]
+        value = self.field(record, node.name, node.kind)
+        return Dual(value, self.field(of(record), node.name, "reals")) if node.kind == "reals" else value
+
+    @staticmethod
+    def is_held(node: tree.Element) -> bool:
+        """Whether an element has no derivatives, or is no real."""
+        if node.kind != "real" or not isinstance(node.array, tree.Field):
+            return node.kind != "real"
+        index = node.index.value if isinstance(node.index, tree.Number) else -1
+        return node.array.name in HELD_ARRAYS or (node.array.name, index) in HELD_PLACES
+
+    def place(self, node: tree.Element) -> str:
+        array, index = self.value(node.array)[0], self.as_kind(node.index, "int")
+        place = self.emit(f"getelementptr inbounds {LLVM[node.kind]}, ptr {array}, i64 {index}")
+        if self.is_held(node):
+            return place
+        return Dual(place, self.emit(f"getelementptr inbounds {VECTOR}, ptr {of(array)}, i64 {index}"))
+
+    def load(self, node: tree.Element, place: str) -> str:
+        value = super().load(node, place)
+        if self.is_held(node):
+            return value
+        return Dual(value, self.emit(f"load {VECTOR}, ptr {of(place)}, align 8, !tbaa !{TAGS[node.what]}"))
+
+    def operation(self, operator: str, left: Value, right: Value, kind: str) -> str:
+        if kind != "real":
+            return super().operation(operator, left, right, kind)
+        a, b = self.cast(left, kind), self.cast(right, kind)
+        value = super().operation(operator, (a, kind), (b, kind), kind)
+        of_a, of_b = of(a), of(b)
+        if operator in "+-":
+            return self.dual(value, self.sum(of_a, of_b, "fadd" if operator == "+" else "fsub"))
+        if operator == "*":
+            return self.dual(value, self.sum(self.scaled(b, of_a), self.scaled(a, of_b)))
+        if operator == "/":
+            if of_a == of_b == ZERO:
+                return value
+            over = self.emit(f"fdiv double 1.0, {b}")
+            return self.dual(value, self.scaled(over, self.sum(of_a, self.scaled(value, of_b), "fsub")))
+        if operator == "%":
+            return self.dual(value, of_a)
+        if of_a != ZERO:
+            less = self.emit(f"fsub double {b}, 1.0")
+            power = self.emit(f"call double @pow(double {a}, double {less}) nobuiltin")
+            of_a = self.scaled(self.emit(f"fmul double {b}, {power}"), of_a)
+        if of_b != ZERO:
+            log = self.emit(f"call double @log(double {a}) nobuiltin")
+            of_b = self.scaled(self.emit(f"fmul double {value}, {log}"), of_b)
+        return self.dual(value, self.sum(of_a, of_b))
+
+    def _Unary(self, node: tree.Unary) -> str:
+        if node.kind != "real":
+            return super()._Unary(node)
+        operand = self.as_kind(node.value, "real")
+        value, tangent = self.unary(node.operator, operand, "real"), of(operand)
+        if tangent == ZERO:
+            return value
+        if node.operator == "-":
+            return Dual(value, self.emit(f"fneg {VECTOR} {tangent}"))
+        if node.operator == "abs":
+            below = self.emit(f"fcmp olt double {operand}, 0.0")
+            return Dual(value, self.scaled(self.emit(f"select i1 {below}, double -1.0, double 1.0"), tangent))
+        none = self.emit(f"fcmp oeq double {value}, 0.0")
+        slope = self.emit(f"fdiv double 0.5, {value}")
+        return Dual(value, self.scaled(self.emit(f"select i1 {none}, double 0.0, double {slope}"), tangent))
+
+    def _Choice(self, node: tree.Choice) -> str:
+        if node.kind not in WITH_TANGENT:
+            return super()._Choice(node)
+        kind = WITH_TANGENT[node.kind]
+        slot, yes, no, end = self.slot(node.kind), self.label(), self.label(), self.label()
+        more = self.vector_slot() if node.kind == "real" else self.slot(node.kind)
+        self.branch(self.as_kind(node.test, "bool"), yes, no)
+        for label, choice in ((yes, node.yes), (no, node.no)):
+            self.begin(label)
+            value = self.as_kind(choice, node.kind)
+            self.lines.append(f"store {LLVM[node.kind]} {value}, ptr {slot}")
+            self.lines.append(f"store {kind} {of(value)}, ptr {more}{self.align(node.kind)}")
+            self.go(end)
+        self.begin(end)
+        value = self.emit(f"load {LLVM[node.kind]}, ptr {slot}")
+        return Dual(value, self.emit(f"load {kind}, ptr {more}{self.align(node.kind)}"))
+
+    def _Extreme(self, node: tree.Extreme) -> str:
+        if node.kind != "real":
+            return super()._Extreme(node)
+        best: str = self.as_kind(node.values[0], "real")
+        tangent = of(best)
+        for each in node.values[1:]:
+            other = self.as_kind(each, "real")
+            better = self.compared(node.operator, (other, "real"), (best, "real"))
+            best = self.emit(f"select i1 {better}, double {other}, double {best}")
+            if not tangent == of(other) == ZERO:
+                tangent = self.emit(f"select i1 {better}, {VECTOR} {of(other)}, {VECTOR} {tangent}")
+        return self.dual(best, tangent)
+
+    def _Call(self, node: tree.Call) -> str:
+        if _is(node.function, self.held):
+            return super()._Call(node)
+        kinds = list(node.function.arguments.values())
+        name = node.function.symbol
+        operands = [self.as_kind(argument, kind) for argument, kind in zip(node.arguments, kinds, strict=True)]
+        if name.startswith("rules.seeded."):
+            lanes = ", ".join(f"double {1.0 if k == LANES - 1 else 0.0}" for k in range(LANES))
+            return Dual(str(operands[0]), f"<{lanes}>")
+        if name.startswith("rules.at_root."):
+            return self.at_root(*operands)
+        if name.startswith("rules.without_tangent."):
+            return str(operands[0])
+        given = [f"{LLVM[kind]} {operand}" for kind, operand in zip(kinds, operands, strict=True)]
+        given += [f"{WITH_TANGENT[k]} {of(each)}" for k, each in zip(kinds, operands, strict=True) if k in WITH_TANGENT]
+        self.called.append(f"{name}.d")
+        result = BUNDLES.get(node.kind, LLVM[node.kind])
+        call = f"call {result} @{name}.d({', '.join(given)})"
+        if node.kind == "none":
+            self.lines.append(call)
+            return ""
+        both = self.emit(call)
+        if node.kind not in BUNDLES:
+            return both
+        return Dual(self.emit(f"extractvalue {result} {both}, 0"), self.emit(f"extractvalue {result} {both}, 1"))
+
+    def at_root(self, place: str, value: str) -> str:
+        """The place h at which a value is 0: ``h' = −g'/ġ``, with ġ in the last lane; there nothing is left of it."""
+        rate = self.emit(f"extractelement {VECTOR} {of(value)}, i64 {LANES - 1}")
+        over = self.emit(f"fdiv double -1.0, {rate}")
+        moved = self.scaled(over, of(value))
+        return Dual(str(place), self.emit(f"insertelement {VECTOR} {moved}, double 0.0, i64 {LANES - 1}"))
+
+    def _Evaluate(self, node: tree.Evaluate) -> str:
+        table, number = self.value(node.kernel)[0], self.as_kind(node.number, "int")
+        inputs = None if node.inputs is None else self.value(node.inputs)[0]
+        out = self.value(node.out)[0]
+        tables = table, of(table)
+        code, params = ([self.field(each, name, "reals") for each in tables] for name in ("code", "params"))
+        block = [self.field(each, "block", "reals") for each in tables] if inputs is None else [inputs, of(inputs)]
+        places = [self.emit(f"getelementptr inbounds ptr, ptr {each}, i64 {number}") for each in code]
+        function, program = (self.emit(f"load ptr, ptr {place}") for place in places)
+        self.lines.append(
+            f"call void @product(ptr {program}, ptr {block[0]}, ptr {params[0]}, ptr {block[1]}, ptr {params[1]}, "
+            f"ptr {of(out)})"
+        )
+        self.lines.append(f"call void {function}(ptr {block[0]}, ptr {params[0]}, ptr {out})")
+        return ""

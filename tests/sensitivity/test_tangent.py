@@ -1,0 +1,132 @@
+"""The kernel with derivatives: its printer, and its runs beside the pass over rows and beside differences of runs."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.kernel.build import object_of
+from mbd.kernel.translate import Source, functions_of, translate
+from mbd.sensitivity.derivative import final_state_derivative
+from mbd.sensitivity.run_data import unknown
+from mbd.sensitivity.tangent.printer import LANES, tangent_text
+from mbd.sensitivity.walk import Walk
+from tests.sensitivity.test_cones import box
+from tests.sensitivity.turns import judged
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
+from tests.simulation.test_cones import thrown
+
+CLOSE = {"tolerance": 1e-12}
+SCHEMES = [
+    mbd.RungeKutta853(), mbd.RungeKutta4(), mbd.RadauIIA(**CLOSE), mbd.HHT(0.05, **CLOSE), mbd.Newmark(**CLOSE),
+    mbd.GeneralizedAlpha(0.8, **CLOSE), mbd.HHT(0.05, formulation="index3", **CLOSE),
+]  # fmt: skip
+
+TEXT = '''
+def entry(K: Kernel, x: Reals, out: Reals) -> int:
+    """All that has a derivative."""
+    out[0] = x[0] * x[1] - x[0] / x[1] + (x[1] - 2.0 * x[0])
+    out[1] = x[0] ** 3.0 + x[0] ** x[1]
+    out[2] = sqrt(x[0] * x[0] + x[1]) + abs(-x[0]) + abs(x[1])
+    out[3] = max(x[0], x[1], x[0] * x[1]) + min(x[0], x[1])
+    out[4] = x[0] if x[0] < x[1] else x[1]
+    out[5] = half(chosen(x, out), 0)
+    out[5] += x[1] * x[0]
+    total = 0.0
+    for i in range(2):
+        total += float(i + 1) * x[i]
+    while total < 10.0:
+        total *= 1.5
+    out[6] = total % 7.0
+    out[7] = float(int(x[0]))
+    return 0
+
+
+def chosen(x: Reals, out: Reals) -> Reals:
+    return x if out[0] < 1e9 else out
+
+
+def half(x: Reals, i: int) -> float:
+    return 0.5 * x[i]
+'''
+
+
+def test_every_operation_has_its_derivative():
+    """Beside differences of order 4 of the values themselves."""
+    source = Source("given", functions_of(TEXT), {})
+    code = object_of(tangent_text(translate(source, "entry", ["kernel", "reals", "reals"]), "given_entry", ()), 0)
+    from mbd.compile.llvm import Machine
+
+    machine = Machine()
+    run = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 6)(machine.load(code, ["given_entry"])[0])
+
+    def at(x):
+        x, out = np.array(x), np.zeros(8)
+        of_x, of_out = np.zeros((2, LANES)), np.zeros((8, LANES))
+        of_x[:, 0], of_x[:, 3] = (1.0, 0.0), (0.5, -2.0)
+        given = [each.ctypes.data for each in (x, out, of_x, of_out)]
+        run(None, given[0], given[1], None, given[2], given[3])
+        return out, of_out
+
+    for x in np.random.default_rng(1).uniform(0.3, 1.7, (20, 2)):
+        out, found = at(x)
+        assert np.isfinite(out).all() and not found[:, 1].any()
+        for lane, way in ((0, np.array([1.0, 0.0])), (3, np.array([0.5, -2.0]))):
+            h = 1e-4
+            one, two = ((at(x + k * h * way)[0] - at(x - k * h * way)[0]) / (2.0 * k * h) for k in (1, 2))
+            smooth = np.abs(one - two) < 1e-2  # no choice is turned between them
+            assert smooth.sum() > 5
+            assert found[smooth, lane] == pytest.approx(((4.0 * one - two) / 3.0)[smooth], rel=1e-6, abs=1e-8)
+
+
+@pytest.fixture
+def forced(monkeypatch):
+    """Lets the pass over rows know nothing, for as long as this is."""
+
+    def force():
+        def whole(*given):
+            raise unknown("forced")
+
+        monkeypatch.setattr(Walk, "whole", whole)
+
+    return force
+
+
+def both(forced, *asked):
+    known = [final_state_derivative(*each) for each in asked]
+    forced()
+    return [
+        np.max(np.abs(np.vstack(a) - np.vstack(b)) / np.max(np.abs(np.vstack(a)), axis=0))
+        for a, b in zip(known, [final_state_derivative(*each) for each in asked], strict=True)
+    ]
+
+
+def test_a_walker_by_every_scheme(forced):
+    """Over the lock of its knee and its foot's impact, in two parts of seven directions at most."""
+    model = kneed_walker()
+    start = kneed_walker_start(model)
+    names = [*start.names, *start.velocity_names, "right thigh.mass", "gravity.x"][:10]
+    runs = [mbd.simulate(model, start, scheme, dt=0.005, until="right foot") for scheme in SCHEMES]
+    assert all(len(run.events) == 4 for run in runs)
+    assert max(both(forced, *((run, names) for run in runs))) < 2e-8
+
+
+@pytest.mark.parametrize(
+    "settings", [{"contact": "nonsmooth"}, {"impact": "poisson"}, {"impact": "sequential"}], ids=str
+)
+def test_a_thrown_mass_with_friction_in_space_by_every_scheme(settings):
+    model = thrown(0.3, 0.6)
+    start = mbd.assemble(model, {"slide.y": 0.01}, {"slide.x": 1.2, "slide.y": -1.0, "slide.z": 0.5})
+    for scheme in SCHEMES:
+        off, noise = judged(model, start, scheme, ways=1, dt=5e-3, until=0.1, **settings)
+        assert np.all(off <= np.maximum(1e-8, 2.0 * noise)), scheme
+
+
+@pytest.mark.parametrize("scheme", [SCHEMES[0], SCHEMES[3]], ids=repr)
+def test_a_floating_box_that_strikes_and_slides_by_nonsmooth_steps(scheme):
+    """With a quaternion, corners and friction in a plane."""
+    found = judged(*box(0.3), scheme, ways=2, parameters=["gravity.y"], dt=2.5e-3, until=0.25, contact="nonsmooth")
+    assert found is not None and np.all(found[0] <= np.maximum(1e-7, 2.0 * found[1])), found
