@@ -42,7 +42,9 @@ if TYPE_CHECKING:
         Bilateral as Bilateral,
         Controller as Controller,
         Event as Event,
+        HystereticStop as HystereticStop,
         KnifeEdge as KnifeEdge,
+        MaxwellStop as MaxwellStop,
         Mode as Mode,
         Nonholonomic as Nonholonomic,
         Penalty as Penalty,
@@ -125,7 +127,9 @@ if TYPE_CHECKING:
     from mbd.joints.losses import (
         AffineFriction as AffineFriction,
         Coulomb as Coulomb,
+        Dahl as Dahl,
         Dissipation as Dissipation,
+        LuGre as LuGre,
         PinFriction as PinFriction,
         Quadratic as Quadratic,
         Stribeck as Stribeck,
@@ -197,8 +201,9 @@ _HOMES = {
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
-    "mbd.constraints": "Ball Bilateral Controller Event KnifeEdge Mode Nonholonomic Penalty PenaltyParameters Plane "
-    "Rolling SampledLaw Transition Unilateral When cone disk_touchdown distance extension flexion height measure "
+    "mbd.constraints": "Ball Bilateral Controller Event HystereticStop KnifeEdge MaxwellStop Mode Nonholonomic Penalty "
+    "PenaltyParameters Plane Rolling SampledLaw Transition Unilateral When cone disk_touchdown distance extension "
+    "flexion height measure "
     "penalty_parameters profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.laboratory.assignment": "assign_plates",
@@ -223,7 +228,8 @@ _HOMES = {
     "mbd.gait.limit_cycle": "limit_cycle",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta4 RungeKutta853",
     "mbd.joints": "Cylindrical Free Planar Prismatic Revolute Screw Spherical Translation Universal Weld",
-    "mbd.joints.losses": "AffineFriction Coulomb Dissipation PinFriction Quadratic Stribeck Tabulated Valves Viscous",
+    "mbd.joints.losses": "AffineFriction Coulomb Dahl Dissipation LuGre PinFriction Quadratic Stribeck "
+    "Tabulated Valves Viscous",
     "mbd.description": "on_slope",
     "mbd.model": "Model",
     "mbd.parts.whole_body.human": "Human human",

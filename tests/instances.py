@@ -102,6 +102,9 @@ LOSSES: list[tuple[str, Callable[[], Loss]]] = [
     ("friction that grows with speed", lambda: mbd.AffineFriction(3.0, 0.2, smoothing=0.05)),
     ("stribeck", lambda: mbd.Stribeck(3.0, 2.0, 0.05)),
     ("stribeck and viscous", lambda: mbd.Stribeck(3.0, 2.0, 0.05) + mbd.Viscous(0.7)),
+    ("dahl", lambda: mbd.Dahl(3.0, 400.0)),
+    ("lugre", lambda: mbd.LuGre(3.0, 2.0, 0.5, 400.0, 0.8) + mbd.Viscous(0.6)),
+    ("lugre whose damping falls", lambda: mbd.LuGre(3.0, 2.0, 0.5, 400.0, 0.8, damping_rate=0.1)),
     ("viscous and quadratic", lambda: mbd.Viscous(0.7) + mbd.Quadratic(0.4)),
 ]
 
@@ -257,6 +260,8 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
     ("round mat", lambda a, b, joint: mbd.Penalty("law", mbd.rolling_touchdown(a, 0.3), 1e4, damping=10.0)),
     ("knee lock", lambda a, b, joint: mbd.Unilateral("law", mbd.flexion(joint))),
     ("rubber stop", lambda a, b, joint: mbd.Penalty("law", mbd.flexion(joint), stiffness=1e3, damping=2.0)),
+    ("viscoelastic stop", lambda a, b, joint: mbd.MaxwellStop("law", mbd.flexion(joint), 1e3, 2e3, 20.0)),
+    ("hysteretic stop", lambda a, b, joint: mbd.HystereticStop("law", mbd.flexion(joint), 1e3, 0.4, 0.02)),
     ("mat", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, damping=10.0, release="pull")),
     (
         "rubbing mat",

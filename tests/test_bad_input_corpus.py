@@ -89,6 +89,10 @@ EXAMPLES: dict[str, Any] = {
     "state": START,
     "starts": [START, START],
     "speed": 0.1,
+    "share": 0.4,
+    "travel": 0.01,
+    "branch_stiffness": 1.0,
+    "branch_damping": 1.0,
     "static": 0.6,
     "stiffness": 1.0,
     "subject": ANGLE,
@@ -102,7 +106,7 @@ EXAMPLES: dict[str, Any] = {
 """A right argument by the name of its parameter."""
 
 OWN: dict[tuple[str, str], Any] = {
-    ("Stribeck", "kinetic"): 0.4,
+    ("Stribeck", "kinetic"): 0.4, ("LuGre", "kinetic"): 0.4,
     ("Applied", "force"): (1.0, 0.0, 0.0), ("accuracy", "until"): 0.1, ("effects", "until"): 0.1,
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,

@@ -6,8 +6,10 @@ from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.controller import Controller
 from mbd.constraints.disks import disk_touchdown
 from mbd.constraints.event import Event
+from mbd.constraints.hysteretic_stop import HystereticStop
 from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.law import Closing, Drag, Equation, Law
+from mbd.constraints.maxwell_stop import MaxwellStop
 from mbd.constraints.measure import Measure
 from mbd.constraints.measures import distance, extension, flexion, height, separation
 from mbd.constraints.mode import Mode, Transition
@@ -26,9 +28,9 @@ from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 
 __all__ = [
-    "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "KnifeEdge", "Law",
-    "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane", "Rolling", "SampledLaw", "Transition",
-    "Unilateral", "VelocityConstraint", "When", "cone", "disk_touchdown", "distance", "extension", "flexion", "height",
-    "measure", "penalty_parameters", "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown",
-    "touchdown", "twist",
+    "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "HystereticStop",
+    "KnifeEdge", "Law", "MaxwellStop", "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane",
+    "Rolling", "SampledLaw", "Transition", "Unilateral", "VelocityConstraint", "When", "cone", "disk_touchdown",
+    "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "profile_touchdown",
+    "rolling_touchdown", "separation", "sphere_touchdown", "touchdown", "twist",
 ]  # fmt: skip

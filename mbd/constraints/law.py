@@ -126,6 +126,7 @@ class Law:
     while_closed : name of a contact by rows that must be closed for rows on velocities to hold
     rates : (z, ż) of its first-order states ``scope.state(self.name, field, initial)``. They follow their rates at all
         times, also while a contact is open; forces, limits and `elastic` may depend on z, rows and gaps may not
+    rates_while_open : False where the states of a force law stand still while it is open
     """
 
     rows: Sequence[Equation] = ()
@@ -136,3 +137,4 @@ class Law:
     elastic: Scalar | None = None
     while_closed: str | None = None
     rates: Sequence[tuple[Node, Scalar]] = field(default=())
+    rates_while_open: bool = True

@@ -168,7 +168,8 @@ def _contact(
     """A law that closes and opens, by rows or by a force."""
     holding = Holding(scope, scope.first_anchor + sum(len(contact.anchors) for contact in found.contacts))
     law = law_of(word, holding, contacts)
-    found.rates += law.rates
+    acts = 1.0 if law.rates_while_open else scope.tape.input("switch", number)
+    found.rates += [(state, acts * rate) for state, rate in law.rates]
     if law.contact is not None:
         by = _by_force if law.push is not None else _by_rows
         found.contacts.append(by(found, scope, dynamics, word, law, law.contact, holding, number))

@@ -49,7 +49,7 @@ def outgrows(K: Switching, h: float, t1: float, stretch: float, at_y: int, at_D:
         take_back(K, at_y, at_D, part, 0.5 * h * part)
         if consistent(K, t1, K.q1, K.y1) == 0:
             moved = growth_between(K, h, stretch, part, at_D, 0, K.n_v)
-            states = growth_between(K, h, stretch, part, at_D, K.n_v, n)
+            states = growth_of_states(K, h, t1, stretch, part, at_y, at_D) if n > K.n_v else 0.0
             K.unforeseen_change = max(moved, states)
             return max(moved, states) > resolved_growth(K)
         part *= 0.0625
@@ -68,6 +68,16 @@ def take_back(K: Guards, at_y: int, at_D: int, part: float, time: float) -> None
     for i in range(K.n_v):
         K.block[K.o_x + i] = -time * K.inside[at_D + i]
     call(K, COMPOSE, K.q1)
+
+
+def growth_of_states(K: Kernel, h: float, t1: float, stretch: float, part: float, at_y: int, at_D: int) -> float:
+    """ζ of the first-order states alone: what they owe to the change of the motion, as ``ż = v``, is no growth."""
+    for i in range(K.n):
+        K.y1[i] = K.inside[at_y + i] - (part * K.inside[at_D + i] if i >= K.n_v else 0.0)
+    K.q1[: K.n_q] = K.inside[: K.n_q]
+    if consistent(K, t1, K.q1, K.y1) != 0:
+        return 0.0
+    return growth_between(K, h, stretch, part, at_D, K.n_v, K.n)
 
 
 def leave_rows_alone(K: Switching, at_D: int) -> None:

@@ -1,0 +1,132 @@
+"""Friction and stops that remember: what their papers say of them in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbd
+
+
+def ramp(u):
+    """From 0 to 1 as u goes there, with rates and accelerations that begin and end at 0."""
+    u = mbd.minimum(mbd.maximum(u, 0.0), 1.0)
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+
+
+def moved(loss=None, motion=lambda t: 0.1 * mbd.sin(t)):
+    """A slider of 1 kg, moved as told, with a loss."""
+    model, body = mbd.Model("moved", gravity=(0, 0, 0)), mbd.PointMass("body", 1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, loss=loss)
+    model.connect(rail)
+    model.constrain(mbd.Bilateral("drive", rail, value=motion))
+    return model, mbd.assemble(model)
+
+
+def pressed(make, motion):
+    """A stop at 0 below a body that is moved up and down."""
+    model, body = mbd.Model("pressed", gravity=(0, 0, 0)), mbd.PointMass("body", 1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, axis=(0, 1, 0))
+    model.connect(rail)
+    model.constrain(mbd.Bilateral("drive", rail, value=motion), make(mbd.height(body.origin)))
+    return model, mbd.assemble(model)
+
+
+def test_dahl_friction_grows_with_the_travel_and_not_with_the_speed():
+    """Along a first loading from rest, ``F = T (1 − e^{−σ x/T})``, however fast it is."""
+    for pace in (1.0, 7.0):
+        model, start = moved(mbd.Dahl(2.0, 300.0), lambda t, w=pace: 0.02 * (1.0 - mbd.cos(w * t)))
+        run = mbd.simulate(model, start, mbd.RungeKutta4(), dt=2e-3 / pace, until=3.0 / pace)
+        x = run["rail.displacement"]
+        np.testing.assert_allclose(-run["rail loss.force"], 2.0 * (1.0 - np.exp(-150.0 * x)), atol=1e-8)
+
+
+def test_a_dahl_loop_takes_its_energy_whatever_its_period():
+    taken = []
+    for pace in (1.0, 10.0):
+        model, start = moved(mbd.Dahl(2.0, 300.0), lambda t, w=pace: 0.02 * (1.0 - mbd.cos(w * t)))
+        run = mbd.simulate(model, start, mbd.RungeKutta4(), dt=np.pi / 1000 / pace, until=2.0 * np.pi / pace)
+        taken.append({part.name: part.energy[-1] for part in run.energy.parts}["rail loss"])
+    assert taken[0] == pytest.approx(taken[1], rel=1e-6)
+    assert taken[0] < -0.05
+
+
+def test_lugre_slides_steadily_with_the_friction_of_stribeck():
+    loss = mbd.LuGre(3.0, 2.0, 0.5, 400.0, 0.8) + mbd.Viscous(0.6)
+    for speed in (0.1, 0.5, 2.0):
+        model, start = moved(loss, lambda t, v=speed: v * t)
+        run = mbd.simulate(model, start, mbd.RadauIIA(), dt=2e-3, until=4.0)
+        expected = 2.0 + np.exp(-((speed / 0.5) ** 2)) + 0.6 * speed
+        assert -run["rail loss.force"][-1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_lugre_holds_a_load_below_its_static_friction_as_a_spring():
+    model, body = mbd.Model("held", gravity=(0, 0, 0)), mbd.PointMass("body", 1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, loss=mbd.LuGre(3.0, 2.0, 0.5, 400.0, 20.0))
+    model.connect(rail)
+    model.apply(mbd.Motor("pull", rail, torque=lambda t: 1.5 * mbd.minimum(t, 1.0)))
+    run = mbd.simulate(model, mbd.assemble(model), mbd.HHT(), dt=1e-3, until=5.0)
+    assert abs(run["rail.rate"][-1]) < 1e-6
+    assert run["rail loss.deflection"][-1] == pytest.approx(1.5 / 400.0, rel=1e-3)
+
+
+def test_a_maxwell_stop_relaxes_to_its_slow_stiffness():
+    """At a depth d since t = 0, ``p = d (k + k₁ e^{−k₁ t/c})`` but for what flowed while it was pressed."""
+    model, start = pressed(
+        lambda where: mbd.MaxwellStop("stop", where, 1000.0, 2000.0, 100.0),
+        lambda t: 0.01 - 0.03 * ramp(t / 0.004),
+    )
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-4, until=0.3)
+    late = run.time > 0.01
+    excess = run["stop.force"][late] - 0.02 * 1000.0
+    np.testing.assert_allclose(np.diff(np.log(excess)), -2000.0 / 100.0 * np.diff(run.time[late]), rtol=1e-6)
+    assert run["stop.force"].max() == pytest.approx(0.02 * 3000.0, rel=0.03)
+
+
+def test_a_maxwell_stop_comes_back_while_it_is_open():
+    """Free, ``ẋ = −x/(c (1/k + 1/k₁))``; it never pulls."""
+    model, start = pressed(
+        lambda where: mbd.MaxwellStop("stop", where, 1000.0, 2000.0, 100.0),
+        lambda t: 0.01 - 0.03 * (ramp(t / 0.1) - ramp((t - 0.1) / 0.1)),
+    )
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-4, until=0.8)
+    assert run["stop.force"].min() >= -1e-12
+    late = run.time > 0.35
+    rate = 1.0 / (100.0 * (1.0 / 1000.0 + 1.0 / 2000.0))
+    np.testing.assert_allclose(np.diff(np.log(run["stop.flow"][late])), -rate * np.diff(run.time[late]), rtol=1e-6)
+
+
+def test_a_hysteretic_stop_follows_its_closed_forms_and_gives_back_less():
+    """Loading ``p = (1−η) k δ + η k d (1 − e^{−δ/d})``; then ``z = −d + (d + z₁) e^{−(δ₁−δ)/d}``."""
+    k, share, d = 1000.0, 0.4, 0.01
+    model, start = pressed(
+        lambda where: mbd.HystereticStop("stop", where, k, share, d), lambda t: 0.01 - 0.03 * mbd.sin(t)
+    )
+    run = mbd.simulate(model, start, mbd.RungeKutta4(), dt=1e-3, until=3.0)
+    depth, going = -run["stop.gap"], run.time < 0.5 * np.pi
+    down, up = going & (depth > 0.0), ~going & (run["stop.force"] > 0.02)
+    one = d * (1.0 - np.exp(-depth / d))
+    np.testing.assert_allclose(run["stop.deflection"][down], one[down], atol=1e-7)
+    deepest = 0.02
+    last = d * (1.0 - np.exp(-deepest / d))
+    np.testing.assert_allclose(
+        run["stop.deflection"][up], (-d + (d + last) * np.exp((depth - deepest) / d))[up], atol=1e-6
+    )
+    assert run["stop.force"].min() >= -1e-12
+    (part,) = [part for part in run.energy.parts if part.name == "stop"]
+    assert part.energy[-1] < -0.02
+    assert np.max(np.abs(run.energy.numerical)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda where: mbd.MaxwellStop("stop", where, 0.0, 1.0, 1.0), "'stop'.*stiffness 0 does not push it back"),
+        (lambda where: mbd.HystereticStop("stop", where, 1.0, 1.0, 0.1), "share 1 is not between 0 and 1"),
+        (lambda where: mbd.Dahl(0.0, 1.0), "torque 0 is not positive"),
+        (lambda where: mbd.LuGre(1.0, 1.0, 0.0, 1.0), "speed 0 is not positive"),
+    ],
+)
+def test_numbers_without_a_meaning_are_refused_by_name(make, told):
+    with pytest.raises(mbd.ModelError, match=told):
+        make(mbd.height(mbd.PointMass("body", 1.0).origin))
