@@ -82,6 +82,11 @@ class CoordinateScope(ParameterScope):
             raise UnknownNameError(nearest(name, self.known, "quantity", "Known are"))
         return self.tape.lift(self.known[found])
 
+    def offer(self, name: str, value: Scalar) -> None:
+        """Let words and expressions ask for one more quantity."""
+        self.known[name] = value
+        self._spelled[identifier(name)] = name
+
     def knows(self, name: str) -> bool:
         """Whether `named` does."""
         return self._spelled.get(name, name) in self.known

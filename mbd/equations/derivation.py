@@ -89,7 +89,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     are `carried` as coordinates of their own in a second derivation.
     """
     scope = DerivationContext(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
-    declare_machines(scope, model.machines, scope.quantities)
+    declare_machines(scope, model.machines, scope.quantities.value)
     scope.offer_frames(model.frames.values())
     scope.parameters.expect(model.parameters)
     if plan.planar and plan.cut:

@@ -14,6 +14,7 @@ from mbd.equations.effects import causes, effect_of
 from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.gathered import Gathered
 from mbd.equations.laws import Laws
+from mbd.equations.machines import declare_machines, machine_guards
 from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_contacts, offer_effects, offer_rows
@@ -37,6 +38,10 @@ class Lowering:
         self.scope = CoordinateScope(names, system.own_parameters, system.tunable)
         self.tape, self.inputs, self.q, self._known = self.scope.tape, self.scope.inputs, self.scope.q, self.scope.known
         self.faults: list[str] = []
+        try:
+            declare_machines(self.scope, system.machines, self.scope.offer)
+        except ModelError as error:
+            self.faults += error.faults
         self.T = self._scalar(system.kinetic, "the kinetic energy")
         self.V = self._scalar(system.potential, "the potential")
         self.D = self._scalar(system.dissipation, "the dissipation")
@@ -136,6 +141,7 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
         balance=tuple(balance), rows=tuple(known.rows), contacts=tuple(known.contacts), guards=tuple(known.guards),
         effects=effects, kinetic=kinetic, potential=potential, compose=None, output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{c.name}.rate" for c in system.coordinates), frictions=tuple(known.frictions),
+        machines=tuple(known.machines),
         observations=tuple((each.name, each.unit) for each in system.observations),
     )  # fmt: skip
 
@@ -160,6 +166,8 @@ def _laws(system: EnergyDescription, lowering: Lowering, gathered: Gathered) -> 
     always = [word for word in system.words if word.kind in ("bilateral", "nonholonomic")]
     written = {name for controller in system.controllers for name in controller.writes}
     laws(scope, scope, (), always, system.contacts, system.events, gathered, before=known, written=written)
+    with gathered.catch():
+        known.take_machines(*machine_guards(scope, system.machines, system.contacts, system.events, system.parameters))
     return known
 
 
@@ -211,6 +219,8 @@ def _outputs(
         outputs.alias(f"{coordinate.name}_rate", f"{coordinate.name}.rate")
     for state, node in scope.states:
         outputs.value(state.name, node)
+    for name in (name for machine in system.machines for name in machine.quantity_names):
+        outputs.value(name, scope.known[name])
     for name, force in lowering.Q.items():
         outputs.value(f"{name}.force", force)
     offer_rows(outputs, tape, known.rows)

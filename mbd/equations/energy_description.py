@@ -11,6 +11,7 @@ from mbd.bodies.values import named_number_faults, names_of, number, printable
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
+from mbd.constraints.machine import Machine
 from mbd.constraints.observation import Observation
 from mbd.description import all_are, served
 from mbd.errors import ModelError, UnknownNameError, nearest
@@ -124,10 +125,11 @@ class EnergyDescription:
         )
         self._add(served(all_are(Constraint, constraints, example)), self.constraints)
 
-    def apply(self, *forces: Force | Controller) -> None:
-        """Add forces on coordinates, such as `mbd.Potential` or a force class of one's own, and controllers."""
+    def apply(self, *forces: Force | Controller | Machine) -> None:
+        """Add forces on coordinates, such as `mbd.Potential` or a force class of one's own, controllers and modes."""
         example = "apply takes forces such as mbd.Potential('spring', lambda q: 5.0 * q**2, 'theta'), and controllers"
-        known = all_are((Force, Controller), forces, example)
+        known = all_are((Force, Controller, Machine), forces, example)
+        self.constrain(*[word for word in known if isinstance(word, Machine)])
         self._add([word for word in known if isinstance(word, Force)], self.forces)
         controllers = [*self.controllers, *(word for word in known if isinstance(word, Controller))]
         object.__setattr__(self, "controllers", controllers)
@@ -169,6 +171,11 @@ class EnergyDescription:
     def contacts(self) -> list[Constraint]:
         """Constraints that open and close, in order."""
         return [word for word in self.words if word.kind in ("unilateral", "penalty")]
+
+    @property
+    def machines(self) -> list[Machine]:
+        """Modes and sampled laws."""
+        return [word for word in self.words if isinstance(word, Machine)]
 
     @property
     def events(self) -> list[Event]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from mbd.constraints.base import Constraint
 from mbd.constraints.event import Event
@@ -10,10 +10,9 @@ from mbd.constraints.machine import Change, Machine, state_of
 from mbd.equations import equations as records
 from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.equations import Guard, Transition
-from mbd.equations.outputs import Outputs
 from mbd.errors import ModelError, nearest
 from mbd.tape.derivatives import live
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["declare_machines", "machine_guards"]
 
@@ -30,8 +29,10 @@ def held_by(scope: DerivationScope, words: Sequence[Machine]) -> dict[str, list[
     return found
 
 
-def declare_machines(scope: DerivationScope, words: Sequence[Machine], quantities: Outputs) -> None:
-    """Their anchors, and what they offer by name and set in the place of parameters.
+def declare_machines(
+    scope: DerivationScope, words: Sequence[Machine], offer: Callable[[str, Scalar], None]
+) -> None:  # fmt: skip
+    """Their anchors, and what they `offer` by name and set in the place of parameters.
 
     Raises
     ------
@@ -43,12 +44,12 @@ def declare_machines(scope: DerivationScope, words: Sequence[Machine], quantitie
         scope.first_anchor += len(held)
         scope.modes[word.name] = word.state_names
         for name, value in word.quantities(scope, held).items():
-            quantities.value(name, value)
+            offer(name, value)
         for name in (*word.held_parameters(), *word.parameters_by_state()):
             if name in scope.parameters:
                 faults.append(
-                    f"'{word.name}' sets {name!r}, which the geometry is made of; only parameters of forces, losses, "
-                    "contacts and measures change at instants"
+                    f"'{word.name}' sets {name!r}, which masses and energies are made of; only parameters of forces, "
+                    "losses, contacts and measures change at instants"
                 )
             if name in scope.held_parameters or name in scope.parameters_by_state:
                 faults.append(f"'{word.name}' sets {name!r}, which another mode or sampled law sets as well")

@@ -98,6 +98,29 @@ def test_timers_end_at_their_instant_and_laws_know_the_time_in_the_state(integra
     np.testing.assert_array_equal(run["phase.index"], [("swing", "pull", "brake").index(each) for each in phase])
 
 
+def test_a_lagrangian_has_modes_too() -> None:
+    theta = mbd.Coordinate("theta")
+
+    def drive(theta: Any, theta_rate: Any, phase: Any, phase_time: Any, phase_turn: Any) -> Any:
+        pull = -3.0 * (theta - phase_turn) + phase_time - 0.04 * theta_rate
+        return mbd.where(phase < 0.5, -0.05 * theta_rate, mbd.where(phase < 1.5, pull, -0.15 * theta_rate))
+
+    model = mbd.Lagrangian(
+        "knee", [theta], kinetic=0.5 * 0.11 * theta.v**2,
+        potential=lambda theta: -2.0 * G * 0.2 * mbd.cos(theta), forces={theta: drive},
+    )  # fmt: skip
+    model.apply(mbd.Mode("phase", ("swing", "pull", "brake"), transitions=[
+        mbd.Transition("swing", "pull", when=theta.v, direction=1),
+        mbd.Transition("pull", "brake", after=0.13),
+        mbd.Transition("brake", "swing", when=theta.q - 0.1),
+    ], remembers={"turn": {"pull": "theta"}}))  # fmt: skip
+    run = mbd.simulate(model, mbd.assemble(model, {"theta": 0.8}), mbd.RungeKutta853(), dt=0.01, until=4.0)
+    wanted, (q, v) = oracle(4.0, 0.8)
+    np.testing.assert_allclose([event.time for event in run.events], [time for time, _ in wanted], atol=1e-10)
+    np.testing.assert_allclose([run.final.q[0], run.final.v[0]], [q, v], atol=1e-9)
+    assert set(run["phase"]) == {"swing", "pull", "brake"}
+
+
 def test_schemes_keep_their_order_across_transitions() -> None:
     model = knee()
     start = mbd.assemble(model, {"knee.angle": 0.8})
