@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
+from scipy.integrate import solve_ivp, trapezoid
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.special import ellipk
@@ -32,7 +32,20 @@ NAMES = (
     "user-constraint", "user-integrator",
 )  # fmt: skip
 NAMES = tuple(
-    sorted((*NAMES, "amputee-in-space", "bicycle", "billiard-ball", "rolling-coin", "tippe-top", "walker-in-space"))
+    sorted(
+        (
+            *NAMES,
+            "amputee-in-space",
+            "bicycle",
+            "billiard-ball",
+            "rolling-coin",
+            "tippe-top",
+            "walker-in-space",
+            "powered-knee",
+            "raibert-hopper",
+            "torso-walker",
+        )
+    )
 )
 HEAVY = ("amputee-in-space",)
 """Whose plain twin takes minutes: see tests/cases/test_space_examples.py."""
@@ -339,6 +352,58 @@ def _first_root(function: Any, begin: float) -> float:
     values = np.array([function(t) for t in times])
     place = int(np.argmax(values < 0.0))
     return float(brentq(function, times[max(place - 1, 0)], times[place], xtol=1e-14))
+
+
+def test_the_torso_walker_repeats_its_stable_gait() -> None:
+    run, found = run_of("torso-walker"), script("torso-walker")["gait"]
+    struck = [event.time for event in strikes(run, "foot")]
+    np.testing.assert_allclose(struck, found.period * np.arange(1, len(struck) + 1), atol=1e-8)
+    assert found.period == pytest.approx(0.746772, abs=1e-6)
+    assert abs(found.multipliers[0]) == pytest.approx(0.559377, abs=1e-6)
+    assert np.max(np.abs(run["waist.angle"] - math.pi)) < 0.05
+    left, right = run["stance"] == "left", run["stance"] == "right"
+    assert not run["right drive.torque"][left].any() and not run["left drive.torque"][right].any()
+
+
+def test_the_powered_knee_switches_where_an_integration_of_each_phase_does() -> None:
+    run, deg = run_of("powered-knee"), math.pi / 180.0
+    m, length, center, inertia = 3.5, 0.42, 0.2, 0.06
+
+    def rates(t: float, y: Any, stiffness: float, damping: float, rest: float) -> list[float]:
+        w = math.pi / 0.45
+        hip, rate, push = (deg * x for x in (
+            7.5 - 17.5 * math.cos(w * t), 17.5 * w * math.sin(w * t), 17.5 * w * w * math.cos(w * t)))  # fmt: skip
+        torque = -stiffness * (y[0] + rest * deg) - damping * y[1] - m * g * center * math.sin(hip + y[0])
+        torque -= m * length * center * (math.cos(y[0]) * push + math.sin(y[0]) * rate**2)
+        return [y[1], torque / (inertia + m * center**2) - push]
+
+    def turns(t: float, y: Any, *_: float) -> Any:
+        return y[1] + 3.0 * deg
+
+    def straightens(t: float, y: Any, *_: float) -> Any:
+        return y[0] + 10.0 * deg
+
+    turns.terminal = straightens.terminal = True  # type: ignore[attr-defined]
+    options: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
+    early = solve_ivp(rates, (0.0, 1.0), [-40 * deg, -150 * deg], events=turns, args=(39.749, 0.063, 60.0), **options)
+    late = solve_ivp(
+        rates, (early.t[-1], 1.0), early.y[:, -1], events=straightens, args=(15.899, 3.816, 5.0), **options
+    )
+    last = solve_ivp(rates, (late.t[-1], 0.6), late.y[:, -1], args=(99.372, 3.18, 5.0), **options)
+    np.testing.assert_allclose([event.time for event in run.events], [early.t[-1], late.t[-1]], atol=1e-10)
+    np.testing.assert_allclose([run.final["knee.angle"], run.final["knee.rate"]], last.y[:, -1], atol=1e-9)
+    assert run["phase.most"][-1] == pytest.approx(early.y[0, -1], abs=1e-10)
+
+
+def test_the_hopper_settles_to_the_gait_that_is_stable() -> None:
+    run = run_of("raibert-hopper")
+    found = mbd.limit_cycle(script("raibert-hopper")["model"], run.final, section="toe")
+    assert found.period == pytest.approx(0.632229, abs=1e-5)
+    assert found.speed == pytest.approx(0.92728, abs=1e-4)
+    assert abs(found.multipliers[0]) == pytest.approx(0.81955, abs=1e-4)
+    hops = np.diff([event.time for event in strikes(run, "toe")])
+    share = (hops[-1] - found.period) / (hops[-4] - found.period)  # of three hops
+    assert share == pytest.approx(abs(found.multipliers[0]) ** 3, rel=0.05)
 
 
 def test_the_compass_gait_is_the_published_one() -> None:

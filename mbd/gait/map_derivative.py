@@ -170,7 +170,7 @@ class _Column:
             self._tried(self.best is not None)
             return
         ends: Any = beside[:2]
-        if self.rescalings and self._rescales(0.5 * float(np.max(np.abs(ends[0] - ends[1]), initial=0.0)), wanted):
+        if self.rescalings and self._rescales(0.5 * float(np.nanmax(np.abs(ends[0] - ends[1]), initial=0.0)), wanted):
             return
         self.rescalings, self.first = 0, self.first or self.step
         pairs = zip(beside[::2], beside[1::2], strict=True)
@@ -182,7 +182,7 @@ class _Column:
             found = np.where(better, found[0], last[0]), np.where(better, found[1], last[1])
         limits = np.maximum(1.0, np.abs(found[0]))
         if last is None:
-            good = bool(np.all(found[1] <= ENOUGH * limits))
+            good = not bool(np.any(found[1] > ENOUGH * limits))
         else:
             good = not bool(np.any(found[1] > POOR * limits))
         self.best = found
