@@ -133,7 +133,9 @@ def _stepped(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values
 
 
 def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:
-    """That nothing moves any more, which repeats itself too."""
+    """That nothing moves any more, which repeats itself too; a machine may go on from there by itself."""
+    if map_.mechanism.equations.machines:
+        return None
     if float(np.max(np.abs(point.state.v), initial=0.0)) > REST * tol:
         return None
     return Outcome("rests", f"comes to rest at {map_.section!r}: nothing moves where it repeats itself")

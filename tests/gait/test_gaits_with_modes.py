@@ -119,3 +119,31 @@ def test_a_mirror_needs_partners_of_modes_and_of_what_they_remember() -> None:
     )
     with pytest.raises(ModelError, match="state 'left push' of mode 'gait' has no partner 'right push'"):
         mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+
+
+def test_a_gait_of_one_foot_has_derivatives_though_its_steps_have_no_length() -> None:
+    model = mbd.Model("hopper")
+    body = mbd.PointMass("body", mass=80.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, axis="y")
+    model.connect(rail)
+    model.constrain(
+        mbd.Unilateral("floor", mbd.height(body.origin)),
+        mbd.Mode("leg", ("flight", "wait", "thrust"), transitions=[
+            mbd.Transition("flight", "wait", on="floor"),
+            mbd.Transition("wait", "thrust", after=0.05),
+            mbd.Transition("thrust", "flight", after="leg.time of thrust"),
+        ], numbers={"time of thrust": 0.1}),
+    )  # fmt: skip
+    model.apply(mbd.Motor("drive", rail, force={"thrust": 80.0 * (9.81 + 20.0)}, by="leg"))
+    start = mbd.assemble(model, {"rail.displacement": 0.5})
+    gait = mbd.limit_cycle(model, start, section="floor")
+
+    def period(thrust: float) -> float:  # wait, thrust, and free flight from y = a T²/2 with v = a T
+        rise, speed = 10.0 * thrust**2, 20.0 * thrust
+        return 0.05 + thrust + (speed + math.sqrt(speed**2 + 2.0 * 9.81 * rise)) / 9.81
+
+    np.testing.assert_allclose(gait.period, period(0.1), rtol=1e-12)
+    slope = (period(0.1 + 1e-5) - period(0.1 - 1e-5)) / 2e-5
+    np.testing.assert_allclose(gait.derivatives["period", "leg.time of thrust"], slope, rtol=1e-8)
+    later = mbd.limit_cycle(model, gait.state, section="leg: wait to thrust")
+    np.testing.assert_allclose(later.period, gait.period, rtol=1e-11)
