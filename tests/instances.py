@@ -5,7 +5,7 @@ LOSSES    factory() → loss
 FORCES    factory(a, b, joint) → force, from two frames of different bodies and a joint named 'hinge' with an `angle`
 MEASURES  factory(a, b, joint) → measure, from the same
 CONSTRAINTS  factory(a, b, joint) → constraint, from the same, whose first body floats on the joint 'float thigh'
-INTEGRATORS  schemes; STEPPED: those that have a step in Python
+INTEGRATORS  schemes
 PARTS     parts of a leg with their benches
 """
 
@@ -22,7 +22,6 @@ from mbd.constraints.base import Constraint
 from mbd.constraints.measure import Measure
 from mbd.forces.base import Force
 from mbd.integrators import Integrator
-from mbd.integrators.base import CompiledIntegrator
 from mbd.joints.base import Joint
 from mbd.joints.losses.base import Loss
 from mbd.scope import Triple
@@ -291,7 +290,6 @@ INTEGRATORS: list[Integrator] = [
     mbd.RungeKutta853(),
     mbd.RungeKutta4(),
 ]
-STEPPED = [scheme for scheme in INTEGRATORS if not isinstance(scheme, CompiledIntegrator)]
 
 BENT = {"part.angle": (-1.5, -0.1, ""), "part.angle.rate": (-5.0, 5.0, "1/s")}
 TURNED = {"part.angle": (-0.2, 0.2, ""), "part.angle.rate": (-5.0, 5.0, "1/s")}

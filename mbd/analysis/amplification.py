@@ -154,7 +154,10 @@ def _filled(run: Any, numbers: Vector) -> Any:
 
 
 def _walk(value: Any, found: list[float], given: Any) -> Any:
-    """The value with its real numbers appended to `found`, or replaced by `given` ones; integers and words stay."""
+    """The value with its real numbers appended to `found`, or replaced by `given` ones; integers and words stay.
+
+    So do fields of dataclasses with the metadata ``{"carried": False}``, which no motion is made of.
+    """
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":
         if given is None:
             found += value.ravel().tolist()
@@ -164,7 +167,8 @@ def _walk(value: Any, found: list[float], given: Any) -> Any:
         found.append(float(value))
         return value if given is None else next(given)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        parts = {each.name: _walk(getattr(value, each.name), found, given) for each in dataclasses.fields(value)}
+        carried = [each.name for each in dataclasses.fields(value) if each.metadata.get("carried", True)]
+        parts = {name: _walk(getattr(value, name), found, given) for name in carried}
         return value if given is None else replace(value, **parts)
     if isinstance(value, dict):
         return {key: _walk(part, found, given) for key, part in value.items()}

@@ -53,7 +53,7 @@ def mechanism_of(
 
     Parameters
     ----------
-    backend : 'auto', 'llvm' (machine code) or 'python' (the plain twin)
+    backend : 'auto', 'llvm' (machine code) or 'python' (plain Python)
     changed : parameter values that are wanted; an exact 0 or ±1 of the model among them, which is folded into the
         equations, is made a run-time input (one more derivation, noted in `Mechanism.notes`)
     inputs : names that are to be run-time inputs whatever their values, those of increments of laws among them

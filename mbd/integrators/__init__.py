@@ -1,6 +1,6 @@
 """Integration schemes behind one stepping interface."""
 
-from mbd.integrators.base import Advance, Integrator, Point, StepReport, StepResult, System, Terms
+from mbd.integrators.base import Advance, CompiledIntegrator, Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.integrators.generalized_alpha import GeneralizedAlpha
 from mbd.integrators.hht import HHT
 from mbd.integrators.newmark import Newmark
@@ -14,6 +14,7 @@ KINDS: tuple[type[Integrator], ...] = (GeneralizedAlpha, Newmark, HHT, RadauIIA,
 __all__ = [
     "KINDS",
     "Advance",
+    "CompiledIntegrator",
     "GeneralizedAlpha",
     "HHT",
     "Integrator",

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
-from mbd.integrators.newton import EPS, MAX_ITERATIONS, NewmarkMemory, NewmarkScheme
+from mbd.integrators.coefficients import Coefficients
+from mbd.integrators.stepping import MAX_ITERATIONS, SchemeMemory
+from mbd.kernel.codes import EPS
 from mbd.state import Mode, State
 
 __all__ = ["AveragedStep"]
@@ -19,16 +23,18 @@ class AveragedStep:
     """
 
     def __init__(
-        self, scheme: NewmarkScheme, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory
-    ) -> None:
-        self.scheme, self.system, self.state, self.dt, self.mode, self.memory = scheme, system, state, dt, mode, memory
+        self, coefficients: Coefficients, tolerance: float, system: System, state: State, dt: float, mode: Mode,
+        memory: SchemeMemory,
+    ) -> None:  # fmt: skip
+        self.coefficients, self.tolerance, self.system = coefficients, tolerance, system
+        self.state, self.dt, self.mode, self.memory = state, dt, mode, memory
 
     def _evaluate(self, t: float, x: Vector, y: Vector, rate: Vector, lam: Vector, c: tuple[float, float]) -> Terms:
         return self.system.evaluate(Point(t, self.state.q, x, y, rate, lam), self.mode, c)
 
     def run(self) -> StepResult:
         """Newton on (a₁, λ₁); the part α M a₁ enters with the mass matrix of the iterate."""
-        k, dt, memory = self.scheme.coefficients, self.dt, self.memory
+        k, dt, memory = self.coefficients, self.dt, self.memory
         alpha, n_v = k.alpha_f, len(self.state.v)
         c_C, c_K = k.gamma * dt, k.beta * dt * dt
         y0 = np.concatenate([self.state.v, self.state.z])
@@ -49,7 +55,7 @@ class AveragedStep:
             terms_of_r = 0.0 if terms.scale_r is None else float(np.max(terms.scale_r))  # at rest they cancel
             stiff = float(np.max(np.abs(np.asarray(terms.S) - mass) @ far))  # what x loses in forces
             least = 16.0 * EPS * max(terms_of_r, stiff)
-            error = float(np.max(np.abs(r)) / max(1e-3 * self.scheme.tolerance * scale, least))
+            error = float(np.max(np.abs(r)) / max(1e-3 * self.tolerance * scale, least))
             fast = np.zeros(len(terms.h), bool) if terms.velocity is None else np.asarray(terms.velocity, dtype=bool)
             held = np.where(fast, terms.rate, terms.h)
             error = max(error, float(np.max(np.abs(held), initial=0.0)) / (64.0 * EPS))
@@ -77,9 +83,8 @@ class AveragedStep:
 
     def _done(self, t1: float, x: Vector, y1: Vector, a1: Vector, lam: Vector, report: StepReport) -> StepResult:
         old, memory, dt, n_v = self.state, self.memory, self.dt, len(self.state.v)
-        after = NewmarkMemory(
-            a1, a1, lam, (a1 - memory.rate) / dt, (lam - memory.lam) / dt, np.zeros(n_v), np.zeros(n_v), dt
-        )
+        slope, lam_slope = (a1 - memory.rate) / dt, (lam - memory.lam) / dt
+        after = replace(memory, rate=a1, aux=a1, lam=lam, slope=slope, lam_slope=lam_slope, step=dt)
         q1 = composed(self.system, old.q, x)
         state = State(
             t1, q1, y1[:n_v], y1[n_v:], old.mode, old.armed, old.anchors, old.names, old.velocity_names, {},

@@ -14,21 +14,14 @@ normal to the rows in the metric of the Newton matrix. Rows on velocities are en
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import replace
 from typing import Any, ClassVar, Literal, TypeAlias
 
-import numpy as np
-
-from mbd.arrays import Vector
 from mbd.bodies.values import among, is_number, shown
 from mbd.errors import CapabilityError
-from mbd.integrators.base import Integrator, StepResult, System, composed, consistent_rates
+from mbd.integrators.base import CompiledIntegrator, System
 from mbd.integrators.coefficients import Coefficients
-from mbd.integrators.newton import NewmarkMemory, Step
-from mbd.kernel.codes import LEFT
-from mbd.state import Mode, State
 
-__all__ = ["DEFAULT_TOLERANCE", "Coefficients", "Formulation", "NewmarkFamily", "NewmarkMemory", "Starting"]
+__all__ = ["DEFAULT_TOLERANCE", "Coefficients", "Formulation", "NewmarkFamily", "Starting"]
 
 DEFAULT_TOLERANCE = 1e-9
 """Largest residual of the balance, relative to the sum of its terms, at which Newton stops.
@@ -40,7 +33,7 @@ Formulation: TypeAlias = Literal["ggl", "index3"]
 Starting: TypeAlias = Literal["jerk", "consistent"]
 
 
-class NewmarkFamily(Integrator):
+class NewmarkFamily(CompiledIntegrator):
     """Base of the family: immutable values that print, compare and pickle by their parameters.
 
     Parameters
@@ -128,38 +121,3 @@ class NewmarkFamily(Integrator):
         if rows and not self.stabilized:
             return f"{self!r} diverges where steps change with rows on positions; use formulation='ggl', or dt="
         return None
-
-    def local_error(self, old: NewmarkMemory, new: NewmarkMemory, dt: float) -> Vector:
-        """``dt² (1/6 − β − (α_m − α_f)/2) (a₁ − a₀)`` of x; of (v, z) ``dt²/12`` times the change of slope.
-
-        Where positions do not add, ``ẋ = v`` leaves ``dt (ẋ₁ − v₁)/3`` of x as well.
-        """
-        c, n_v = self.coefficients, len(new.shift)
-        a0 = old.rate + dt / old.step * (old.aux - old.rate)
-        x = dt * dt * (1.0 / 6.0 - c.beta - 0.5 * (c.alpha_m - c.alpha_f)) * (new.aux - a0)[:n_v]
-        x = x + dt / 3.0 * new.drift
-        return np.concatenate([x, dt * dt / 12.0 * ((new.rate - old.rate) / dt - old.slope)])
-
-    def start(self, system: System, state: State, mode: Mode, dt: float) -> NewmarkMemory:
-        """a₀ = v̇₀ + (α_m−α_f) dt j₀ with the jerk j₀ from one difference of consistent accelerations."""
-        y = np.concatenate([state.v, state.z])
-        n_v = len(state.v)
-        rate, lam = consistent_rates(system, state.time, state.q, y, mode)
-        ahead = dt / 16.0
-        q = composed(system, state.q, ahead * state.v)
-        later, lam_later = consistent_rates(system, state.time + ahead, q, y + ahead * rate, mode)
-        slope, lam_slope = (later - rate) / ahead, (lam_later - lam) / ahead
-        c = self.coefficients
-        jerk = (c.alpha_m - c.alpha_f) * dt if self.starting == "jerk" else 0.0
-        return NewmarkMemory(rate, rate + jerk * slope, lam, slope, lam_slope, np.zeros(n_v), np.zeros(n_v), dt, 0, dt)
-
-    def resume(self, system: System, state: State, mode: Mode, dt: float, memory: NewmarkMemory) -> NewmarkMemory:
-        """A start, but that a keeps its distance from v̇, as beyond a singular configuration."""
-        fresh = self.start(system, state, mode, dt)
-        return replace(fresh, aux=fresh.rate + (dt / memory.step) * (memory.aux - memory.rate))
-
-    def step(self, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> StepResult:
-        """One step by Newton's method; the readable twin of the compiled kernel."""
-        if memory.near == LEFT:
-            memory = self.resume(system, state, mode, memory.whole or dt, memory)
-        return Step(self, system, state, dt, mode, memory).run()

@@ -13,9 +13,9 @@ from mbd.integrators.family import (
     Coefficients,
     Formulation,
     NewmarkFamily,
-    NewmarkMemory,
     Starting,
 )
+from mbd.integrators.stepping import SchemeMemory
 from mbd.state import Mode, State
 
 __all__ = ["HHT"]
@@ -86,8 +86,8 @@ class HHT(NewmarkFamily):
             return 1
         return super().order(system)
 
-    def step(self, system: System, state: State, dt: float, mode: Mode, memory: NewmarkMemory) -> StepResult:
-        """One step; see `NewmarkFamily.step` and, for the averaged form, `AveragedStep`."""
+    def step(self, system: System, state: State, dt: float, mode: Mode, memory: SchemeMemory) -> StepResult:
+        """One step of the kernel's scheme; for the averaged form that of `AveragedStep`."""
         if self.form == "averaged":
-            return AveragedStep(self, system, state, dt, mode, memory).run()
+            return AveragedStep(self.coefficients, self.tolerance, system, state, dt, mode, memory).run()
         return super().step(system, state, dt, mode, memory)

@@ -1,26 +1,20 @@
-"""The three-stage Radau IIA method of order 5: its parameters, and what it does between steps."""
+"""The three-stage Radau IIA method of order 5: its parameters."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
-from mbd.integrators.base import Integrator, StepResult, System, completed, consistent_rates
+from mbd.integrators.base import CompiledIntegrator, Integrator, System, completed
 from mbd.integrators.family import DEFAULT_TOLERANCE
-from mbd.integrators.radau_singular import SingularRadauStep
-from mbd.integrators.radau_step import RadauMemory, RadauStep
-from mbd.state import Mode, State
 
-__all__ = ["RadauIIA", "RadauMemory"]
+__all__ = ["RadauIIA"]
 
 
 @dataclass(frozen=True)
-class RadauIIA(Integrator):
+class RadauIIA(CompiledIntegrator):
     """Radau IIA with three stages: order 5, L-stable, for stiff motion and for tight accuracy.
 
     Rows are held in position and velocity at every stage. Positions and velocities are of order 5, and so are
@@ -75,26 +69,3 @@ class RadauIIA(Integrator):
     def check_tolerance(self, rows: int) -> str | None:
         """It follows any tolerance."""
         return None
-
-    def local_error(self, old: RadauMemory, new: RadauMemory, dt: float) -> Vector:
-        """The estimate made with the step."""
-        return new.error
-
-    def start(self, system: System, state: State, mode: Mode, dt: float) -> RadauMemory:
-        """Stages of a step before it at rates and multipliers that do not change."""
-        y = np.concatenate([state.v, state.z])
-        rate, lam = consistent_rates(system, state.time, state.q, y, mode)
-        n_v = len(state.v)
-        stages = np.tile(rate, (3, 1)), np.tile(lam, (3, 1)), np.zeros((3, n_v))
-        return RadauMemory(rate, lam, *stages, np.zeros_like(rate), np.zeros_like(lam), dt, np.zeros(n_v + len(rate)))
-
-    def step(self, system: System, state: State, dt: float, mode: Mode, memory: RadauMemory) -> StepResult:
-        """One step by Newton's method; the readable twin of the compiled kernel."""
-        given = (self.tolerance, system, state, dt, mode, memory)
-        step = RadauStep(*given)
-        if len(memory.lam) and step.rows_turn():
-            return SingularRadauStep(*given).run()
-        result = step.run()
-        if len(memory.lam) and not result.report.converged and np.isfinite(result.report.residual):
-            result = SingularRadauStep(*given).run()
-        return result

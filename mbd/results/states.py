@@ -14,11 +14,10 @@ from mbd.errors import TrajectoryError
 
 __all__ = ["pack", "pack_state", "unpack"]
 
-HOMES = (
-    "mbd.state", "mbd.results.record", "mbd.integrators.family", "mbd.integrators.newton", "mbd.integrators.radau",
-    "mbd.integrators.radau_step", "mbd.integrators.runge_kutta",
-)  # fmt: skip
-"""The modules whose dataclasses a file may name; `family` and `radau` in older files."""
+HOMES = ("mbd.state", "mbd.results.record", "mbd.integrators.stepping")
+"""The modules whose dataclasses a file may name."""
+RETIRED = ("NewmarkMemory", "RadauMemory", "RungeKuttaMemory")
+"""What older files may hold of steps in Python: a run that continues from them starts its scheme again."""
 
 
 def pack_state(state: Any, arrays: dict[str, NDArray[Any]]) -> Any:
@@ -71,6 +70,8 @@ def unpack(value: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
         return [unpack(item, arrays) for item in value["list"]]
     if "mapping" in value:
         return {unpack(key, arrays): unpack(item, arrays) for key, item in value["mapping"]}
+    if value["class"] in RETIRED:
+        return None
     home = value.get("home", HOMES[0])
     kind = getattr(import_module(home), value["class"], None) if home in HOMES else None
     if not (isinstance(kind, type) and is_dataclass(kind)):

@@ -110,7 +110,7 @@ def simulate(
         functions of parameters and other results too. Contacts are then treated by 'events'
     controllers : with `wrt`: 'held' differentiates with what controllers wrote held as it was, without their feedback;
         by default their models have no derivatives. They act in the run whatever this is
-    backend : 'auto', 'llvm' or 'python' (the plain twin, slow)
+    backend : 'auto', 'llvm' or 'python' (all of it interpreted, slow)
 
     Returns
     -------

@@ -69,7 +69,7 @@ def check_scheme(
 
     Parameters
     ----------
-    integrator : a scheme, or a function that makes one; one of machine code alone (`CompiledIntegrator`) too
+    integrator : a scheme, or a function that makes one
     dt : the largest step [s]; by default one that suits the order
     halvings : how often it is halved
 

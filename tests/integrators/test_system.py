@@ -19,7 +19,7 @@ from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State
 from mbd.testing.order import observed_order
 from mbd.testing.problems import PROBLEMS, problem
-from tests.instances import STEPPED
+from tests.instances import INTEGRATORS
 from tests.integrators.own import ProjectedMidpoint
 
 FACTORS = [(0.0, 0.0), (0.0, 0.7), (0.3, 0.0), (0.3, 0.7), (1e-3, 1e-6), (-0.2, 0.5), (2.0, -1.0)]
@@ -189,7 +189,7 @@ def steps(scheme, system, start, dt, count):
     return np.concatenate([state.q, state.v])
 
 
-@pytest.mark.parametrize("scheme", [*STEPPED, ProjectedMidpoint()], ids=repr)
+@pytest.mark.parametrize("scheme", [*INTEGRATORS, ProjectedMidpoint()], ids=repr)
 @pytest.mark.parametrize("system", [Swing(), Bare()], ids=["inherits", "bare"])
 def test_a_class_with_an_evaluate_alone_runs_through_every_scheme(scheme, system):
     start = State(0.0, np.array([1.0]), np.array([0.3]))
@@ -199,7 +199,7 @@ def test_a_class_with_an_evaluate_alone_runs_through_every_scheme(scheme, system
 
 
 @pytest.mark.covering
-@pytest.mark.parametrize("scheme", STEPPED, ids=repr)
+@pytest.mark.parametrize("scheme", INTEGRATORS, ids=repr)
 @pytest.mark.parametrize("system", [Top(), ChartedTop()], ids=["centre", "charts"])
 def test_where_positions_turn_a_scheme_has_the_order_that_it_tells(scheme, system):
     start = State(0.0, np.array([1.0, 0.0, 0.0, 0.0]), np.array([2.0, -3.0, 1.5]))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from mbd.integrators.base import CompiledIntegrator
+from mbd.integrators import CompiledIntegrator
 from mbd.kernel.codes import PASSING
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.contract import Abilities, Scheme

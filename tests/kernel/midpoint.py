@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from mbd.integrators.base import CompiledIntegrator
+from mbd.integrators import CompiledIntegrator
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import consistent, fill_block, refresh_scales
 from mbd.kernel.schemes.contract import Abilities, Scheme

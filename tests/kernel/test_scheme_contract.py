@@ -10,12 +10,14 @@ import pytest
 
 import mbd
 from mbd.errors import CapabilityError
+from mbd.integrators import CompiledIntegrator
 from mbd.kernel import build
 from mbd.kernel.entry import entry
 from mbd.kernel.schemes import contract
 from mbd.sensitivity.tangent import build as tangent_build
-from mbd.state import Mode, State
-from mbd.testing import check_scheme
+from mbd.state import Mode
+from mbd.testing import check_integrator, check_scheme
+from mbd.testing.problems import problem
 from tests.kernel.bdf2 import BDF2
 from tests.kernel.midpoint import Midpoint
 from tests.sensitivity.differences import differences, off
@@ -71,8 +73,21 @@ def test_what_it_cannot_do_is_refused_by_its_name():
     model, start = swing()
     with pytest.raises(CapabilityError, match=r"Midpoint\(\) does not estimate its error"):
         mbd.simulate(model, start, Midpoint(), tol=1e-6, until=0.1)
-    with pytest.raises(CapabilityError, match=r"Midpoint\(\) has no step in Python"):
-        Midpoint().start(None, State(0.0, np.zeros(1), np.zeros(1), np.zeros(0), Mode()), Mode(), 0.1)
+
+
+@pytest.mark.parametrize("scheme", [Midpoint(), BDF2()], ids=repr)
+def test_a_listed_scheme_steps_any_system(scheme):
+    check_integrator(scheme, halvings=3)
+
+
+def test_an_integrator_that_names_no_scheme_is_told_to():
+    class Nameless(CompiledIntegrator):
+        def order(self, system=None):
+            return 1
+
+    posed = problem("varying mass")
+    with pytest.raises(CapabilityError, match=r"names no scheme; give its class scheme = '…', or a step of its own"):
+        Nameless().start(posed.system, posed.start, Mode(), 0.1)
 
 
 def test_the_kernel_of_another_order_of_schemes_is_another():

@@ -13,9 +13,9 @@ import pytest
 import mbd
 from mbd.errors import CapabilityError
 from mbd.kernel import build
+from mbd.kernel.interpreted import InterpretedScheme
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes import contract
-from mbd.simulation.run.plain import KernelScheme
 from mbd.testing import LawBroken, schemes as kit
 from mbd.testing.findings import Findings
 from tests.kernel import midpoint
@@ -181,7 +181,7 @@ def test_a_scheme_without_a_resume_starts_from_the_rates_that_are_there(listed, 
     listed(start=begins, resume=resumes if own else None)
     text, names = contract.dispatch()
     exec(text, names := {**names, "Kernel": Kernel})
-    for resume in (names["scheme_resume"], KernelScheme(contract.scheme_named("wrong")).resume):
+    for resume in (names["scheme_resume"], InterpretedScheme(contract.scheme_named("wrong")).resume):
         K = Kernel(n=2, n_rows=1, scheme=contract.number_of("wrong"), jump=[3.0, 4.0], impulse=[5.0])
         K.rate, K.lam = [0.0, 0.0], [0.0]
         assert resume(K, 0.1) == (8 if own else 7)

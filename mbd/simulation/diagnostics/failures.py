@@ -20,6 +20,7 @@ from mbd.simulation.diagnostics.jamming import may_jam
 from mbd.simulation.diagnostics.redundant import clash
 from mbd.simulation.diagnostics.round_off import remainder
 from mbd.simulation.run.data import RunData
+from mbd.simulation.run.plain import PlainScheme
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 from mbd.tape.evaluate import evaluate
@@ -182,7 +183,7 @@ def _no_end(stepper: Stepper, status: int, closed: str, rushing: str) -> str:
             f"a step would miss an angle by more than half a radian, down to a tenth of dt{closed}"
             f"{worst}: the motion is too fast to be resolved; use a smaller dt"
         )
-    message = "" if stepper.compiled else stepper.scheme.report.message
+    message = stepper.scheme.report.message if isinstance(stepper.scheme, PlainScheme) else ""
     if residual <= 1.0 and message:
         return (
             f"steps fail down to a tenth of dt; {type(stepper.scheme.integrator).__name__} says: {message}"

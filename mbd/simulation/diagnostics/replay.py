@@ -14,10 +14,10 @@ from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
+from mbd.kernel.interpreted import InterpretedScheme
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
 from mbd.simulation.diagnostics.failures import residual_names
-from mbd.simulation.run.plain import KernelScheme
 from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import prepared
 from mbd.state import State
@@ -150,8 +150,8 @@ def replay(
     trajectory, problem = run.complete()
     again, seen = _prepared(capsule, trajectory.final if problem else capsule.state, model, scheme, step, 1)
     if again.stepper.compiled:  # interpreted, with the programs and so the decisions of machine code
-        again.stepper.compiled, again.stepper.scheme = False, KernelScheme(again.stepper.own)
-    if isinstance(again.stepper.scheme, KernelScheme):
+        again.stepper.compiled, again.stepper.scheme = False, InterpretedScheme(again.stepper.own)
+    if isinstance(again.stepper.scheme, InterpretedScheme):
         seen.counts = again.kernel
     again.march()
     same = bool(problem) and problem == capsule.message

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -12,15 +11,13 @@ import numpy as np
 from mbd.arrays import Matrix, Vector, read_only
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
-from mbd.errors import CapabilityError, SimulationError
+from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
-from mbd.kernel.hints import shown
 from mbd.kernel.mass_ratios import LOSS
 from mbd.kernel.records import Kernel
 from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales, take_consistent
-from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.simulation.run.shared_loads import shares
@@ -270,44 +267,6 @@ def _units(names: tuple[str, ...]) -> Any:
     return read_only(np.array([{"m": 0, "rad": 1}.get(name, 2) for name in names], dtype=np.int64))
 
 
-class KernelScheme:
-    """Hooks of the interpreted kernel: the functions of a compiled scheme, step by step what machine code does."""
-
-    memory = None
-    report = StepReport(True)
-
-    def __init__(self, scheme: Scheme) -> None:
-        self.scheme = scheme
-        self.start, self.step, self.accept = (self._within(hook) for hook in (scheme.start, scheme.step, scheme.accept))
-        self.resume = self._within(scheme.resume or self._start_there)
-        self.error = self._within(scheme.error or self._has_left_its_error)
-
-    def _start_there(self, K: Kernel, h: float) -> int:
-        take_consistent(K)
-        return self.scheme.start(K)
-
-    def _has_left_its_error(self, K: Kernel, h: float) -> None:
-        pass
-
-    def _within(self, hook: Any) -> Any:
-        """The hook, in which an index beyond an array or a wrong field is an error by file, line and function."""
-
-        def called(K: Kernel, *more: float) -> Any:
-            try:
-                return hook(K, *more)
-            except (IndexError, AttributeError) as error:
-                last = traceback.extract_tb(error.__traceback__)
-                place = [each for each in last if each.name not in ("__getattr__", "__setattr__")][-1]
-                given = ", ".join(f"{name}: {length}" for name, length in self.scheme.memory(K).items()) or "none"
-                memory = f"; the memory of the scheme {self.scheme.name!r} is {given}"
-                raise CapabilityError(
-                    f"{shown(place.filename)}:{place.lineno}, in {place.name}: {place.line!r}: {error}"
-                    + memory * isinstance(error, IndexError)
-                ) from error
-
-        return called
-
-
 class PlainScheme:
     """Hooks of the interpreted kernel: an integrator's `start` and `step` on the kernel's arrays."""
 
@@ -331,11 +290,9 @@ class PlainScheme:
         return self._begin(K, call_user(what, self.integrator.start, self.system, state, mode, start_step(K)))
 
     def resume(self, K: Kernel, h: float) -> int:
-        """The same after a step that told `LEFT`, from the rates in K.jump and the multipliers in K.impulse."""
+        """After a step that told `LEFT`, which only schemes of the kernel do: their next step resumes by itself."""
         take_consistent(K)
-        state, mode, _ = self._state(K)
-        scheme: Any = self.integrator  # one of the family: no other tells that
-        return self._begin(K, scheme.resume(self.system, state, mode, start_step(K), self.memory))
+        return self._begin(K, self.memory)
 
     def _begin(self, K: Kernel, memory: Any) -> int:
         self.memory = memory

@@ -9,16 +9,17 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
-from mbd.errors import CapabilityError, MemoryLimitError, ModelError, nearest
-from mbd.integrators.base import CompiledIntegrator, Integrator
-from mbd.integrators.newton import MAX_ITERATIONS
+from mbd.errors import MemoryLimitError, ModelError
+from mbd.integrators.base import Integrator
+from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
 from mbd.kernel import codes
 from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.contact_modes import room_to_log
-from mbd.kernel.records import PROGRAMS, TABLE, Kernel
-from mbd.kernel.schemes.contract import MEMORY, NO_SCHEME, Scheme, scheme_named
+from mbd.kernel.interpreted import InterpretedScheme
+from mbd.kernel.records import PROGRAMS, Kernel
+from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.simulation.run.call_table import CallTable
-from mbd.simulation.run.plain import KernelScheme, MechanismSystem, PlainScheme, row_units, unit_blocks
+from mbd.simulation.run.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.simulation.run.shelves import Shelves, plan_of
 from mbd.tape.derivatives import live
 
@@ -32,11 +33,6 @@ TAKES_PART = 1e-7
 """Coefficient of a row below which another does not depend on it [-]."""
 SUBSTEPS = 4
 """Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
-
-
-def own_scheme(integrator: Integrator) -> Scheme:
-    """The kernel's scheme that takes this integrator's steps; `NO_SCHEME` if it is written in Python only."""
-    return scheme_named(integrator.compiled_scheme or "")
 
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
@@ -88,8 +84,8 @@ class Stepper:
             mechanism, manager, self.kernel.params, self.kernel.anchors, self.stabilized, self.kernel.dropped,
             self.kernel.sticks, self.kernel.slip, self.kernel.hold, self.kernel.blurs,
         )  # fmt: skip
-        alone = isinstance(integrator, CompiledIntegrator)
-        self.scheme: Any = KernelScheme(self.own) if alone else PlainScheme(integrator, self.system, manager)
+        interpreted = self.own is not NO_SCHEME
+        self.scheme: Any = InterpretedScheme(self.own) if interpreted else PlainScheme(integrator, self.system, manager)
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
@@ -135,26 +131,13 @@ class Stepper:
             **self.own.numbers(),
         )  # fmt: skip
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
-        self._take_numbers(K)
+        set_numbers(K, self.integrator)
         return K
-
-    def _take_numbers(self, K: Kernel) -> None:
-        """The parameters of the integrator, under the names of the kernel's fields."""
-        for name, number in self.integrator.numbers().items():
-            if name not in TABLE.kinds:
-                text = nearest(name, TABLE.kinds, "number of the kernel", "There are")
-                raise CapabilityError(f"{self.integrator!r} gives numbers() for {name!r}: {text}")
-            setattr(K, name, number)
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.kernel
         block, tables = self.mechanism.layout.size, manager.tables()
-        own = self.own.memory(v)
-        unknown = [name for name in own if name not in MEMORY]
-        if unknown:
-            raise CapabilityError(
-                f"the scheme {self.own.name!r} asks for memory {unknown[0]!r}; the kernel has {', '.join(MEMORY)}"
-            )
+        own = memory_lengths(v, self.own)
         given = own | {name: len(table) for name, table in tables.items()}
         given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
         given["chart"] = 1 if v.vector else max(block, 2 * v.n_q + 2 * v.n_v)
@@ -168,13 +151,7 @@ class Stepper:
         v.step = v.dt
         v.sinking[:] = np.inf
         v.was[:] = codes.UNKNOWN
-        for name, numbers in (*self.own.coefficients().items(), ("nodes", self.own.nodes)):
-            if len(numbers) > len(getattr(v, name)):
-                raise CapabilityError(
-                    f"the scheme {self.own.name!r} has {len(numbers)} coefficients for {name!r}, to which its memory "
-                    f"gives a length of {len(getattr(v, name))}; try {len(numbers)} or more"
-                )
-            getattr(v, name)[: len(numbers)] = numbers
+        fill_coefficients(v, self.own)
         v.unit = unit_blocks(self.mechanism).copy()
         for number, (_, turning) in enumerate(self.mechanism.turning, 1):
             v.turned_by[turning] = number
