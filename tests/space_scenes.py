@@ -13,9 +13,9 @@ import numpy as np
 import mbd
 from mbd.bodies.base import Frame
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.parts import any_axis, any_body, any_frame
-from mbd.testing.fuzz.spatial_structures import any_foot, any_place, any_plane
-from mbd.testing.fuzz.tree_poses import close_loop, pose
+from tests.fuzz.parts import any_axis, any_body, any_frame
+from tests.fuzz.spatial_structures import any_foot, any_place, any_plane
+from tests.fuzz.tree_poses import close_loop, pose
 
 __all__ = ["JOINTS", "KINDS", "Scene", "cases", "scene"]
 

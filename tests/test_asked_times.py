@@ -17,8 +17,8 @@ import pytest
 import mbd
 from mbd.hardcases.redundant_rows import bricard
 from mbd.hardcases.schemes import SCHEMES
-from mbd.testing.fuzz import judge
-from mbd.testing.fuzz.structures import SPACE, structure
+from tests.fuzz import judge
+from tests.fuzz.structures import SPACE, structure
 from tests.mechanisms_between_rows import KINDS
 
 UNTIL = 0.4

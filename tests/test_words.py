@@ -45,7 +45,7 @@ VAGUE = {"told", "said", "interior", "ring"}
 
 
 def test_variables_are_named_for_what_they_hold():
-    files = [file for file in FILES if file.suffix == ".py" and not {"kernel", "fuzz"} & set(file.parts)]
+    files = [file for file in FILES if file.suffix == ".py" and "kernel" not in file.parts]
     found = []
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mbd
-from mbd.testing.fuzz.structures import SPACE, structure
+from tests.fuzz.structures import SPACE, structure
 
 JOINTS = ("spherical", "universal", "revolute", "cylindrical", "free of place")
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.testing.fuzz.judge import judge
+from tests.fuzz.judge import judge
 
 DIGITS = 60
 """Decimal digits of the accelerations that are compared with [-]."""

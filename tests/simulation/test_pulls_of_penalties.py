@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.testing.fuzz.judge import judge
-from mbd.testing.fuzz.scenes import scene
-from mbd.testing.fuzz.verdict import run_of
+from tests.fuzz.judge import judge
+from tests.fuzz.scenes import scene
+from tests.fuzz.verdict import run_of
 
 SCHEMES = {
     "tolerance": (mbd.RungeKutta853(), "auto", [2, 9, 15, 18]),

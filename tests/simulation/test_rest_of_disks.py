@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.testing.fuzz.scenes import scene
-from mbd.testing.fuzz.structures import SPACE
-from mbd.testing.fuzz.verdict import run_of
+from tests.fuzz.scenes import scene
+from tests.fuzz.structures import SPACE
+from tests.fuzz.verdict import run_of
 
 RADIUS = 0.168
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.testing.fuzz.scenes import scene
-from mbd.testing.fuzz.verdict import run_of
+from tests.fuzz.scenes import scene
+from tests.fuzz.verdict import run_of
 
 SCHEMES = [mbd.HHT(0.05), mbd.HHT(0.05, formulation="index3"), mbd.GeneralizedAlpha(0.5), mbd.Newmark()]
 

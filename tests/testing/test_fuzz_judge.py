@@ -11,12 +11,12 @@ from mbd.bodies import algebra
 from mbd.equations import kinematics
 from mbd.joints.losses.viscous import Viscous
 from mbd.results.columns import ModelColumns
-from mbd.testing.fuzz import batch
-from mbd.testing.fuzz.geometry import Signal, inverse, product, shift, turn, twist
-from mbd.testing.fuzz.judge import between, judge
-from mbd.testing.fuzz.scenes import STRUCTURES, scene
-from mbd.testing.fuzz.structures import DRIVEN, SPACE
-from mbd.testing.fuzz.verdict import run_of, verdict
+from tests.fuzz import batch
+from tests.fuzz.geometry import Signal, inverse, product, shift, turn, twist
+from tests.fuzz.judge import between, judge
+from tests.fuzz.scenes import STRUCTURES, scene
+from tests.fuzz.structures import DRIVEN, SPACE
+from tests.fuzz.verdict import run_of, verdict
 from tests.helpers import altered
 
 SOUND = [2, 10, 12, 40, 68, 98, 112, 128, 138]

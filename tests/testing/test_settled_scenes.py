@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mbd.testing.fuzz.verdict import verdict
+from tests.fuzz.verdict import verdict
 
 SETTLED = {
     2002301: "friction that turns and loads a disk as it comes to rest",

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.testing.fuzz.parts import add_loads, any_axis, any_body, any_frame, any_joint
-from mbd.testing.fuzz.tree_poses import close_loop, pose
+from tests.fuzz.parts import add_loads, any_axis, any_body, any_frame, any_joint
+from tests.fuzz.tree_poses import close_loop, pose
 
 __all__ = ["SPATIAL_KINDS"]
 

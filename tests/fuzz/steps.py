@@ -7,12 +7,12 @@ import ast
 import numpy as np
 
 import mbd
-from mbd.testing.fuzz.bodies import Bodies
-from mbd.testing.fuzz.faults import Faults
-from mbd.testing.fuzz.geometry import Array, of_quaternion
-from mbd.testing.fuzz.quantities import gap_of
-from mbd.testing.fuzz.readings import Readings
-from mbd.testing.fuzz.turning import rotation_vector
+from tests.fuzz.bodies import Bodies
+from tests.fuzz.faults import Faults
+from tests.fuzz.geometry import Array, of_quaternion
+from tests.fuzz.quantities import gap_of
+from tests.fuzz.readings import Readings
+from tests.fuzz.turning import rotation_vector
 
 __all__ = ["crossings", "error_share", "impacts", "motion", "passive"]
 

@@ -12,7 +12,7 @@ import numpy as np
 import mbd
 from mbd.bodies.base import Body, Frame
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.geometry import (
+from tests.fuzz.geometry import (
     Array,
     Moving,
     Signal,
@@ -27,7 +27,7 @@ from mbd.testing.fuzz.geometry import (
     turn,
     twist,
 )
-from mbd.testing.fuzz.readings import Readings, coordinates
+from tests.fuzz.readings import Readings, coordinates
 
 __all__ = ["Bodies", "Mass", "joint_motion", "mass_of"]
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.testing.fuzz.bodies import Bodies
-from mbd.testing.fuzz.geometry import Array
-from mbd.testing.fuzz.parts import any_frame
-from mbd.testing.fuzz.readings import Readings
+from tests.fuzz.bodies import Bodies
+from tests.fuzz.geometry import Array
+from tests.fuzz.parts import any_frame
+from tests.fuzz.readings import Readings
 
 __all__ = ["close_loop", "pose", "scalars"]
 

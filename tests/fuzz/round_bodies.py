@@ -9,9 +9,9 @@ import numpy as np
 
 from mbd.bodies.base import Frame
 from mbd.constraints.turning_measures import Cone
-from mbd.testing.fuzz.bodies import Bodies
-from mbd.testing.fuzz.gap import Gap
-from mbd.testing.fuzz.geometry import Array
+from tests.fuzz.bodies import Bodies
+from tests.fuzz.gap import Gap
+from tests.fuzz.geometry import Array
 
 __all__ = ["ball_gap", "edge_gap", "over_plane", "turning_gap"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import mbd
-from mbd.testing.fuzz.structures import DRIVEN, SPACE, Structure, structure
+from tests.fuzz.structures import DRIVEN, SPACE, Structure, structure
 
 __all__ = ["STRUCTURES", "Scene", "scene"]
 

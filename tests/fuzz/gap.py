@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mbd.testing.fuzz.bodies import Bodies
-from mbd.testing.fuzz.geometry import Array
+from tests.fuzz.bodies import Bodies
+from tests.fuzz.geometry import Array
 
 __all__ = ["Gap"]
 

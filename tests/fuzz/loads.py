@@ -12,11 +12,11 @@ from mbd.bodies.base import Frame
 from mbd.constraints.user_measure import UserMeasure
 from mbd.joints.base import Joint
 from mbd.joints.losses.base import Loss, LossSum
-from mbd.testing.fuzz.bodies import Bodies, mass_of
-from mbd.testing.fuzz.geometry import Array, cross
-from mbd.testing.fuzz.quantities import TINY, gap_of, named, triple, user_gap, value_of
-from mbd.testing.fuzz.round_bodies import edge_gap
-from mbd.testing.fuzz.turning import ball_spring, bushing
+from tests.fuzz.bodies import Bodies, mass_of
+from tests.fuzz.geometry import Array, cross
+from tests.fuzz.quantities import TINY, gap_of, named, triple, user_gap, value_of
+from tests.fuzz.round_bodies import edge_gap
+from tests.fuzz.turning import ball_spring, bushing
 
 __all__ = ["Load", "loads"]
 

@@ -9,12 +9,12 @@ import numpy as np
 
 import mbd
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.bodies import Bodies, mass_of
-from mbd.testing.fuzz.faults import Faults
-from mbd.testing.fuzz.geometry import Array, Moving, cross, inverse, product, twist
-from mbd.testing.fuzz.loads import Loads
-from mbd.testing.fuzz.quantities import gap_of, named, value_of
-from mbd.testing.fuzz.round_bodies import edge_gap
+from tests.fuzz.bodies import Bodies, mass_of
+from tests.fuzz.faults import Faults
+from tests.fuzz.geometry import Array, Moving, cross, inverse, product, twist
+from tests.fuzz.loads import Loads
+from tests.fuzz.quantities import gap_of, named, value_of
+from tests.fuzz.round_bodies import edge_gap
 
 __all__ = [
     "balance",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.testing.fuzz.geometry import Array
+from tests.fuzz.geometry import Array
 
 __all__ = ["Fault", "Faults"]
 

@@ -14,8 +14,8 @@ import numpy as np
 
 import mbd
 from mbd.errors import MbdError
-from mbd.testing.fuzz.judge import SHARE, between, judge
-from mbd.testing.fuzz.scenes import Scene, scene
+from tests.fuzz.judge import SHARE, between, judge
+from tests.fuzz.scenes import Scene, scene
 
 __all__ = ["verdict"]
 

@@ -10,8 +10,8 @@ import numpy as np
 
 import mbd
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.geometry import Array, Attitude, Signal
 from mbd.topology.plan import plan
+from tests.fuzz.geometry import Array, Attitude, Signal
 
 __all__ = ["Readings", "names_for", "readings"]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.testing.fuzz.bodies import Bodies, mass_of
-from mbd.testing.fuzz.geometry import Array
-from mbd.testing.fuzz.quantities import gap_of
+from tests.fuzz.bodies import Bodies, mass_of
+from tests.fuzz.geometry import Array
+from tests.fuzz.quantities import gap_of
 
 __all__ = ["unknown_force"]
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.testing.fuzz.motions import any_jump, any_motion
-from mbd.testing.fuzz.parts import add_loads, any_body, any_frame, any_joint
-from mbd.testing.fuzz.spatial_structures import free_tree
-from mbd.testing.fuzz.tree_poses import pose
+from tests.fuzz.motions import any_jump, any_motion
+from tests.fuzz.parts import add_loads, any_body, any_frame, any_joint
+from tests.fuzz.spatial_structures import free_tree
+from tests.fuzz.tree_poses import pose
 
 __all__ = ["DRIVEN_KINDS"]
 

@@ -11,16 +11,18 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from queue import Empty, Queue
 from typing import Any
 
-from mbd.testing.fuzz.scenes import STRUCTURES
-from mbd.testing.fuzz.structures import DRIVEN, SPACE
+from tests.fuzz.scenes import STRUCTURES
+from tests.fuzz.structures import DRIVEN, SPACE
 
 __all__ = ["main", "run_batch", "summary"]
 
-COMMAND = [sys.executable, "-m", "mbd.testing.fuzz", "--worker"]
-"""A worker."""
+COMMAND = [sys.executable, "-m", "tests.fuzz", "--worker"]
+"""A worker, begun in the checkout."""
+CHECKOUT = Path(__file__).parents[2]
 LIMIT = 60.0
 """Wall time after which a scene counts as one without end [s]."""
 
@@ -57,6 +59,7 @@ def _until_lost(
         stderr=subprocess.DEVNULL,
         text=True,
         env=dict(os.environ),
+        cwd=CHECKOUT,
     )
     assert process.stdin is not None
     assert process.stdout is not None
@@ -111,7 +114,7 @@ def summary(verdicts: Iterable[dict[str, Any]]) -> str:
 
 def _work() -> None:
     """A worker: numbers come as one list, verdicts go out line by line."""
-    from mbd.testing.fuzz.verdict import verdict
+    from tests.fuzz.verdict import verdict
 
     for number in json.load(sys.stdin):
         print(json.dumps(verdict(number)), flush=True)
@@ -119,7 +122,7 @@ def _work() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
-    parser = argparse.ArgumentParser(prog="python -m mbd.testing.fuzz", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--scenes", default="0:200", help="numbers of scenes, first:end")
     parser.add_argument("--space", action="store_true", help="scenes with joints that turn freely")
     parser.add_argument("--driven", action="store_true", help="driven and held mechanisms, exact zeros, curved ground")

@@ -16,10 +16,10 @@ from mbd.constraints.touchdown import Touchdown
 from mbd.constraints.turning_measures import Cone, Twist
 from mbd.constraints.user_measure import UserMeasure
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.bodies import Bodies
-from mbd.testing.fuzz.gap import Gap
-from mbd.testing.fuzz.geometry import Array
-from mbd.testing.fuzz.round_bodies import ball_gap, edge_gap, over_plane, turning_gap
+from tests.fuzz.bodies import Bodies
+from tests.fuzz.gap import Gap
+from tests.fuzz.geometry import Array
+from tests.fuzz.round_bodies import ball_gap, edge_gap, over_plane, turning_gap
 
 __all__ = ["Gap", "gap_of", "named", "triple", "user_gap", "value_of"]
 

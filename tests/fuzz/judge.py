@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 import mbd
-from mbd.testing.fuzz import laws, steps
-from mbd.testing.fuzz.bodies import Bodies
-from mbd.testing.fuzz.faults import Fault, Faults
-from mbd.testing.fuzz.geometry import Array
-from mbd.testing.fuzz.loads import loads
-from mbd.testing.fuzz.readings import Readings, readings
-from mbd.testing.fuzz.stiffness import unknown_force
+from tests.fuzz import laws, steps
+from tests.fuzz.bodies import Bodies
+from tests.fuzz.faults import Fault, Faults
+from tests.fuzz.geometry import Array
+from tests.fuzz.loads import loads
+from tests.fuzz.readings import Readings, readings
+from tests.fuzz.stiffness import unknown_force
 
 __all__ = ["Judgement", "judge"]
 

@@ -13,8 +13,8 @@ import numpy as np
 
 import mbd
 from mbd.joints.base import Joint
-from mbd.testing.fuzz.driven_structures import DRIVEN_KINDS
-from mbd.testing.fuzz.parts import (
+from tests.fuzz.driven_structures import DRIVEN_KINDS
+from tests.fuzz.parts import (
     add_event,
     add_loads,
     any_axis,
@@ -24,8 +24,8 @@ from mbd.testing.fuzz.parts import (
     any_joint,
     smooth_loss,
 )
-from mbd.testing.fuzz.spatial_structures import SPATIAL_KINDS
-from mbd.testing.fuzz.tree_poses import close_loop, pose
+from tests.fuzz.spatial_structures import SPATIAL_KINDS
+from tests.fuzz.tree_poses import close_loop, pose
 
 __all__ = ["DRIVEN", "KINDS", "SPACE", "Structure", "structure"]
 

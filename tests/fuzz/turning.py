@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.testing.fuzz.geometry import Array, hat
+from tests.fuzz.geometry import Array, hat
 
 __all__ = ["ball_spring", "bushing", "rotation_vector"]
 

@@ -1,6 +1,0 @@
-"""``python -m mbd.testing.fuzz --scenes 0:2000 --workers 2``: run and judge fuzzed scenes."""
-
-from mbd.testing.fuzz.batch import main
-
-if __name__ == "__main__":
-    main()
