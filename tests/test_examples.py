@@ -25,7 +25,7 @@ from mbd.cli import Script, examples
 g = 9.81
 NAMES = (
     "basin-picture", "chapter-walker", "compare-two-knees", "compass-gait", "double-pendulum", "find-a-gait",
-    "four-bar",
+    "four-bar", "from-the-laboratory",
     "identify-a-shank", "kneed-walker", "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg",
     "rimless-wheel", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "spinning-top", "steeper-slope",
     "tennis-racket", "tune-a-knee-damper",
@@ -49,7 +49,7 @@ NAMES = tuple(
 )
 HEAVY = ("amputee-in-space",)
 """Whose plain twin takes minutes: see tests/cases/test_space_examples.py."""
-STUDIES = ("compare-two-knees", "identify-a-shank", "tune-a-knee-damper")
+STUDIES = ("compare-two-knees", "from-the-laboratory", "identify-a-shank", "tune-a-knee-damper")
 """Which find gaits or fits before their run, for seconds."""
 LONG = ("steeper-slope", "long-pendulum", "basin-picture")
 """Which run for seconds, and are run again where the site is made."""
@@ -673,6 +673,19 @@ def test_the_shank_is_identified_within_its_errors() -> None:
     for name, value in truth.items():
         assert abs(found.values[name] - value) < 4.0 * found.errors[name] < 0.1 * value
     assert found.noise == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_files_of_a_laboratory_lead_to_the_damper_of_the_knee() -> None:
+    names = script("from-the-laboratory")
+    film, motion, moments = (names[name] for name in ("film", "motion", "moments"))
+    assert names["damper"] == pytest.approx(0.8, rel=0.03)
+    assert motion.rms == pytest.approx(0.0005 * math.sqrt(2.0), rel=0.2)  # two components in the plane
+    off = motion["right knee.angle"] - film.at(motion.time)["right knee.angle"]
+    assert np.sqrt(np.mean(off**2)) < 0.004
+    calm = np.abs(motion.time - 1.2) < 0.1  # far from impacts
+    assert np.abs(moments["trunk.residual_force"][calm]).max() < 60.0
+    assert [plate.foot.body.name for plate in names["plates"]] == ["left foot", "right foot"]
 
 
 @pytest.mark.slow

@@ -28,7 +28,8 @@ SHOWN, POSES, CURVE = 1.6, 9, 240
 TOPICS = {
     "Walkers and prostheses": "prosthetic-leg kneed-walker amputee-in-space compass-gait walker-in-space "
     "chapter-walker rimless-wheel simplest-walker-lagrangian torso-walker powered-knee raibert-hopper",
-    "Gait studies": "find-a-gait steeper-slope basin-picture compare-two-knees tune-a-knee-damper identify-a-shank",
+    "Gait studies": "find-a-gait steeper-slope basin-picture compare-two-knees tune-a-knee-damper identify-a-shank "
+    "from-the-laboratory",
     "Linkages and pendulums": "four-bar slider-crank pendulum double-pendulum long-pendulum lagrangian-double-pendulum",
     "Rolling, spinning and shaking": "bicycle rolling-coin billiard-ball spinning-top tippe-top tennis-racket "
     "shaken-block",

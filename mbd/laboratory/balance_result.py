@@ -16,6 +16,7 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
 from mbd.joints.planar import Planar
+from mbd.joints.translation import Translation
 from mbd.results.names import scalars_behind
 from mbd.results.tables import library
 from mbd.trajectory import Trajectory
@@ -96,7 +97,7 @@ class InverseDynamics:
 
     def _wrench(self, joint: Joint | None, name: str, places: tuple[int, ...]) -> dict[str, Vector]:
         """Residual force and moment of a joint that leaves its child free, in ground axes."""
-        if not isinstance(joint, Free | Planar):
+        if not isinstance(joint, Free | Planar | Translation):
             return {}
         parts = self._residual[:, list(places)]
         force, moment = np.zeros((len(parts), 3)), np.zeros((len(parts), 3))
@@ -104,8 +105,10 @@ class InverseDynamics:
             equations: Any = self.run.record.equations
             at = [c.name for c in equations.coordinates].index(f"{name}.orientation.w")
             force, moment = parts[:, :3], _turned(self.run.record.q[:, at : at + 4], parts[:, 3:])
-        else:
+        elif isinstance(joint, Planar):
             force[:, :2], moment[:, 2] = parts[:, :2], parts[:, 2]
+        else:
+            force[:, ["xyz".index(axis) for axis in joint.axes]] = parts
         return {
             f"{name}.residual_{kind}.{axis}": values[:, k]
             for kind, values in (("force", force), ("moment", moment))
@@ -159,9 +162,7 @@ class InverseDynamics:
         efforts = [name for name in self._own if name.endswith((".moment", ".force"))]
         largest = sorted(efforts, key=lambda name: -float(np.abs(self._own[name]).max(initial=0.0)))[:1]
         lines += [f"  largest: {name!r} {np.abs(self._own[name]).max():.3g}" for name in largest]
-        floating = [
-            name for joint, name, p in self._joints if not self._driven[p[0]] and isinstance(joint, Free | Planar)
-        ]
+        floating = [name for _, name, _ in self._joints if f"{name}.residual_force.x" in self._own]
         for name in floating:
             force, moment = (np.linalg.norm(self[f"{name}.residual_{kind}"], axis=1) for kind in ("force", "moment"))
             lines.append(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import named_number_faults, names_of
 from mbd.compile.many import at_blocks, blocks_of
 from mbd.compile.mechanism import Mechanism
@@ -21,6 +22,7 @@ from mbd.errors import CapabilityError, ModelError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
 from mbd.joints.planar import Planar
+from mbd.joints.translation import Translation
 from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate, all_plates, loaded_model, wrenches
 from mbd.laboratory.least_norm import balanced
@@ -66,7 +68,7 @@ def inverse_dynamics(
         'trunk.orientation': (R, 4), …} [s, m, rad], or `Samples`; rates and accelerations may be given too
         ('left hip.angle.rate'), coordinates that closed loops determine may be left out
     joints : names of the joints that are driven; by default all but those with which a body floats over the ground
-        (`Free`, in the plane `Planar`)
+        (`Free`, in the plane `Planar`, of a point mass `Translation`)
     plates : force plates with the feet that stand on them, in the place of all contacts (`mbd.ForcePlate`,
         `mbd.assign_plates`)
     parameters : values that differ from those of the model
@@ -129,7 +131,7 @@ def dynamics_of(
     lam = record.lam.copy()
     lam[:, list(equations.bilateral)] = found.lam
     run = Trajectory(replace(record, lam=lam, message="motion that was given", settings={"method": "inverse dynamics"}))
-    remarks = [*motion.notes, *notes, *_notes(equations, found.free, found.shared, driven, motion)]
+    remarks = [*motion.notes, *notes, *_notes(equations, found.free, found.shared, driven, motion, bool(outside))]
     return InverseDynamics(
         run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), outside
     )
@@ -218,10 +220,13 @@ def _floats(model: Any, joint: Joint | None) -> bool:
     """Whether a joint lets a body move freely over the ground."""
     if joint is None or joint.parent.body.name != model.ground.name:
         return False
-    return isinstance(joint, Free | Planar) or len(joint.freedoms) == 6
+    carried = isinstance(joint, Translation) and isinstance(joint.child.body, PointMass)
+    return isinstance(joint, Free | Planar) or carried or len(joint.freedoms) == 6
 
 
-def _notes(equations: Equations, free: int, shared: bool, driven: NDArray[np.bool_], motion: Motion) -> list[str]:
+def _notes(
+    equations: Equations, free: int, shared: bool, driven: NDArray[np.bool_], motion: Motion, pushed: bool
+) -> list[str]:
     """What a reader must know of the answer."""
     found = []
     if shared:
@@ -236,5 +241,6 @@ def _notes(equations: Equations, free: int, shared: bool, driven: NDArray[np.boo
         )
     if motion.run is None and equations.contacts:
         names = ", ".join(repr(contact.name) for contact in equations.contacts[:4])
-        found.append(f"contacts are open, their forces are part of the residual: {names}")
+        whose = "plates push in their place" if pushed else "their forces are part of the residual"
+        found.append(f"contacts are open, {whose}: {names}")
     return found

@@ -16,7 +16,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, nearest
 from mbd.joints.free import Free
-from mbd.laboratory.kinematics_result import InverseKinematics
+from mbd.laboratory.kinematics_result import InverseKinematics, stops_of
 from mbd.laboratory.marker_program import MarkerProgram, marker_program, point_names
 from mbd.laboratory.nearest_posture import Problem, nearest_postures
 from mbd.laboratory.recording import Recording
@@ -87,7 +87,7 @@ def inverse_kinematics(
     size = _weights(weights, [*points, *followed])
     # rows that hold, and stops that must not be passed
     rows = [k for k in equations.bilateral if not equations.rows[k].is_velocity]
-    gaps = [k for k, contact in enumerate(equations.contacts) if contact.unit == "rad" and not contact.is_velocity]
+    gaps = stops_of(equations)
     program = marker_program(mechanism, list(points.values()), list(followed), rows, gaps)
     problem = _problem(program, recording, points, followed, size, len(rows), len(gaps))
     values = mechanism.parameters(parameters, getattr(model, "parameters", {}))
@@ -200,7 +200,8 @@ def _begin(
         if not isinstance(start, State) or len(start.q) != equations.n_q:
             raise ModelError(f"start: a state of '{equations.name}' is expected, such as mbd.assemble(model)")
         return np.array(start.q, dtype=float)
-    q = np.array(assemble(model, parameters=dict(parameters or {})).q, dtype=float)
+    contacts = [contact.name for contact in equations.contacts]
+    q = np.array(assemble(model, open=contacts, parameters=dict(parameters or {})).q, dtype=float)
     for joint, first_q, first_v in equations.configuration.charts:
         if isinstance(joint, Free) and first_v == 0:
             return _laid(mechanism, problem, q, first_q, first, float(recording.time[first]), values, len(points))

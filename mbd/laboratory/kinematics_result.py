@@ -19,7 +19,7 @@ from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
 from mbd.results.record import Record
 from mbd.trajectory import Trajectory
 
-__all__ = ["InverseKinematics"]
+__all__ = ["InverseKinematics", "stops_of"]
 
 
 class InverseKinematics:
@@ -79,7 +79,7 @@ class InverseKinematics:
                 "all frames; what is not determined stays as in the frame before"
             )
         if found.stopped.any():
-            stops = [c.name for c in equations.contacts if c.unit == "rad" and not c.is_velocity]
+            stops = [equations.contacts[k].name for k in stops_of(equations)]
             reached = [name for name, own in zip(stops, found.stopped.T, strict=True) if own.any()]
             remarks.append(f"stops reached: {', '.join(map(repr, reached[:5]))}")
         if cutoff is not None:
@@ -129,6 +129,12 @@ class InverseKinematics:
             f"  residual {1e3 * self.rms:.3g} mm (rms), largest {1e3 * size:.3g} mm of {name!r} at {time:.4g} s",
         ]
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+
+def stops_of(equations: Equations) -> list[int]:
+    """Numbers of the contacts that are stops of joints by rows; soft ones may be passed."""
+    contacts = enumerate(equations.contacts)
+    return [k for k, each in contacts if each.kind == "unilateral" and each.unit == "rad" and not each.is_velocity]
 
 
 def error_names(equations: Equations) -> list[str]:

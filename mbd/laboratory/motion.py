@@ -262,7 +262,8 @@ def _closed(
     free = [places[names.index(name)] for name in missing]
     rows = list(equations.bilateral)
     position = {name: float(value) for name, value in zip(names, motion.q[0], strict=True) if name not in missing}
-    start = assemble(model, position=position, parameters=dict(changed))
+    contacts = [contact.name for contact in equations.contacts]
+    start = assemble(model, position=position, open=contacts, parameters=dict(changed))
     q, v, a = motion.q.copy(), motion.v.copy(), motion.a.copy()
     parameters = mechanism.parameters(changed, getattr(model, "parameters", {}))
     held = [row.is_velocity for _, row in _bilateral(equations)]
