@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ __all__ = [
     "named_file",
     "plain",
     "read",
+    "shrinks",
     "write",
     "write_whole",
     "writing",
@@ -40,6 +42,8 @@ __all__ = [
 
 COMPRESSION = 1
 """Level of zlib: higher levels take five times as long for a few percent [-]."""
+SAMPLE, WORTH = 1 << 15, 0.5
+"""How much of an array is compressed to see whether that pays [bytes], and how small it must become for it [-]."""
 SHARE = 0.5
 """Part of the free memory that the arrays of a file may fill [-]."""
 WORDS, TIMES = 200, 200
@@ -105,6 +109,13 @@ def file_to_read(path: Any) -> Path:
     raise TrajectoryError(f"the path of a file to read is expected, such as 'run.mbd.npz', not {path!r}")
 
 
+def shrinks(array: NDArray[Any]) -> bool:
+    """Whether compressing pays: it takes four times as long as writing, and most reals of a motion keep their size."""
+    data = array.reshape(-1).view(np.uint8)
+    sample = data[: SAMPLE // 2].tobytes() + data[-(SAMPLE // 2) :].tobytes()
+    return len(zlib.compress(sample, COMPRESSION)) < WORTH * len(sample)
+
+
 def write(target: Path, arrays: Arrays, meta: Mapping[str, Any]) -> None:
     """Write arrays and words, with a hash over both."""
     text = json.dumps({**meta, "hashed": True}, default=plain)
@@ -113,9 +124,11 @@ def write(target: Path, arrays: Arrays, meta: Mapping[str, Any]) -> None:
     every[HASH] = np.frombuffer(_hash(every), dtype=np.uint8)
 
     def fill(partial: Path) -> None:
-        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=COMPRESSION) as archive:
+        with zipfile.ZipFile(partial, "w", compresslevel=COMPRESSION) as archive:
             for name, array in every.items():
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                entry = zipfile.ZipInfo(f"{name}.npy")
+                entry.compress_type = zipfile.ZIP_DEFLATED if shrinks(array) else zipfile.ZIP_STORED
+                with archive.open(entry, "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, array, allow_pickle=False)
 
     write_whole(target, fill)

@@ -25,7 +25,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.results.columns import ModelColumns
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.powers import Lost, Power, moving_share, powers
-from mbd.results.quadrature import cumulative
+from mbd.results.quadrature import cumulative_of_many
 from mbd.results.record import EventRecord
 from mbd.results.within import readable, within
 
@@ -209,7 +209,7 @@ def _refined(
     by more than `least` [J] from ``h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``.
     """
     time = columns.record.time
-    works = [cumulative(time, value, rate) for _, value, rate in asked]
+    works = cumulative_of_many(time, [(value, rate) for _, value, rate in asked])
     known = readable(columns)
     if not known.any():
         return works

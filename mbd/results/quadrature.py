@@ -8,12 +8,14 @@ rates are ``∫ P dt = h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``, of orde
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 
-__all__ = ["cumulative", "stretches"]
+__all__ = ["cumulative", "cumulative_of_many", "stretches"]
 
 ROWS_WITH_RATES, ROWS_WITHOUT = 4, 8
 """Rows that the polynomial goes through: eight conditions either way."""
@@ -55,20 +57,37 @@ def cumulative(time: Vector, values: Vector, rates: Vector | None = None) -> Vec
     values : P at the rows; those of the two sides of a switch may differ
     rates : Ṗ at the rows, each as seen from its own side; None where they are not known
     """
-    steps = np.zeros(len(time))
+    return cumulative_of_many(time, [(values, rates)])[0]
+
+
+def cumulative_of_many(time: Vector, integrands: Sequence[tuple[Vector, Vector | None]]) -> list[Vector]:
+    """`cumulative` of several integrands, (values, rates), whose weights are computed once."""
+    known = {with_rates: _rules(time, with_rates) for with_rates in {rates is not None for _, rates in integrands}}
+    found = []
+    for values, rates in integrands:
+        steps = np.zeros(len(time))
+        for upper, rows, weights in known[rates is not None]:
+            columns = values[rows] if rates is None else np.hstack([values[rows], rates[rows]])
+            steps[upper] = np.sum(weights * columns, axis=1)
+        found.append(np.cumsum(steps))
+    return found
+
+
+def _rules(time: Vector, with_rates: bool) -> list[tuple[Index, Index, Matrix]]:
+    """Intervals in groups: their upper rows, the rows that each looks at, and the weights of these."""
     begin = np.flatnonzero(np.diff(time) > 0.0)
     if not len(begin):
-        return steps
-    wanted = ROWS_WITHOUT if rates is None else ROWS_WITH_RATES
+        return []
+    wanted = ROWS_WITH_RATES if with_rates else ROWS_WITHOUT
     first, last = _alike(time, begin, *stretches(time), wanted - 2)
     size = np.minimum(wanted, last - first + 1)
     left = np.clip(begin - (size - 2) // 2, first, last + 1 - size)
+    found = []
     for count in np.unique(size):
         chosen = np.flatnonzero(size == count)
         rows = left[chosen, None] + np.arange(count)
-        columns = values[rows] if rates is None else np.hstack([values[rows], rates[rows]])
-        steps[begin[chosen] + 1] = np.sum(_weights(time, begin[chosen], rows, rates is not None) * columns, axis=1)
-    return np.cumsum(steps)
+        found.append((begin[chosen] + 1, rows, _weights(time, begin[chosen], rows, with_rates)))
+    return found
 
 
 def _alike(time: Vector, begin: Index, first: Index, last: Index, most: int) -> tuple[Index, Index]:
