@@ -20,7 +20,7 @@ from mbd.kernel.guards import judge
 from mbd.kernel.locate import locate
 from mbd.kernel.records import Frictions, Guards, Kernel
 from mbd.kernel.roots import sqrt
-from mbd.kernel.trial_step import try_step
+from mbd.kernel.trial_step import try_step, turns
 
 __all__ = [
     "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "shorter_turn", "slides_at_first", "slides_on",
@@ -88,6 +88,8 @@ def approached_end(K: Guards, t1: float) -> float:
                 K.hold[f] = K.hold[p] = HELD
             elif fall > 0.0 or across * h > PART * speed * speed:
                 end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
+    if K.begun_step > 0.0 and not turns(K):  # what is held needs the whole step to come to rest
+        K.begun_step = 0.0
     if K.begun_step > 0.0:
         K.begun_step *= LONGER
         if K.begun_step < end - K.time:
@@ -104,12 +106,7 @@ def approached_end(K: Guards, t1: float) -> float:
 
 def slides_at_first(K: Frictions, h: float) -> bool:
     """Whether something slides whose direction may turn too fast for a step of dt: one of h may follow it."""
-    if K.adaptive == 1 or h < BRIEFEST * K.dt:
-        return False
-    found = False
-    for f in range(K.n_frictions):
-        found = found or (K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD)
-    return found
+    return not (K.adaptive == 1 or h < BRIEFEST * K.dt) and turns(K)
 
 
 def slides_on(K: Guards) -> bool:

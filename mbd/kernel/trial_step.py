@@ -27,7 +27,7 @@ from mbd.kernel.restart import (
     minimum_norm_multipliers,
 )
 
-__all__ = ["try_step"]
+__all__ = ["try_step", "turns"]
 
 MOST_PASSES = 60
 """Times that the end of a brief step is asked for the rates that lead there, where these change its forces much [-]."""
