@@ -9,10 +9,10 @@ import pytest
 
 import mbd
 from mbd.errors import CapabilityError, ModelError, SimulationError
+from mbd.kernel.interpreted import InterpretedScheme
 from mbd.kernel.records import TABLE
 from mbd.results.matching import apart
 from mbd.simulation.run.begin import notify
-from mbd.simulation.run.plain import KernelScheme
 from mbd.simulation.simulate import prepared
 from mbd.simulation.tolerance.comparison import gap
 from tests.equations.mechanisms import four_bar
@@ -261,7 +261,7 @@ def test_the_interpreted_kernel_takes_the_steps_of_the_compiled_one(scene, schem
     model, start, _, _ = reference(scene)
     fast, slow = (following(model, start, scheme, 0.3) for _ in range(2))
     assert fast.stepper.compiled
-    slow.stepper.compiled, slow.stepper.scheme = False, KernelScheme(slow.stepper.own)
+    slow.stepper.compiled, slow.stepper.scheme = False, InterpretedScheme(slow.stepper.own)
     one, two = (each.complete()[0] for each in (fast, slow))
     assert one.success and one.stats["rejected"] == two.stats["rejected"]
     np.testing.assert_allclose(one.time, two.time, rtol=0, atol=1e-9)
