@@ -88,15 +88,20 @@ def test_a_resolved_blow_keeps_the_steps_of_the_run():
     assert run.stats["notes"] == [] and np.max(np.diff(run.time)) == pytest.approx(1e-3)
 
 
-def test_without_shorter_steps_energy_would_be_gained(monkeypatch):
+def test_without_shorter_steps_a_blow_would_lose_energy_that_its_law_gives_back(monkeypatch):
     """What the law above guards against, in the kernel as it runs interpreted."""
     model = mbd.Model("mat", gravity=(0.0, 0.0, 0.0))
     ball = mbd.PointMass("ball", mass=2.0)
     model.connect(mbd.Translation("flight", model.ground.origin, ball.origin, axes="y"))
     model.constrain(mbd.Penalty("mat", mbd.height(ball.origin), stiffness=2e4))
     start = mbd.assemble(model, position={"flight.y": 0.01}, velocity={"flight.y": -1.0})
+
+    def backs():
+        runs = [
+            mbd.simulate(model, start, mbd.HHT(0.3), dt=dt, until=0.3, backend="python") for dt in (1e-2, 2e-2, 5e-2)
+        ]
+        return np.array([run["flight.y.rate"][-1] for run in runs])
+
+    assert np.all(np.abs(backs() - 1.0) < 0.01)
     monkeypatch.setattr(contact_step, "pace_of", lambda K, c: K.dt)
-    backs = [
-        mbd.simulate(model, start, dt=dt, until=0.3, backend="python")["flight.y.rate"][-1] for dt in (1e-2, 2e-2, 5e-2)
-    ]
-    assert max(backs) > 1.02
+    assert np.max(np.abs(backs() - 1.0)) > 0.1
