@@ -29,7 +29,7 @@ NO_SLIP = 1e-100
 def sliding_force(equations: Equations, k: int, smooth: Scalar = 1.0) -> Node:
     """λ_T of friction k while it slides, in terms of its slip, its velocity and its limit.
 
-    smooth : 0 in impacts, where the limit is that at rest
+    smooth : 0 in impacts, where the limit is that at the slip before them
     """
     tape, friction = equations.tape, equations.frictions[k]
     own, limit = tape.input("slip", k), friction.limit_at_speed(smooth)

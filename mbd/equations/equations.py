@@ -153,6 +153,7 @@ class Friction:
     rate : γ on the tape; change : γ̇, with accelerations
     limit : at rest, of multipliers and parameters, homogeneous of degree one in the multipliers but for a constant
     sliding : limit at the velocity of its slide, `limit` itself where that changes nothing; see `limit_at_speed`
+    struck : limit at the velocity before an impact, in whichever direction; `limit` where velocity changes nothing
     partner : number of the other direction of a contact in space, −1 if this one is alone; both together obey
         ``‖λ_T‖ ≤ limit``, and ``λ_T = limit γ/‖γ‖`` while they slide (see `mbd.equations.cones`)
     """
@@ -164,16 +165,22 @@ class Friction:
     change: Node
     limit: Node
     sliding: Node
+    struck: Node
     partner: int = -1
 
+    @property
+    def falls(self) -> bool:
+        """Whether the limit of a contact's friction changes as it slides."""
+        return self.contact >= 0 and self.sliding is not self.limit
+
     def limit_at_speed(self, smooth: Node | float = 1.0) -> Node:
-        """``limit + smooth (sliding − limit)``, smooth = 0 in impacts, whose slips pass all speeds.
+        """``struck + smooth (sliding − struck)``, smooth = 0 in impacts: their limit is that of the slip before them.
 
         Friction in joints stays finite, so that impacts make nothing of it: it is that of its velocity always.
         """
-        if self.sliding is self.limit or self.contact < 0 or not isinstance(smooth, Node):
+        if not self.falls or not isinstance(smooth, Node):
             return self.sliding
-        return self.limit + smooth * (self.sliding - self.limit)
+        return self.struck + smooth * (self.sliding - self.struck)
 
 
 @dataclass(frozen=True)

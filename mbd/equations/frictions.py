@@ -73,9 +73,12 @@ def _slide(
     speed = _speed(scope, views, first)
     for place, (row, word) in enumerate(tangents):
         limit = scope.tape.lift(word.limit(push) if callable(word.limit) else word.limit or 0.0)
-        sliding = limit if word.sliding is None else scope.tape.lift(word.sliding(push, speed))
+        sliding = struck = limit
+        if word.sliding is not None:
+            sliding = scope.tape.lift(word.sliding(push, speed))
+            struck = scope.tape.lift(word.sliding(push, _size(scope, views)))
         partner = -1 if len(tangents) == 1 else first + 1 - place
-        _add(found, scope, name, row, found.rows[row].contact, views[place], limit, sliding, partner)
+        _add(found, scope, name, row, found.rows[row].contact, views[place], limit, sliding, struck, partner)
     _add_loss(found, scope, dynamics, name, range(first, len(found.frictions)))
 
 
@@ -92,7 +95,7 @@ def dry_friction(
     """Dry friction along a row on velocities, ``|λ| ≤ limit``; `sliding` is the limit at a speed."""
     view = found.viewed[row]
     moving = limit if sliding is None else scope.tape.lift(sliding(_speed(scope, [view], len(found.frictions))))
-    _add(found, scope, name, row, contact, view, limit, moving)
+    _add(found, scope, name, row, contact, view, limit, moving, moving)
     _add_loss(found, scope, dynamics, name, [len(found.frictions) - 1])
 
 
@@ -122,6 +125,12 @@ def _speed(scope: DerivationScope, views: Sequence[Node], first: int) -> Node:
     rates = [scope.real(view) for view in views]
     if len(rates) == 1:
         return scope.tape.input("slip", first) * rates[0]
+    return _size(scope, views)
+
+
+def _size(scope: DerivationScope, views: Sequence[Node]) -> Node:
+    """‖γ‖ of these velocities."""
+    rates = [scope.real(view) for view in views]
     return scope.tape.lift(sqrt(sum((rate * rate for rate in rates), scope.tape.lift(LEAST_SQUARE))))
 
 
@@ -143,12 +152,13 @@ def _add(
     view: Node,
     limit: Node,
     sliding: Node,
+    struck: Node,
     partner: int = -1,
 ) -> None:
     """A direction of dry friction, and its row marked as held by it."""
     rate = scope.real(view)
     found.rows[row] = replace(found.rows[row], friction=len(found.frictions))
-    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit, sliding, partner))
+    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit, sliding, struck, partner))
     found.sliding.append(view)
 
 

@@ -184,7 +184,7 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that transitions
     and closing contacts store, in the order of anchors, and the whole turns as they are; T is the kinetic energy. In
     `impacts`, where c_C is 1, smooth friction of contacts has no impulse, and dry friction of contacts its limit at
-    rest.
+    the slip before them.
     """
     inputs = Inputs.of(equations)
     tape = equations.tape

@@ -20,7 +20,7 @@ def prepare(K: Balance) -> None:
 
     A contact that closes holds the place that it strikes from here on: its tangents are those of the ground there, also
     where it rebounds. Smooth friction of contacts, where K.rubs says that there is any, takes no part; dry friction of
-    contacts is that at rest.
+    contacts has its limit at the slip before the impact.
     """
     evaluate(K, K.time, K.q, K.y)
     if K.n_cones > 0:

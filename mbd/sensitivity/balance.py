@@ -173,7 +173,10 @@ def impact(
         A[:n, :n] += (loaded - bare)[:, c.y]
     Z = before.tangent.stacked(c)
     still = before.with_tangent(y=np.zeros_like(before.tangent.y)).tangent.stacked(c)
-    right = [(loaded - bare) @ still - M @ before.tangent.y]
+    forces = (loaded - bare) @ still
+    if any(what.slip[f] != 0.0 and each.falls for f, each in enumerate(programs.equations.frictions)):
+        forces = (programs.steps(before.at(mode, jump, impulse))[3] - bare0) @ Z  # their size is that of v⁻
+    right = [forces - M @ before.tangent.y]
     right.append(of_speed1[rows] @ still + e[:, np.newaxis] * (of_speed0[rows] @ Z))
     for k, row in enumerate(rows):
         if row in of_e and row in what.restitution:

@@ -109,13 +109,6 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
         texts.append(scheme.check_tolerance(len(held)))
         found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
     found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in texts if text]
-    falling = {friction.contact for friction in equations.frictions if friction.sliding is not friction.limit}
-    rubbing = [c.name for k, c in enumerate(equations.contacts) if c.rows and (c.drags or k in falling)]
-    if rubbing and options.get("contact") == "nonsmooth":
-        found.append(
-            f"contact='nonsmooth' solves friction=μ, and that of {_listed(rubbing)} is a loss that follows the "
-            "velocity; use contact='events'"
-        )
     if equations.compose is not None and not scheme.any_chart:
         found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
     return found

@@ -92,13 +92,73 @@ def test_words_that_make_no_friction_are_refused():
         mbd.assemble(model, {"hinge.angle": 0.0})
 
 
-def test_an_impact_with_the_static_size_says_so():
-    model = mbd.Model("thrown")
+def thrown(law, speed, space):
+    """A ball that falls on the floor from 0.1 m, at this speed along it."""
+    model = mbd.Model("thrown", gravity=(0.0, -9.81, 0.0))
     ball = mbd.PointMass("ball", mass=1.0)
-    model.connect(mbd.Translation("place", model.ground.origin, ball.origin))
-    model.constrain(mbd.Unilateral("foot", mbd.touchdown(ball.origin), friction=mbd.Stribeck(0.6, 0.3, 0.1)))
-    start = mbd.assemble(model, position={"place.y": 0.1}, velocity={"place.x": 2.0})
-    run = mbd.simulate(model, start, dt=1e-3, until=0.2)
-    normal, forward = run.events[0].impulse
-    assert forward == pytest.approx(-0.6 * normal)
-    assert [note for note in run.stats["notes"] if note.startswith("impacts of 'foot' had the static size")]
+    model.connect(mbd.Translation("place", model.ground.origin, ball.origin, axes="xyz" if space else "xy"))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(ball.origin), friction=law))
+    velocity = {"place.x": -0.6 * speed, "place.z": 0.8 * speed} if space else {"place.x": -speed}
+    return model, mbd.assemble(model, position={"place.y": 0.1}, velocity=velocity)
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+@pytest.mark.parametrize("speed", [0.05, 0.9, 1.0, 3.0])
+def test_an_impact_has_the_size_of_the_slip_before_it(space, speed):
+    """It sticks where μ(v) p ≥ m v, else it takes μ(v) p against the slip."""
+    law = mbd.Stribeck(0.9, 0.6, 1.5)
+    model, start = thrown(law, speed, space)
+    run = mbd.simulate(model, start, dt=1e-3, until=0.145)
+    push = np.sqrt(2.0 * 9.81 * 0.1)
+    mu = 0.6 + 0.3 * np.exp(-((speed / 1.5) ** 2))
+    impulse = run.events[0].impulse
+    assert impulse[0] == pytest.approx(push, rel=1e-9)
+    assert np.linalg.norm(impulse[1:]) == pytest.approx(min(mu * push, speed), rel=1e-9)
+    against = impulse[1:] / np.linalg.norm(impulse[1:])
+    assert against == pytest.approx([0.6, -0.8] if space else [1.0], abs=1e-9)
+
+
+def test_derivatives_of_an_impact_follow_the_size_of_its_slip():
+    law = mbd.Stribeck(0.8, 0.4, 1.5)
+    ends = []
+    for speed in (2.0 - 1e-4, 2.0 + 1e-4):
+        model, start = thrown(law, speed, False)
+        ends.append(mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.16)["place.x"][-1])
+    model, start = thrown(law, 2.0, False)
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.16, wrt=["place.x.rate"])
+    slope = (ends[0] - ends[1]) / 2e-4
+    assert run.sensitivities["place.x", "place.x.rate"] == pytest.approx(slope, rel=1e-6)
+    model, start = thrown(law, 2.0, True)
+    with pytest.raises(mbd.CapabilityError, match="the friction of 'foot' changes with its slip"):
+        mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.16, wrt=["place.x.rate"])
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+def test_what_falls_and_slides_in_non_smooth_steps_has_the_size_of_its_slip(space):
+    """The place where it stops is that of located events, but for O(dt)."""
+    for law in mbd.Stribeck(0.8, 0.4, 0.5), mbd.Coulomb(0.4) + mbd.Viscous(0.1):
+        model, start = thrown(law, 3.0, space)
+        runs = [mbd.simulate(model, start, dt=1e-3, until=0.9, contact=how) for how in ("nonsmooth", "events")]
+        way = [np.hypot(run["place.x"], run["place.z"] if space else 0.0)[-1] for run in runs]
+        assert way[0] == pytest.approx(way[1], abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    "law", [mbd.Stribeck(0.6, 0.3, 0.3), mbd.Coulomb(0.3) + mbd.Viscous(0.1), mbd.Viscous(0.2)], ids=str
+)
+def test_non_smooth_steps_come_to_the_motion_of_located_events_with_dt(law):
+    """A box on four corners slides and turns until it stops: its place is off by O(dt), friction only takes energy."""
+    model = mbd.Model("box", gravity=(0.0, -9.81, 0.0))
+    body = mbd.RigidBody("body", 2.0, (0.02, 0.03, 0.02))
+    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    corners = [body.point(x, -0.05, z) for x in (-0.1, 0.1) for z in (-0.08, 0.08)]
+    names = [contact.name for contact in mbd.parts.polygon_foot(model, "sole", corners, friction=law)]
+    speed = {"float.x": 1.2, "float.z": 0.5, "float.angular_velocity.y": 2.0}
+    start = mbd.assemble(model, position={"float.y": 0.05}, velocity=speed, closed=names)
+    exact = mbd.simulate(model, start, mbd.RadauIIA(), dt=2e-3, until=0.5)
+    for dt in (2e-3, 5e-4):
+        run = mbd.simulate(model, start, mbd.HHT(0.05), dt=dt, until=0.5, contact="nonsmooth")
+        for name in ("float.x", "float.z", "float.rotation_vector.y"):
+            assert run[name][-1] == pytest.approx(exact[name][-1], abs=0.5 * dt)
+        taken = sum(run.energy[f"{name} friction"][-1] for name in names)
+        assert taken < 0.0 and run["float.y"][-1] == pytest.approx(0.05, abs=1e-9)

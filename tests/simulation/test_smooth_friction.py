@@ -150,6 +150,3 @@ def test_what_is_no_friction_of_a_contact_is_refused_by_name():
     body = mbd.RigidBody("body", 1.0, 1.0)
     with pytest.raises(mbd.ModelError, match="friction of 'foot'.*follows the force in a joint"):
         mbd.Unilateral("foot", mbd.touchdown(body.origin), friction=mbd.PinFriction(0.3, 0.01))
-    model = slider(mbd.Viscous(0.3))
-    with pytest.raises(mbd.CapabilityError, match="contact='nonsmooth' solves friction=μ, and that of 'foot'"):
-        mbd.simulate(model, mbd.assemble(model, closed="foot"), dt=1e-3, until=0.01, contact="nonsmooth")

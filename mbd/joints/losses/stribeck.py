@@ -26,7 +26,7 @@ class Stribeck(Loss):
     sticks and slips. ``+ mbd.Viscous(c)`` lets it grow again.
 
     As ``friction=`` of a contact it is isotropic: T_s and T_k are coefficients per newton of normal force [-], v is the
-    speed of the slip [m/s]; impacts, whose slips pass all speeds, have the static one.
+    speed of the slip [m/s]. An impact has the coefficient of the slip before it.
 
     Parameters
     ----------

@@ -143,7 +143,6 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
             held = _pulled(record, number, contact)
             notes, doubts = notes + held, doubts + held
         doubts += blind
-    notes += _static_in_impacts(run)
     return notes, doubts
 
 
@@ -191,23 +190,6 @@ def _ignored(run: RunData, number: int, contact: Contact) -> list[str]:
     if np.isfinite(sinking):
         notes.append(f"{contact.name!r} was released at t = {sinking:.6g} s while moving into its surface")
     return notes
-
-
-def _static_in_impacts(run: RunData) -> list[str]:
-    """Contacts that slid in an impact with friction that falls with speed, whose impulses know the static size only."""
-    equations = run.mechanism.equations
-    falling = {f.contact for f in equations.frictions if f.contact >= 0 and f.sliding is not f.limit}
-    names = {contact.name for c, contact in enumerate(run.manager.contacts) if c in falling}
-    slid = dict.fromkeys(
-        event.name for event in run.events
-        if event.kind == "closed" and event.name in names and np.any(event.impulse[1:] != 0.0)
-    )  # fmt: skip
-    if not slid:
-        return []
-    return [
-        f"impacts of {', '.join(map(repr, slid))} had the static size of its friction, whatever the speed of the slip: "
-        "a slip passes all speeds in an impact; friction=mbd.Coulomb(kinetic) bounds the difference"
-    ]
 
 
 def _pulled(record: Record, number: int, contact: Contact) -> list[str]:
