@@ -39,11 +39,15 @@ LONG |= {("j6", "RadauIIA")}
 """Cases that take seconds with schemes that others judge quickly."""
 
 
+ALONE = {"b4", "h1", "h1b", "j2", "j4", "j5", "j14", "j17"}
+"""Cases whose laws no file of `tests/cases` tries with other numbers or schemes."""
+
+
 def quick(place: int, case: HardCase) -> set[str]:
     """The scheme that judges every other case here, by turns so that each scheme has some; CI judges all by
     ``mbd hardcases``, `pytest -m slow` here."""
     names = [name for name in case.schemes if (short(case), name) not in LONG]
-    return set() if case.slow or place % 2 else {names[place % len(names)]}
+    return set() if case.slow or (place % 2 and short(case) not in ALONE) else {names[place % len(names)]}
 
 
 def marks(case: HardCase, name: str, chosen: set[str]) -> list:
