@@ -16,7 +16,7 @@ from mbd.assembly.foreseen import require_inertia
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.infeasibility import Held
 from mbd.assembly.initial_pose import opening
-from mbd.assembly.machines import first_anchors, store_first
+from mbd.assembly.machines import first_anchors, hold, store_first, without_held
 from mbd.assembly.named_projection import nearest_positions, nearest_velocities
 from mbd.assembly.posture import (
     TOLERANCE,
@@ -69,7 +69,8 @@ def assemble(
         ('left shank.end.x', the angle of a cut joint), which then holds like a row. 'ball.orientation' is a unit
         quaternion (w, x, y, z), whose length is 1 within 1e-6, a scipy ``Rotation``, a rotation matrix (3, 3), an axis
         with an angle ((0, 0, 1), 0.3), or Euler angles about axes that turn along ('zxy', (0.1, 0.2, 0.3)) [rad]; three
-        numbers behind any other name are its '.x', '.y', '.z'
+        numbers behind any other name are its '.x', '.y', '.z'. A mode starts in another state than its own by
+        {'knee phase': 'swing'}, with a remembered value by {'knee phase.touchdown angle': 0.2}
     velocity : {'left hip.angle': −1.1} or {'left hip.rate': …} rates by coordinate or rate name [m/s, rad/s], such as
         {'ball.angular_velocity': (0, 0, 2)} in the child's axes, 'ball.angular_velocity.parent', '… .ground'
     closed : names of contacts that start closed
@@ -95,6 +96,7 @@ def assemble(
     ModelError
         if the model itself has faults.
     """
+    position, held = without_held(model, position)
     position, wrong, doubts = spelled_out(model, position, "position")
     velocity, more_wrong, _ = spelled_out(model, velocity, "velocity")
     wanted = {"position": position, "velocity": velocity, "parameters": parameters}
@@ -121,6 +123,7 @@ def assemble(
     guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
     guess = equations.configuration.normalise(guess)
     anchors = first_anchors(mechanism)
+    hold(mechanism, held, anchors)
     work = Posture(
         mechanism, manager, values, guess, y.copy(), manager.flags(closed), anchors, named.places, named.speeds
     )
@@ -129,6 +132,7 @@ def assemble(
         raise AssemblyError(bad)
     name_wrapped(work)
     store_first(mechanism, 0.0, work.q, work.y, values, work.anchors)
+    hold(mechanism, held, work.anchors)
     doubt(*doubts, *doubtful(model, equations, position or {}), of=model)
     assembled = State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.bodies.values import number
 from mbd.compile.mechanism import Mechanism
+from mbd.errors import ModelError, nearest
 
-__all__ = ["first_anchors", "store_first"]
+__all__ = ["first_anchors", "hold", "store_first", "without_held"]
 
 
 def first_anchors(mechanism: Mechanism) -> Vector:
@@ -26,3 +31,37 @@ def store_first(mechanism: Mechanism, time: float, q: Vector, y: Vector, paramet
     captured = mechanism.acceleration_terms(time, q, y, parameters, anchors).captured
     for machine in machines:
         anchors[list(machine.first)] = captured[list(machine.first)]
+
+
+def without_held(model: Any, position: Any) -> tuple[Any, dict[str, Any]]:
+    """Named values without those of machines, and these: states as numbers, and values that they remember.
+
+    Raises
+    ------
+    ModelError
+        for a state that a mode does not have, and what is no number.
+    """
+    machines = getattr(model, "machines", ())
+    if not machines or not isinstance(position, Mapping):
+        return position, {}
+    held: dict[str, Any] = {}
+    for machine in machines:
+        own = set(machine.quantity_names) - {f"{machine.name}.index", f"{machine.name}.time"}
+        for name in own & set(position):
+            value = position[name]
+            if name != machine.name:
+                held[name] = number(value, f"position of {name!r}")
+            elif value in machine.state_names:
+                held[name] = float(machine.state_names.index(value))
+            else:
+                raise ModelError(f"position, {name!r}: " + nearest(str(value), machine.state_names, "state", "It has"))
+    return {name: value for name, value in position.items() if name not in held}, held
+
+
+def hold(mechanism: Mechanism, held: Mapping[str, float], anchors: Vector) -> None:
+    """Write what machines are to hold into anchors."""
+    for machine in mechanism.equations.machines if held else ():
+        for field, anchor in zip(machine.fields, machine.anchors, strict=True):
+            name = machine.name if anchor == machine.anchors[0] else f"{machine.name}.{field}"
+            if name in held:
+                anchors[anchor] = held[name]

@@ -67,6 +67,8 @@ def quantity(run: Trajectory, name: str) -> Any:
             f"{name!r} follows from forces, which a state does not have; simulate the model, and ask the run for it"
         )
     value = run[name][0]
+    if isinstance(value, str):  # the state of a mode
+        return str(value)
     return float(value) if np.ndim(value) == 0 else np.array(value)
 
 

@@ -151,6 +151,19 @@ def test_energy_is_balanced_though_a_clutch_moves_what_a_spring_stores() -> None
     assert off == 0.0 < run["spring.energy"][row - 1]
 
 
+def test_a_start_names_a_state_and_what_it_remembers() -> None:
+    model = knee()
+    start = mbd.assemble(model, {"knee.angle": 0.3, "phase": "pull", "phase.turn": 0.5})
+    assert start["phase"] == "pull" and start["phase.turn"] == 0.5 and start["phase.time"] == 0.0
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.2)
+    assert [event.name for event in run.events] == ["phase: pull to brake"]
+    assert run["drive.torque"][0] == pytest.approx(-3.0 * (0.3 - 0.5), rel=1e-14)
+    with pytest.raises(ModelError, match="'phase': no state named 'pul'"):
+        mbd.assemble(model, {"phase": "pul"})
+    with pytest.raises(ModelError, match="position of 'phase.turn'"):
+        mbd.assemble(model, {"phase.turn": "far"})
+
+
 def test_a_run_that_goes_on_or_was_saved_is_the_same_to_the_bit(tmp_path: Any) -> None:
     model = knee()
     start = mbd.assemble(model, {"knee.angle": 0.8})
