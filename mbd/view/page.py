@@ -115,6 +115,16 @@ def content(run: Trajectory, picture: Scene) -> dict[str, Any]:
                 "closed": stretches(run.time, run.record.closed[:, k]),
             }
             for k, contact in enumerate(run.facts.contacts)
+        ]
+        + [
+            {
+                "name": f"{mode}: {state}",
+                "side": side(state) or side(mode),
+                "foot": False,
+                "closed": stretches(run.time, run[mode] == state),
+            }
+            for mode, states in run.facts.modes
+            for state in states
         ],
         "events": [
             {"time": event.time, "kind": event.kind, "name": event.name, "side": side(event.name), "loss": loss}

@@ -96,7 +96,7 @@ def histories(run: Trajectory, *names: str, path: str | Path | None = None, degr
     panels: dict[str, list[str]] = {}
     for name in scalars:
         panels.setdefault(unit(name, run.facts), []).append(name)
-    bars = len(run.facts.contacts)
+    bars = len(run.facts.contacts) + len(run.facts.modes)
     heights = [2.1 + 0.17 * ((len(group) - 1) // 4) for group in panels.values()]
     heights += [0.25 + 0.2 * bars] if bars else []
     with drawing(path, 7.4, 0.7 + sum(heights)) as figure:
@@ -151,6 +151,10 @@ def _upright(axes: Any, times: Sequence[float], low: float, high: float, **look:
     axes.add_collection(lines, autolim=False)
 
 
+NAMED = 0.012
+"""Share of the time of a run that a letter of the name of a state takes in its bar [-]."""
+
+
 def _shade(axes: Any, run: Trajectory, wanted: Sequence[str]) -> None:
     """The times at which contacts are closed: of those asked for by name, else of feet, else of all; a shade a side."""
     contacts = [
@@ -173,11 +177,20 @@ def _shade(axes: Any, run: Trajectory, wanted: Sequence[str]) -> None:
 
 
 def _bars(axes: Any, run: Trajectory) -> None:
-    """One bar per stretch of time in which a contact is closed."""
+    """One bar per stretch of time in which a contact is closed, or a mode in a state, whose name it bears."""
     names = [contact.name for contact in run.facts.contacts]
     for row, name in enumerate(names):
         spans = stretches(run.time, run.record.closed[:, row])
         axes.broken_barh([(a, b - a) for a, b in spans], (row - 0.32, 0.64), color=color(name), alpha=0.85, linewidth=0)
+    whole = float(run.time[-1] - run.time[0]) if len(run) else 0.0
+    for row, (mode, states) in enumerate(run.facts.modes, len(names)):
+        names.append(mode)
+        for number, state in enumerate(states):
+            spans, shade = stretches(run.time, run[mode] == state), tone(CYCLE[number % len(CYCLE)])
+            axes.broken_barh([(a, b - a) for a, b in spans], (row - 0.32, 0.64), color=shade, alpha=0.45, linewidth=0)
+            for a, b in spans:
+                if b - a > NAMED * len(state) * whole:
+                    axes.text(0.5 * (a + b), row, as_label(state), ha="center", va="center", fontsize="x-small")
     axes.set_yticks(range(len(names)), [as_label(name) for name in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
