@@ -8,11 +8,11 @@ from typing import Any
 
 from mbd.bodies.algebra import rotate
 from mbd.bodies.base import Frame
+from mbd.bodies.by_mode import by_mode_of
 from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import name_of
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
-from mbd.forces.by_mode import by_mode_of
 from mbd.forces.quantities import (
     Mention,
     arguments_of,

@@ -9,9 +9,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from mbd.bodies.base import Frame
+from mbd.bodies.by_mode import ByMode
 from mbd.bodies.values import is_number, number
 from mbd.errors import ModelError, UnknownNameError
-from mbd.forces.by_mode import ByMode
 from mbd.forces.samples import Samples
 from mbd.forces.scipy_curves import is_curve
 from mbd.joints.base import Joint

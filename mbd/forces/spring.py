@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
+from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
 from mbd.bodies.domains import Domain, at_least_zero
-from mbd.bodies.values import name_of, number
+from mbd.bodies.values import name_of
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope
@@ -28,20 +30,23 @@ class Spring(Force):
     a, b : its end frames
     stiffness : k [N/m]
     length : unstretched [m]
+    by : name of a mode whose states have values of their own: ``length={"stance": 0.9, "push": 1.0}, by="phase"``; in
+        states whose stiffness is left out there is no spring. Each is the parameter 'name.length.push'
     """
 
     name: str
     a: Frame
     b: Frame
-    stiffness: float
-    length: float = 0.0
+    stiffness: Any
+    length: Any = 0.0
+    by: str | None = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Spring")
         frame_of(self.a, f"first end of Spring '{self.name}'")
         frame_of(self.b, f"second end of Spring '{self.name}'")
-        object.__setattr__(self, "stiffness", number(self.stiffness, f"stiffness of '{self.name}'"))
-        object.__setattr__(self, "length", number(self.length, f"length of '{self.name}'"))
+        object.__setattr__(self, "stiffness", number_by_mode(self.stiffness, self.by, f"stiffness of '{self.name}'"))
+        object.__setattr__(self, "length", number_by_mode(self.length, self.by, f"length of '{self.name}'"))
 
     @property
     def kind(self) -> str:
@@ -54,11 +59,13 @@ class Spring(Force):
 
     def parameters(self) -> dict[str, float]:
         """`stiffness` and `length`."""
-        return {f"{self.name}.stiffness": self.stiffness, f"{self.name}.length": self.length}
+        stiffness = parameters_by_mode(self.name, "stiffness", self.stiffness)
+        return stiffness | parameters_by_mode(self.name, "length", self.length)
 
     def domains(self) -> dict[str, Domain]:
         """A length ≥ 0."""
-        return {f"{self.name}.length": at_least_zero("is negative; give the unstretched length", "m")}
+        names = parameters_by_mode(self.name, "length", self.length)
+        return dict.fromkeys(names, at_least_zero("is negative; give the unstretched length", "m"))
 
     @property
     def known_as(self) -> str:
@@ -75,8 +82,8 @@ class Spring(Force):
     def act(self, scope: Scope) -> Action:
         """Its potential."""
         arm = difference(scope.frame(self.b).position, scope.frame(self.a).position)
-        k = scope.parameter(self.name, "stiffness", self.stiffness)
-        length = scope.parameter(self.name, "length", self.length)
+        k = parameter_by_mode(scope, self.name, "stiffness", self.stiffness, 0.0)
+        length = parameter_by_mode(scope, self.name, "length", self.length)
         if length.is_zero:
             return Action(potential=0.5 * k * dot(arm, arm))
         stretch = norm(arm) - length
@@ -88,5 +95,5 @@ class Spring(Force):
 
     def _tension(self, scope: Scope) -> Scalar:
         arm = difference(scope.frame(self.b).position, scope.frame(self.a).position)
-        k = scope.parameter(self.name, "stiffness", self.stiffness)
-        return k * (norm(arm) - scope.parameter(self.name, "length", self.length))
+        k = parameter_by_mode(scope, self.name, "stiffness", self.stiffness, 0.0)
+        return k * (norm(arm) - parameter_by_mode(scope, self.name, "length", self.length))

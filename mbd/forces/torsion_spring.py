@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from mbd.bodies.values import name_of, number
+from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.values import name_of
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
@@ -24,18 +26,21 @@ class TorsionSpring(Force):
     joint : a Revolute, Screw or Prismatic joint
     stiffness : k [N m/rad or N/m]
     rest : coordinate at which it is slack [rad or m]
+    by : name of a mode whose states have values of their own: ``stiffness={"stance": 500.0}, by="phase"``; in states
+        that are left out there is no spring. Each is the parameter 'name.stiffness.stance'
     """
 
     name: str
     joint: Joint
-    stiffness: float
-    rest: float = 0.0
+    stiffness: Any
+    rest: Any = 0.0
+    by: str | None = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "TorsionSpring")
         joint_of(self.joint, f"joint of TorsionSpring '{self.name}'")
-        object.__setattr__(self, "stiffness", number(self.stiffness, f"stiffness of '{self.name}'"))
-        object.__setattr__(self, "rest", number(self.rest, f"rest of '{self.name}'"))
+        object.__setattr__(self, "stiffness", number_by_mode(self.stiffness, self.by, f"stiffness of '{self.name}'"))
+        object.__setattr__(self, "rest", number_by_mode(self.rest, self.by, f"rest of '{self.name}'"))
 
     @property
     def kind(self) -> str:
@@ -48,19 +53,23 @@ class TorsionSpring(Force):
 
     def parameters(self) -> dict[str, float]:
         """`stiffness` and `rest`."""
-        return {f"{self.name}.stiffness": self.stiffness, f"{self.name}.rest": self.rest}
+        stiffness = parameters_by_mode(self.name, "stiffness", self.stiffness)
+        return stiffness | parameters_by_mode(self.name, "rest", self.rest)
 
     def act(self, scope: Scope) -> Action:
         """Its potential."""
-        (q,) = scope.joint(self.joint.name).coordinates
-        stretch = q - scope.parameter(self.name, "rest", self.rest)
-        return Action(potential=0.5 * scope.parameter(self.name, "stiffness", self.stiffness) * stretch * stretch)
+        stiffness, stretch = self._stiffness_and_stretch(scope)
+        return Action(potential=0.5 * stiffness * stretch * stretch)
 
     def results(self) -> dict[str, Result]:
         """'torque' [N m], or 'force' along a slider [N]: −k (q − rest), positive along the coordinate."""
         return {"torque" if self.joint.labels[0].unit == "rad" else "force": Result(self._effort)}
 
     def _effort(self, scope: Scope) -> Scalar:
+        stiffness, stretch = self._stiffness_and_stretch(scope)
+        return -stiffness * stretch
+
+    def _stiffness_and_stretch(self, scope: Scope) -> tuple[Scalar, Scalar]:
         (q,) = scope.joint(self.joint.name).coordinates
-        stretch = q - scope.parameter(self.name, "rest", self.rest)
-        return -scope.parameter(self.name, "stiffness", self.stiffness) * stretch
+        stretch = q - parameter_by_mode(scope, self.name, "rest", self.rest)
+        return parameter_by_mode(scope, self.name, "stiffness", self.stiffness, 0.0), stretch

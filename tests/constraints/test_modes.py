@@ -164,6 +164,39 @@ def test_a_start_names_a_state_and_what_it_remembers() -> None:
         mbd.assemble(model, {"phase.turn": "far"})
 
 
+def test_springs_and_dampers_take_numbers_by_state() -> None:
+    """As with `sets`, to the bit; and energy is balanced."""
+
+    def clutch(by: bool) -> mbd.Trajectory:
+        model = mbd.Model("clutch")
+        rod = mbd.Link("rod", mass=2.0, length=0.4, center=0.2, inertia=0.03)
+        loss = mbd.Viscous({"on": 0.3, "off": 0.05}, by="clutch") if by else mbd.Viscous(0.3)
+        hinge = mbd.Revolute("hinge", model.ground.origin, rod.start, loss=loss)
+        model.connect(hinge)
+        sets = {"hinge loss.coefficient": {"off": 0.05}, "spring.stiffness": {"off": 0.0}, "spring.rest": {"off": 0.8},
+                "rope.length": {"off": 0.3}}  # fmt: skip
+        corner = model.ground.point(0.5, 0.1)
+        if by:
+            model.apply(
+                mbd.TorsionSpring("spring", hinge, stiffness={"on": 5.0}, rest={"on": 0.3, "off": 0.8}, by="clutch"),
+                mbd.Spring("rope", rod.end, corner, stiffness=30.0, length={"on": 0.2, "off": 0.3}, by="clutch"),
+            )
+        else:
+            model.apply(mbd.TorsionSpring("spring", hinge, stiffness=5.0, rest=0.3))
+            model.apply(mbd.Spring("rope", rod.end, corner, stiffness=30.0, length=0.2))
+        model.apply(mbd.Mode("clutch", ("on", "off"), transitions=[
+            mbd.Transition("on", "off", when="hinge.rate"), mbd.Transition("off", "on", after=0.2),
+        ], sets={} if by else sets))  # fmt: skip
+        return mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 1.3}), mbd.RungeKutta853(), dt=0.01, until=1.5)
+
+    one, other = clutch(by=True), clutch(by=False)
+    assert len(one.events) >= 3
+    np.testing.assert_array_equal(one.final.q, other.final.q)
+    np.testing.assert_array_equal(one["spring.torque"], other["spring.torque"])
+    assert one.parameters["spring.stiffness.on"] == 5.0
+    assert np.max(np.abs(one.energy.numerical)) < 1e-9
+
+
 def test_a_run_that_goes_on_or_was_saved_is_the_same_to_the_bit(tmp_path: Any) -> None:
     model = knee()
     start = mbd.assemble(model, {"knee.angle": 0.8})
@@ -346,6 +379,7 @@ def mode(*transitions: mbd.Transition, **more: Any) -> mbd.Mode:
     ([lambda j: mode(sets={"body.mass": {"a": 2.0}})], "body.mass"),
     ([lambda j: mode(sets={"drive.trque": {"a": 2.0}})], "sets 'drive.trque'"),
     ([lambda j: mbd.Motor("drive", j, force={"a": 1.0})], "name the mode too: by="),
+    ([lambda j: mode(), lambda j: mbd.TorsionSpring("k", j, 1.0, {"a": 1.0}, by="m")], "no value for 'b' of 'm'"),
     ([lambda j: mode(), lambda j: mbd.Motor("drive", j, force={"c": 1.0}, by="m")], "no state named 'c'"),
     ([lambda j: mode(), lambda j: mbd.Motor("drive", j, force={"a": 1.0}, by="n")], "no mode named 'n'"),
 ])  # fmt: skip

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
-from mbd.bodies.values import number
+from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
 from mbd.joints.losses.base import DissipationFunction
 from mbd.scope import Scope
 from mbd.tape.node import Scalar
@@ -19,16 +20,20 @@ class Viscous(DissipationFunction):
     Parameters
     ----------
     coefficient : c ≥ 0 [N s/m or N m s/rad]
+    by : name of a mode whose states have coefficients of their own: ``Viscous({"stance": 5.0}, by="phase")``; in states
+        that are left out there is none. Each is the parameter 'owner.coefficient.stance'
     """
 
-    coefficient: float
+    coefficient: Any
+    by: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficient", number(self.coefficient, "coefficient of Viscous"))
+        object.__setattr__(self, "coefficient", number_by_mode(self.coefficient, self.by, "coefficient of Viscous"))
 
     def fields(self) -> dict[str, float]:
         """`coefficient`."""
-        return {"coefficient": self.coefficient}
+        found = parameters_by_mode("", "coefficient", self.coefficient)
+        return {name.removeprefix("."): value for name, value in found.items()}
 
     def dissipation(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
         """½ c v²."""
@@ -36,4 +41,4 @@ class Viscous(DissipationFunction):
 
     def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
         """c v, the derivative of D in its shortest form."""
-        return scope.parameter(owner, "coefficient", self.coefficient) * rate
+        return parameter_by_mode(scope, owner, "coefficient", self.coefficient, 0.0) * rate
