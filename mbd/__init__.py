@@ -143,6 +143,8 @@ if TYPE_CHECKING:
     from mbd.laboratory.inverse_dynamics import inverse_dynamics as inverse_dynamics
     from mbd.laboratory.inverse_kinematics import inverse_kinematics as inverse_kinematics
     from mbd.laboratory.kinematics_result import InverseKinematics as InverseKinematics
+    from mbd.laboratory.models.read_model import read_model as read_model
+    from mbd.laboratory.models.report import ImportedModel as ImportedModel, ImportReport as ImportReport
     from mbd.laboratory.read import read as read
     from mbd.laboratory.recording import PlateRecord as PlateRecord, Recording as Recording
     from mbd.laboratory.scale import scale as scale
@@ -212,6 +214,8 @@ _HOMES = {
     "mbd.laboratory.inverse_dynamics": "inverse_dynamics",
     "mbd.laboratory.inverse_kinematics": "inverse_kinematics",
     "mbd.laboratory.kinematics_result": "InverseKinematics",
+    "mbd.laboratory.models.read_model": "read_model",
+    "mbd.laboratory.models.report": "ImportReport ImportedModel",
     "mbd.laboratory.read": "read",
     "mbd.laboratory.recording": "PlateRecord Recording",
     "mbd.laboratory.scale": "scale",

@@ -152,7 +152,7 @@ MEANT_OTHERWISE = {
     "Samples": ("periodic",),
     "Translation": ("rest",),
     "load": ("path",),
-    "read": ("path", "up", "forward"),
+    "read": ("path", "up", "forward"), "read_model": ("path", "stops", "losses", "repair", "base"),
     "replay": ("dt", "integrator", "steps", "model", "trusted"),
 }
 """Arguments that are right by themselves: the sentence is about the others."""
@@ -163,7 +163,7 @@ RESULTS = {
     "PenaltyParameters", "Replay", "Sensitivities", "State", "StateSpace", "Sweep", "Trajectory",
 }  # fmt: skip
 """Values that are handed to users, who make none."""
-RESULTS |= {"InverseDynamics", "InverseKinematics", "PlateRecord", "Recording"}
+RESULTS |= {"ImportReport", "ImportedModel", "InverseDynamics", "InverseKinematics", "PlateRecord", "Recording"}
 RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
@@ -231,7 +231,7 @@ def without_warnings(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "basin" else n for n in WORDS])
 def test_a_wrong_argument_is_taken_or_named(name):
     word, fine = WORDS[name], right(name)
-    files = {"load", "read", "replay"} & {name}
+    files = {"load", "read", "read_model", "replay"} & {name}
     if name not in STUDIES and not files:
         assert word(**fine) is not None
     for parameter in inspect.signature(word).parameters.values():

@@ -22,7 +22,8 @@ GROUPS = {
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria sensitivities Sensitivities fit Fit optimize Optimum",
     "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch PointCurve basin Basin",
-    "Laboratory": "read Recording PlateRecord ForcePlate assign_plates scale "
+    "Laboratory": "read Recording PlateRecord ForcePlate assign_plates scale read_model ImportedModel "
+    "ImportReport "
     "inverse_kinematics InverseKinematics inverse_dynamics InverseDynamics",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",

@@ -109,6 +109,9 @@ class InverseDynamics:
             force[:, :2], moment[:, 2] = parts[:, :2], parts[:, 2]
         else:
             force[:, ["xyz".index(axis) for axis in joint.axes]] = parts
+        if joint.parent.rotation is not None:
+            turn = np.array(joint.parent.rotation)
+            force, moment = force @ turn.T, moment @ turn.T
         return {
             f"{name}.residual_{kind}.{axis}": values[:, k]
             for kind, values in (("force", force), ("moment", moment))

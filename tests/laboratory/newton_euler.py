@@ -18,6 +18,8 @@ def joint_motion(joint, q, v, a):
     """Rotation, shift, columns (angular, linear) in parent axes, and what accelerates without v̇, of the child frame."""
     kind = type(joint).__name__
     zero = np.zeros(3)
+    if kind == "Weld":
+        return np.eye(3), zero, [], zero
     if kind == "Revolute":
         axis = np.asarray(joint.axis, dtype=float)
         return turn(axis, q[0]), zero, [(axis, zero)], zero

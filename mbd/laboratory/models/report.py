@@ -1,0 +1,48 @@
+"""What became of a file of another program: the model, and what of the file is in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from mbd.bodies.base import Body
+from mbd.joints.base import Joint
+
+__all__ = ["ImportReport", "ImportedModel"]
+
+
+@dataclass
+class ImportReport:
+    """What was understood, approximated and left out, a sentence each with the names of the file."""
+
+    understood: list[str] = field(default_factory=list)
+    approximated: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        parts = []
+        for title, sentences in (
+            ("understood", self.understood), ("approximated", self.approximated), ("left out", self.left_out),
+        ):  # fmt: skip
+            parts += [f"{title}:", *(f"  {sentence}" for sentence in sentences)] if sentences else []
+        return "\n".join(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedModel:
+    """A model that was read from a file.
+
+    Attributes
+    ----------
+    model : a `Model` of plain words, to be changed like any other
+    bodies, joints : by their names in the file
+    report : what of the file is in it
+    """
+
+    model: Any
+    bodies: dict[str, Body]
+    joints: dict[str, Joint]
+    report: ImportReport
+
+    def __repr__(self) -> str:
+        return f"ImportedModel '{self.model.name}': {len(self.bodies)} bodies, {len(self.joints)} joints\n{self.report}"
