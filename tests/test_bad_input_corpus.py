@@ -152,7 +152,8 @@ MEANT_OTHERWISE = {
     "Samples": ("periodic",),
     "Translation": ("rest",),
     "load": ("path",),
-    "read": ("path", "up", "forward"), "read_model": ("path", "stops", "losses", "repair", "base"),
+    "read": ("path", "up", "forward"),
+    "read_model": ("path", "stops", "losses", "repair", "base"),
     "replay": ("dt", "integrator", "steps", "model", "trusted"),
 }
 """Arguments that are right by themselves: the sentence is about the others."""
