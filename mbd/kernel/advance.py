@@ -12,6 +12,7 @@ from mbd.kernel.codes import (
     DONE,
     EVENT,
     FULL,
+    JUMPED,
     LAST,
     LEFT,
     NEW_MODE,
@@ -39,7 +40,7 @@ from mbd.kernel.guard_sides import settle_sides, striking_contact
 from mbd.kernel.guard_substeps import parts_to_take
 from mbd.kernel.guards import is_quiet, judge, update_armed, update_sides
 from mbd.kernel.hooks import scheme_accept
-from mbd.kernel.locate import find_jump, locate
+from mbd.kernel.locate import find_jump, jumps_over_stop, locate
 from mbd.kernel.nonsmooth import closes_below_surface, must_release
 from mbd.kernel.nonsmooth_cones import hold_for_step
 from mbd.kernel.observe import is_awaited, store_row
@@ -464,6 +465,9 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         status = end_unlocated(K, h, t1)
         if status != 0:
             return status
+    if K.vector == 0 and jumps_over_stop(K, h):
+        K.failure_time = t1
+        return JUMPED
     status = conclude(K, h, full, t1, cut, within, quiet, holds, pulls)
     if status != 0:
         return status

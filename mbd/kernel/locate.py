@@ -28,7 +28,7 @@ from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.refine import enough, refine
 from mbd.kernel.trial_step import try_step
 
-__all__ = ["find_jump", "locate"]
+__all__ = ["find_jump", "jumps_over_stop", "locate"]
 
 MOST_LOOKS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
@@ -189,6 +189,21 @@ def find_jump(K: Kernel, h: float, t1: float) -> int:
                 if status != 0:
                     return status
     return 0
+
+
+def jumps_over_stop(K: Guards, h: float) -> bool:
+    """Whether an angle leads past its stop in a step and jumps back to the open side, as a twist does at half a turn.
+
+    The contact is open at both ends of the step; the rates there lead to its other side: K.failure_index.
+    """
+    found = False
+    for c in range(K.n_contacts):
+        if K.row_unit[K.normal[c]] == 1 and K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1:
+            there = K.guards0[c] + 0.5 * h * (K.guards0[K.at_gap_rate + c] + K.guards1[K.at_gap_rate + c])
+            if there < 0.0 < K.guards1[c] and K.guards1[c] - there > UNEXPLAINED and is_watched(K, c, K.guards0):
+                K.failure_index = c
+                found = True
+    return found
 
 
 def another_before(K: Switching, kind: int, index: int, found: float) -> bool:

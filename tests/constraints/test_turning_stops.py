@@ -89,6 +89,25 @@ def test_a_twist_is_known_next_to_half_a_turn():
             assert run["outward.gap"][0] == pytest.approx(LIMITS[1] - twist, abs=1e-15 / (p * p))
 
 
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+@pytest.mark.parametrize(("stop", "rate", "dt"), [(3.0, 3.0, 0.05), (3.1, 8.0, 0.05), (2.9, 7.0, 0.1)])
+def test_a_step_over_a_stop_and_half_a_turn_meets_it_or_ends_the_run_by_name(stop, rate, dt, contact):
+    """The gap is positive before and after it, unless a step ends between; with a smaller step the stop is met."""
+    model = mbd.Model("twisting", gravity=(0.0, 0.0, 0.0))
+    top = mbd.RigidBody("top", 1.0, (0.1, 0.1, 0.05))
+    hip = mbd.Spherical("hip", model.ground.origin, top.origin)
+    model.connect(hip)
+    model.constrain(mbd.Unilateral("stop", mbd.twist(hip, stop)))
+    start = mbd.assemble(model, {}, {"hip.angular_velocity.y": rate})
+    for scheme in (mbd.HHT(), mbd.RungeKutta853()):
+        run = mbd.simulate(model, start, scheme, dt=dt, until=2.0, contact=contact, on_failure="return")
+        if not [event for event in run.events if event.kind == "closed"]:
+            assert "the angle of 'stop' jumps past zero, as a twist does at half a turn" in run.message
+            assert abs(run.time[-1] - stop / rate) <= dt
+        fine = mbd.simulate(model, start, scheme, dt=0.01, until=0.5 + stop / rate, contact=contact)
+        assert fine.success and fine.events[0].kind == "closed"
+
+
 def test_a_twist_that_jumps_past_its_stop_at_half_a_turn_ends_the_run_by_name():
     model = mbd.Model("twisting", gravity=(0.0, 0.0, 0.0))
     top = mbd.RigidBody("top", 1.0, (0.1, 0.1, 0.05))

@@ -361,3 +361,16 @@ def test_a_step_beyond_the_pole_of_a_potential_is_no_motion(scheme):
             assert f"t = {run.time[first]:.9g} s" in run.message
         else:
             assert (run["rail.displacement"] > pole).all(), run.message
+
+
+@pytest.mark.parametrize(("dt", "told"), [(0.03, True), (1e-3, False)])
+def test_non_smooth_steps_tell_a_gain_above_a_fiftieth(dt, told):
+    """A ball that is lifted out of the floor by m g times its depth, of the size of dt: 6.8 % here."""
+    model = mbd.Model("dropped")
+    ball = mbd.PointMass("ball", mass=1.0)
+    model.connect(mbd.Translation("place", model.ground.origin, ball.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(ball.origin), restitution=0.9))
+    start = mbd.assemble(model, position={"place.y": 0.5})
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=dt, until=1.0, contact="nonsmooth")
+    notes = [note for note in run.stats["notes"] if note.startswith("numerical energy gain")]
+    assert bool(notes) == told and (not told or "(6.8 %)" in notes[0])

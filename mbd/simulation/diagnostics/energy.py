@@ -43,6 +43,8 @@ SPREAD, EARLY = 30, tuple(2**k for k in range(10))
 """Rows of a look: so many from the last look to now, and the first rows of a run at these numbers."""
 TELLING = 0.1
 """Share of the energy that a mechanism has, above which a note tells what the scheme gained or lost [-]."""
+TELLING_GAIN = 0.02
+"""The same of a gain in non-smooth steps, whose errors are of the size of dt [-]."""
 ABSURD = 1e6
 """Gain of energy over all that there was before, above which a single row is a verdict [-]."""
 LEAP = 100.0
@@ -150,7 +152,7 @@ class EnergyWatch(EnergyFindings):
         self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
         if found.row >= 0:
             self.problem, self.row = _sentence(run, found), found.row
-        elif abs(found.share) > TELLING:
+        elif abs(found.share) > TELLING or found.share > _telling_gain(run):
             self.note, self.share = _note(found), found.share
         return self.problem
 
@@ -209,7 +211,7 @@ class EnergyWatch(EnergyFindings):
         noise = ROUND_OFF * np.max(np.abs(self._seen[:, :2]))
         owned = kinetic[0] + fallen
         rise = total - total[0]
-        risen = ~(rise <= np.maximum(TELLING * owned + noise, 2.0 * self._cleared))  # NaN is strange too
+        risen = ~(rise <= np.maximum(_telling_gain(run) * owned + noise, 2.0 * self._cleared))  # NaN is strange too
         sunk = rise < -TELLING * owned[-1] - noise
         if not (risen.any() or sunk.any()):
             return False
@@ -220,6 +222,11 @@ class EnergyWatch(EnergyFindings):
         swing = kinetic[0] + _swing(kinetic) + _swing(potential)
         leaps = rise[1:] > LEAP * swing[:-1]
         return bool(np.any(leaps[3:] & risen[4:]))
+
+
+def _telling_gain(run: RunData) -> float:
+    """Share of the energy that a mechanism has, above which a note tells what the scheme gained [-]."""
+    return TELLING_GAIN if run.kernel.strategy == 1 else TELLING
 
 
 def _way(q: Vector, start: Vector) -> Vector:
