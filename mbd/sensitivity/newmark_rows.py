@@ -96,13 +96,11 @@ class NewmarkRows(SchemeSteps):
             )
 
     def _step(self, motion: Motion, memory: Memory, mode: Mode, rows: Rows, dh: Vector) -> tuple[Motion, Memory]:
-        """A step between two rows, with least solutions where it is singular."""
+        """A step between two rows."""
         done, end, after = taken(self.steps, motion, memory, mode, rows, dh)
-        if done:
-            return end, after
-        time, q, y, rate, lam = (each[1] for each in rows)
-        none = np.zeros((0, 0)), np.zeros((0, 0))
-        return self.steps.step(motion, memory, mode, (float(time), q, y), Rates(rate, lam, *none), dh)
+        if not done:
+            raise unknown(f"the equations of the step to t = {float(rows[0][1]):.9g} s are singular")
+        return end, after
 
     def _other_start(
         self, motion: Motion, memory: Memory, mode: Mode, h: float, row: int, fresh: bool

@@ -27,15 +27,6 @@ class OneStepMethod(SchemeSteps):
         checked : false for one step whose end q, y is not known; rows then get it
         """
 
-    @abstractmethod
-    def least(
-        self, motion: Motion, memory: Memory, mode: Mode, time: float, dh: Vector, row: int
-    ) -> tuple[Motion, Rates]:
-        """A step in numpy, with least solutions of singular systems.
-
-        row : one that is near its end
-        """
-
     def start(self, motion: Motion, mode: Mode, rates: Rates) -> Memory:
         """It remembers nothing but its rates."""
         return Memory.of_rates(rates, 0.0)
@@ -68,6 +59,6 @@ class OneStepMethod(SchemeSteps):
         rows = self.rows.step_to(row, motion, memory.rates)
         rows[0][1] = time
         done, end, found = self.taken(motion, memory.rates, mode, rows, dh, False)
-        if not (done or self.programs.charts.is_vector):
+        if not done:
             raise unknown(f"the equations of the step to t = {time:.9g} s are singular")
-        yield (end, found) if done else self.least(motion, memory, mode, time, dh, row)
+        yield end, found

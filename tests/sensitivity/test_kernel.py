@@ -1,4 +1,4 @@
-"""The kernel of derivatives takes the same steps as numpy does one by one, compiled and interpreted."""
+"""The pass over rows has the derivatives of the kernel's own trees, and is the same compiled and interpreted."""
 
 from __future__ import annotations
 
@@ -6,43 +6,46 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.sensitivity import newmark_rows, radau, runge_kutta
 from mbd.sensitivity.derivative import final_state_derivative
+from mbd.sensitivity.run_data import unknown
+from mbd.sensitivity.walk import Walk
 from mbd.testing.mechanisms import random_loop, random_scene
 from tests.simulation.mechanisms import pendulum
 
+CLOSE = {"tolerance": 1e-12}
 SCHEMES = (
-    mbd.HHT(alpha=0.05), mbd.GeneralizedAlpha(0.7), mbd.HHT(0.1, formulation="index3"),
-    mbd.Newmark(start="consistent"), mbd.RungeKutta853(),
-    mbd.RadauIIA(tolerance=1e-12), mbd.RungeKutta4(),
+    mbd.HHT(alpha=0.05, **CLOSE), mbd.GeneralizedAlpha(0.7, **CLOSE), mbd.HHT(0.1, formulation="index3", **CLOSE),
+    mbd.Newmark(start="consistent", **CLOSE), mbd.RungeKutta853(), mbd.RadauIIA(**CLOSE), mbd.RungeKutta4(),
 )  # fmt: skip
 
 
-def one_by_one(monkeypatch):
-    """From now on numpy takes every step."""
-    for steps in (newmark_rows, radau, runge_kutta):
-        monkeypatch.setattr(steps, "taken", lambda owner, motion, memory, *_: (0, motion, memory))
+def whole(*given):
+    raise unknown("left to the kernel with derivatives")
 
 
 def both(monkeypatch, run, names):
+    """Of the pass over rows, and of the kernel with derivatives (`mbd.sensitivity.tangent`)."""
+    found = np.vstack(final_state_derivative(run, names))
     with monkeypatch.context() as alone:
-        one_by_one(alone)
-        wanted = np.vstack(final_state_derivative(run, names))
-    return np.vstack(final_state_derivative(run, names)), wanted
+        alone.setattr(Walk, "whole", whole)
+        return found, np.vstack(final_state_derivative(run, names))
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_steps_of_random_scenes(seed, monkeypatch):
+def test_steps_of_random_scenes(monkeypatch):
     """With contacts that close, hold and slide; directions of the start and of parameters."""
-    model, scheme = random_scene(seed, bodies=2), SCHEMES[seed % len(SCHEMES)]
-    try:
-        start = mbd.assemble(model)
-        run = mbd.simulate(model, start, scheme, dt=5e-3, until=0.4)
-        names = [*start.names, *run.record.parameter_names[:6]]
-        found, wanted = both(monkeypatch, run, names)
-    except (mbd.SimulationError, mbd.AssemblyError, mbd.CapabilityError):
-        return  # a scene without a run, or a run without derivatives
-    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-11 * np.max(np.abs(wanted)))
+    compared = 0
+    for seed in range(12):
+        model, scheme = random_scene(seed, bodies=2), SCHEMES[seed % len(SCHEMES)]
+        try:
+            start = mbd.assemble(model)
+            run = mbd.simulate(model, start, scheme, dt=5e-3, until=0.4)
+            names = [*start.names, *run.record.parameter_names[:6]]
+            found, wanted = both(monkeypatch, run, names)
+        except (mbd.SimulationError, mbd.AssemblyError, mbd.CapabilityError):
+            continue  # a scene without a run, or a run without derivatives
+        compared += 1
+        assert found == pytest.approx(wanted, rel=1e-7, abs=1e-8 * np.max(np.abs(wanted))), (seed, scheme)
+    assert compared >= 6
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
@@ -50,7 +53,7 @@ def test_steps_of_closed_loops(scheme, monkeypatch):
     model, place = random_loop(2)
     run = mbd.simulate(model, mbd.assemble(model, place, project=True), scheme, dt=0.01, until=0.2)
     found, wanted = both(monkeypatch, run, ["bar 1.mass", "hinge 1.angle", "bar 2.length"])
-    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-11 * np.max(np.abs(wanted)))
+    assert found == pytest.approx(wanted, rel=1e-7, abs=1e-8 * np.max(np.abs(wanted)))
 
 
 @pytest.mark.parametrize("scheme", [SCHEMES[0], *SCHEMES[4:]], ids=repr)
