@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Vector
 from mbd.compile.backend import Function
-from mbd.sensitivity.kernel.sizes import BASE, COLUMNS, PARTS, ROWS, WIDTH
+from mbd.sensitivity.kernel.sizes import COLUMNS, PARTS, ROWS, WIDTH
 from mbd.sensitivity.motion import Mode, Motion
 from mbd.sensitivity.programs import Programs
 
@@ -125,6 +125,4 @@ def stacked(motion: Motion, system: System) -> Vector:
     out[first, :width] = tangent.t
     out[first + 1 : first + 1 + len(tangent.anchors), :width] = tangent.anchors
     out[first + 1 + len(tangent.anchors) : last, :width] = tangent.p
-    if tangent.slips is not None:
-        out[last : int(sizes[BASE]), :width] = tangent.slips
     return out

@@ -13,39 +13,25 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.programs import Columns, State
 
-__all__ = ["Mode", "Motion", "Rates", "Tangent", "reach", "solved"]
+__all__ = ["Mode", "Motion", "Rates", "Tangent", "solved"]
 
 
 @dataclass(frozen=True)
 class Mode:
-    """What acts: numbers of the rows that do not depend on others, of all that act; closed; signs of sliding.
-
-    turns : whether a friction slides in a plane in space, whose force turns with its velocity
-    """
+    """What acts: numbers of the rows that do not depend on others, of all that act; closed; signs of sliding."""
 
     rows: tuple[int, ...]
     held: tuple[int, ...]
     closed: Vector
     switch: Vector
     slip: Vector
-    turns: bool = False
-
-
-NEAR = 1e-6
-"""Largest rate of differences where forces turn with a velocity that may be small [m/s², rad/s²]."""
-
-
-def reach(mode: Mode) -> float:
-    """The largest rate of differences along a position correction; forces are all but linear along it, or near it."""
-    return NEAR if mode.turns else 1.0
 
 
 @dataclass(frozen=True)
 class Tangent:
     """Derivatives of a state in D directions: t (D,), q (n_v, D), y (n, D), anchors (A, D); of the parameters p (P, D).
 
-    q is along velocities. slips (S, D) : of the slips of frictions in planes in space (`mbd.equations.cones`), which
-    change where these hold a direction; None: they do not
+    q is along velocities.
     """
 
     t: Vector
@@ -53,15 +39,12 @@ class Tangent:
     y: Matrix
     anchors: Matrix
     p: Matrix
-    slips: Matrix | None = None
 
     def stacked(self, columns: Columns, rate: Matrix | None = None, lam: Matrix | None = None) -> Matrix:
         """As the columns of `Programs` stand, with derivatives of rates and multipliers where they are given."""
         out = np.zeros((columns.count, len(self.t)))
         out[columns.x], out[columns.y], out[columns.t] = self.q, self.y, self.t
         out[columns.anchor], out[columns.p] = self.anchors, self.p
-        if self.slips is not None:
-            out[columns.slip] = self.slips
         if rate is not None:
             out[columns.rate] = rate
         if lam is not None:
@@ -74,14 +57,12 @@ class Tangent:
         def wide(part: Matrix) -> Matrix:
             return np.concatenate([part, np.zeros((*part.shape[:-1], 1))], axis=-1)
 
-        slips = None if self.slips is None else wide(self.slips)
-        return Tangent(wide(self.t), wide(self.q), wide(self.y), wide(self.anchors), wide(self.p), slips)
+        return Tangent(wide(self.t), wide(self.q), wide(self.y), wide(self.anchors), wide(self.p))
 
     def combined(self, along: Vector) -> Tangent:
         """Without the last direction, of which each other one takes the part `along` (D,)."""
-        slips = None if self.slips is None else taken(self.slips, along)
         t, q, y, anchors, p = (taken(part, along) for part in (self.t, self.q, self.y, self.anchors, self.p))
-        return Tangent(t, q, y, anchors, p, slips)
+        return Tangent(t, q, y, anchors, p)
 
 
 def taken(part: Matrix, along: Vector) -> Matrix:

@@ -17,7 +17,6 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.sensitivity.balance import consistent_rates
-from mbd.sensitivity.held_directions import with_held_directions
 from mbd.sensitivity.kernel.newmark_prediction import FOLLOWED
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
@@ -49,8 +48,6 @@ class NewmarkSteps:
         if self.jerk == 0.0 and not (self.stabilized and mode.rows):
             return Memory(rates, rates.rate.copy(), rates.of_rate.copy(), full)
         c, charts, ahead = self.programs.columns, self.programs.charts, full / 16.0
-        if c.slips and np.any(mode.slip):
-            mode, motion = with_held_directions(self.programs, motion, mode, rates)
         tangent = motion.tangent
         way = ahead * motion.y[: c.n_v]
         of_q = charts.carried(motion.q, way, tangent.q, ahead * tangent.y[: c.n_v])

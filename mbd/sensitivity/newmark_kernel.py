@@ -12,7 +12,7 @@ from mbd.sensitivity.entries import System, stacked, system
 from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.kernel.newmark import newmark_steps
 from mbd.sensitivity.kernel.newmark_end import newmark_end
-from mbd.sensitivity.motion import Mode, Motion, Rates, reach
+from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.newmark import NewmarkSteps
 from mbd.sensitivity.run_data import Rows
 from mbd.sensitivity.schemes import Memory
@@ -37,7 +37,7 @@ def taken(
     size = (2 if twofold else 1) * (n + m)
     block = np.zeros((2, programs.layout.size))
     programs.fill(block, motion.at(mode, rate[0], lam[0]))
-    numbers = np.array([steps.alpha_m, steps.alpha_f, steps.beta, steps.gamma, steps.full, reach(mode)])
+    numbers = np.array([steps.alpha_m, steps.alpha_f, steps.beta, steps.gamma, steps.full, 1.0])
     memories, X = _numbers(memory, n_v), _derivatives(memory, twofold, known, n_v, w)
     by_size = np.zeros(w)
     by_size[:width] = dh
@@ -72,7 +72,7 @@ def ended(steps: NewmarkSteps, motion: Motion, memory: Memory, mode: Mode, time:
     )  # fmt: skip
     block = np.zeros((2, programs.layout.size))
     programs.fill(block, motion.at(mode, guess.rate, guess.lam))
-    numbers = np.array([steps.alpha_m, steps.alpha_f, steps.beta, steps.gamma, steps.full, reach(mode)])
+    numbers = np.array([steps.alpha_m, steps.alpha_f, steps.beta, steps.gamma, steps.full, 1.0])
     singular = entry(newmark_end)(
         [known.function, *programs.charts.programs()],
         programs.values, known.sizes, numbers, *rows, known.rows, known.fast, known.entries, block[0],

@@ -10,7 +10,6 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.errors import UnknownNameError, nearest
 from mbd.results.stored_states import StoredStates
-from mbd.sensitivity.cones import force_in_plane
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
@@ -136,3 +135,15 @@ def with_sliding(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -
             lam[friction.row] = mode.slip[f] * values[first + f]
             of_lam[friction.row] = mode.slip[f] * (slopes[first + f] @ Z)
     return Rates(rates.rate, lam, rates.of_rate, of_lam)
+
+
+def force_in_plane(programs: Programs, f: int, values: Vector, slopes: Matrix) -> tuple[float, Vector]:
+    """λ_T of friction f while it slides, and its derivatives (D,), from what is watched."""
+    equations = programs.equations
+    n_c, n_g, n_f = len(equations.contacts), len(equations.guards), len(equations.frictions)
+    speeds, limit = 2 * n_c + n_g, 2 * n_c + n_g + n_f + f
+    own, other = speeds + f, speeds + equations.frictions[f].partner
+    size = float(np.hypot(values[own], values[other])) or 1.0
+    cosine = float(values[own]) / size
+    turned = (slopes[own] - cosine * (values[own] * slopes[own] + values[other] * slopes[other]) / size) / size
+    return float(values[limit]) * cosine, np.asarray(cosine * slopes[limit] + values[limit] * turned)

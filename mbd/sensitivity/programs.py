@@ -2,7 +2,7 @@
 
 Each program lists values and, row by row, those of their derivatives by the columns
 
-    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters | slips of cones | bases of charts
+    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters | bases of charts
 
 that are not always zero. Where coordinates do not add, x is the increment from the q of the block, and only `steps` and
 `consistent` depend on the base (`mbd.sensitivity.charts`).
@@ -56,18 +56,17 @@ class Columns:
     rows: int
     anchors: int
     parameters: int
-    slips: int = 0
     bases: int = 0
 
     @classmethod
     def of(cls, equations: Equations, layout: Layout, parameters: int) -> Columns:
         """Those of a mechanism with so many chosen parameters."""
         sizes = layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters
-        return cls(*sizes, len(paired(equations)), len(based(equations)))
+        return cls(*sizes, len(based(equations)))
 
     @cached_property
     def _starts(self) -> list[int]:
-        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters, self.slips, self.bases]
+        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters, self.bases]
         return [int(start) for start in np.cumsum(lengths)]
 
     def _part(self, number: int) -> slice:
@@ -102,12 +101,8 @@ class Columns:
         return self._part(6)
 
     @cached_property
-    def slip(self) -> slice:
-        return self._part(7)
-
-    @cached_property
     def base(self) -> slice:
-        return self._part(8)
+        return self._part(7)
 
     @cached_property
     def count(self) -> int:
@@ -293,14 +288,13 @@ def paired(equations: Equations) -> list[int]:
 def derivatives(
     equations: Equations, values: Sequence[Node], places: Sequence[int], bases: bool = False
 ) -> list[list[Node]]:
-    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors, these parameters, slips; of charts if `bases`."""
+    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors, these parameters; of charts if `bases`."""
     if not values:
         return [[] for _ in range(Columns.of(equations, Layout.of(equations), len(places)).count)]
     inputs, tape = Inputs.of(equations), equations.tape
     anchors = [tape.input("anchor", k) for k in range(equations.n_anchors)]
     parameters = [tape.input("p", k) for k in places]
-    slips = [tape.input("slip", k) for k in paired(equations)]
-    others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters, *slips)
+    others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters)
     by_others = jvps(values, [{node: 1.0} for node in others])
     if equations.chart is None:
         return [*along_places(equations, values), *by_others]

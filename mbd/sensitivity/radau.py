@@ -17,7 +17,7 @@ from mbd.kernel.schemes.collocation import RADAU
 from mbd.sensitivity.entries import stacked, system
 from mbd.sensitivity.kernel.build import entry
 from mbd.sensitivity.kernel.radau import radau_steps
-from mbd.sensitivity.motion import Mode, Motion, Rates, reach
+from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.one_step import OneStepMethod
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import Rows
@@ -53,7 +53,7 @@ def taken(
     X, by_size, block = np.zeros((size, w)), np.zeros(w), np.zeros(programs.layout.size)
     by_size[:width] = dh
     programs.fill(block, motion.at(mode, rate[0], lam[0]))
-    numbers = np.concatenate([RADAU.c, np.ravel(RADAU.A), np.ravel(SQUARE), [RADAU.real, reach(mode)]])
+    numbers = np.concatenate([RADAU.c, np.ravel(RADAU.A), np.ravel(SQUARE), [RADAU.real, 1.0]])
     outputs = level.outputs
     done = entry(radau_steps)(
         [known.function, level.function, *programs.charts.programs()], programs.values,

@@ -234,8 +234,7 @@ class RunRows:
         flags, phase = self.record.closed[row], self.record.phase[row]
         held = self.manager.active_rows(np.asarray(flags, dtype=np.int64), (phase == 2).astype(np.int64))
         slip = np.where(np.abs(phase) == 1, phase, 0).astype(float)
-        turns = any(each.partner >= 0 and slip[f] != 0.0 for f, each in enumerate(self.manager.frictions))
-        return Mode(held, held, np.asarray(flags), np.asarray(flags, dtype=float), slip, turns)
+        return Mode(held, held, np.asarray(flags), np.asarray(flags, dtype=float), slip)
 
     def start_anchors(self) -> Vector:
         """What contacts hold at the start."""

@@ -10,35 +10,22 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.equations.switching_times import instant_slopes
-from mbd.errors import CapabilityError
 from mbd.integrators import RadauIIA
 from mbd.integrators.family import NewmarkFamily
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
 from mbd.results.record import EventRecord
 from mbd.sensitivity.balance import consistent_rates, independent, pushed
-from mbd.sensitivity.cones import ended_in_rest, held_rows, rests
 from mbd.sensitivity.guards import Trigger, shift_of_end, trigger
-from mbd.sensitivity.held_directions import (
-    HELD,
-    ONSET,
-    Way,
-    along_ways,
-    first_of_pair,
-    pull_of,
-    slow_ways,
-    with_held_directions,
-)
 from mbd.sensitivity.motion import Mode, Motion, Rates, Tangent
 from mbd.sensitivity.newmark_rows import NewmarkRows
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_start
 from mbd.sensitivity.passed import Instant, Passed
-from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.programs import Programs, paired
 from mbd.sensitivity.radau import RadauSteps
 from mbd.sensitivity.resets import after_reset
 from mbd.sensitivity.run_data import RunRows, refused, sided, unknown
 from mbd.sensitivity.runge_kutta import RungeKuttaSteps
 from mbd.sensitivity.schemes import Memory, SchemeSteps, is_at
-from mbd.sensitivity.shortened import Shortened
 from mbd.sensitivity.strikes import captured, struck
 from mbd.sensitivity.transitions import with_transitions
 from mbd.sensitivity.watching import Watching
@@ -81,15 +68,13 @@ class Walk:
             raise unknown("its contacts were treated by non-smooth steps", "take contact='events'")
         if settings.get("store", 1) != 1:
             raise unknown(f"it kept one row in {settings['store']}", "take store=1")
+        if np.any(np.abs(rows.record.phase[:, paired(programs.equations)]) == 1):
+            raise unknown("a contact slides in a plane in space", "take backend='auto' with llvmlite")
         self.record = rows.record
         self._modes: dict[tuple[Any, ...], Mode] = {}
         self.steps = steps_of(rows, programs)
         self._watching = Watching(rows, programs, self.steps)
         self._written = dict(rows.changes)
-        self._held_rows = held_rows(rows)
-        self._shortened, self._grid = Shortened(rows, programs), np.zeros(0)
-        self._ways: dict[int, Way] = {}
-        self._pulls: dict[int, Way] = {}
         self.visit: Callable[[int, Motion, Mode, Rates], None] | None = None
         """Called with every row that a step starts from, and what the pass knows there."""
 
@@ -130,9 +115,8 @@ class Walk:
                 self._take_written(row)
                 motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
                 continue
-            if self.visit is None and not self._ways and not rows.begins_late(motion.t, row):
+            if self.visit is None and not rows.begins_late(motion.t, row):
                 before, far = row, self._watching.unwatched(mode, row, rows.segment_end(row) - 1)
-                far = min([self._shortened.next_row(row, far), *(self._held_rows[self._held_rows > row] - 1)])
                 row, motion, memory = self.steps.leap(motion, memory, mode, row, far)
                 fresh = fresh and row == before
             if row not in looked:
@@ -148,21 +132,9 @@ class Walk:
                 self._take_written(row)
                 motion, mode, rates, memory = self._started(motion, self.mode(row, motion), row)
                 continue
-            if rows.is_fixed(row + 1):
-                dh = -motion.tangent.t
-            elif row in self._shortened.pairs:
-                dh = self._shortened.size(row, motion, mode, rates if fresh else memory.rates)
-            else:
-                dh = self._grid - motion.tangent.t if row in self._shortened.rows else np.zeros_like(motion.tangent.t)
-            if row + 1 in self._held_rows:
-                motion, memory = self._held_step(motion, memory, mode, row + 1, dh, fresh)
-            else:
-                motion, memory = self._plain_step(motion, memory, mode, row + 1, dh, fresh)
+            dh = -motion.tangent.t if rows.is_fixed(row + 1) else np.zeros_like(motion.tangent.t)
+            motion, memory = self.steps.along(motion, memory, mode, row + 1, dh, fresh)
             row, fresh = row + 1, False
-            if self._ways:
-                plain = self.mode(row, motion)
-                self._ways = slow_ways(self.programs, motion, plain, memory.rates, self._ways)
-                mode, motion = along_ways(self.programs, motion, plain, self._ways, ONSET)
         if self._written:
             raise unknown(f"a controller wrote parameters at t = {record.time[min(self._written)]:.9g} s within a step")
         rates = rates if fresh else memory.rates
@@ -187,32 +159,6 @@ class Walk:
         change = rows.rate[row] - rows.rate[row + 1]
         return motion.with_tangent(y=motion.tangent.y + np.outer(change, slopes[0] @ p))
 
-    def _held_step(
-        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
-    ) -> tuple[Motion, Memory]:
-        """A step to a row that holds the directions in which contacts slide as it begins."""
-        held, along = with_held_directions(self.programs, motion, mode, memory.rates)
-        motion, memory = self.steps.along(along, memory, held, row, dh, fresh)
-        return along_ways(self.programs, motion, mode, {}, HELD)[1], memory
-
-    def _plain_step(
-        self, motion: Motion, memory: Memory, mode: Mode, row: int, dh: Vector, fresh: bool
-    ) -> tuple[Motion, Memory]:
-        """A step to a row; one that ends elsewhere held the directions of sliding, which explicit schemes do not store.
-
-        The multipliers of their rows are those of the velocity at the end.
-        """
-        try:
-            return self.steps.along(motion, memory, mode, row, dh, fresh)
-        except CapabilityError:
-            if not (self.programs.columns.slips and np.any(mode.slip)):
-                raise
-            try:
-                return self._held_step(motion, memory, mode, row, dh, fresh)
-            except CapabilityError:
-                pass
-            raise
-
     def _take_written(self, row: int) -> None:
         """From a row on, take the parameters that controllers wrote there, which are held as they are."""
         values = self._written.pop(row, None)
@@ -220,21 +166,9 @@ class Walk:
             self.programs.values = values
 
     def _started(self, motion: Motion, mode: Mode, row: int) -> tuple[Motion, Mode, Rates, Memory]:
-        """The scheme from a row on, with what acts and which frictions in planes do not follow their velocity yet."""
-        self._grid = motion.tangent.t
-        if not (self.programs.columns.slips and np.any(mode.slip)):
-            self._ways = {}
-            rates = self._restarted(motion, mode, row)
-            return motion, mode, rates, self.steps.start(motion, mode, rates)
-        width = len(motion.tangent.t)
-        none = np.zeros((len(self.rows.rate[row]), width)), np.zeros((len(self.record.lam[row]), width))
-        guess = Rates(self.rows.rate[row], np.array(self.record.lam[row]), *none)
-        self._ways = slow_ways(self.programs, motion, mode, guess, self._pulls)
-        held, begun = along_ways(self.programs, motion, mode, self._ways, HELD)
-        rates = self._restarted(begun, held, row)
-        memory = self.steps.start(begun, held, rates)
-        mode, motion = along_ways(self.programs, motion, mode, self._ways, ONSET)
-        return motion, mode, rates, memory
+        """The scheme from a row on, with what acts there."""
+        rates = self._restarted(motion, mode, row)
+        return motion, mode, rates, self.steps.start(motion, mode, rates)
 
     def _restarted(self, motion: Motion, mode: Mode, row: int) -> Rates:
         """Consistent rates at a row, which are those that it holds."""
@@ -259,11 +193,6 @@ class Walk:
             self.programs.equations,
             len(self.programs.equations.contacts),
         )
-        resting = rests(equations, events, mode)
-        if resting >= 0:
-            fired = trigger(equations, events, np.zeros(n_c), np.zeros(n_c), mode.slip, motion.t)
-            before, rates = ended_in_rest(self.steps, motion, memory, mode, row, resting)
-            return Instant(row + 1, fired, before, self._after(before, mode, fired, row + 1, rates))
         wide = replace(motion, tangent=motion.tangent.widened())
         dh = np.zeros(len(wide.tangent.t))
         dh[-1] = 1.0
@@ -274,11 +203,6 @@ class Walk:
         slowest = float(self.record.settings.get("rest_speed", 1e-6))
         along = shift_of_end(self.programs, end, mode, rates, fired, slowest)
         before = replace(end, tangent=end.tangent.combined(along))
-        f = first_of_pair(equations, fired.number) if fired.kind == "slipped" else -1
-        self._pulls = {}
-        if f >= 0 and equations.frictions[f].partner >= 0:
-            there = consistent_rates(self.programs, before, mode, rates.combined(along))
-            self._pulls[f] = pull_of(self.programs, there, f)
         return Instant(row + 1, fired, before, self._after(before, mode, fired, row + 1, rates))
 
     def _after(self, before: Motion, mode: Mode, fired: Trigger, row: int, rates: Rates) -> Motion:
