@@ -20,6 +20,7 @@ from mbd.results.columns import Columns, ModelColumns, gather
 from mbd.results.facts import Facts
 from mbd.results.finite import require_finite
 from mbd.results.interpolation import OneSide, Side
+from mbd.results.names import scalars_behind
 from mbd.results.orientations import doubt_singular
 from mbd.results.record import EventRecord, Events, Record
 from mbd.state import State
@@ -93,7 +94,7 @@ class Trajectory:
         return self._known[name]
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and (self.columns.knows(name) or name in self.columns.vectors)
+        return isinstance(name, str) and bool(scalars_behind(name, self.columns.knows))
 
     def __len__(self) -> int:
         return len(self.record.time)
