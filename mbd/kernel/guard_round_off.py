@@ -11,8 +11,9 @@ positions alone and to Newton's tolerance, what is open of these in a step is a 
     δv_i = ε |v_i| + h ε F_i / M_ii + Σ_k w_ki δḣ_k,   δx_i = ε |q_i| + h δv_i + Σ_k w_ki δh_k,
     w_ki = M_ii⁻¹ |B_ki| / Σ_j M_jj⁻¹ B_kj²
 
-with F the largest terms of the balance among those of a unit. Whatever its units, a small guard is thus measured by its
-own scale; nothing of this is evaluated unless a sign has changed.
+with F the largest terms of the balance among those of a unit, and δh_k no less than what the row misses at the state: a
+guard that a closed contact holds at zero, as its own gap, is not crossed by what Newton's method leaves of it. Whatever
+its units, a small guard is thus measured by its own scale; nothing of this is evaluated unless a sign has changed.
 """
 
 from __future__ import annotations
@@ -93,13 +94,14 @@ def doubts_of_state(K: Switching, q: Reals, y: Reals) -> None:
         size = 0.0
         for j in range(K.n_v):
             size += K.acc[o_B + k * n + j] * K.acc[o_B + k * n + j] * lightness(K, j)
+        missed = max(EPS * ROUGH * K.scale[n + k], abs(K.acc[K.acc_h + k]))
         for i in range(K.n_v):
-            share = EPS * ROUGH * abs(K.acc[o_B + k * n + i]) * lightness(K, i) / (size + 1e-300)
-            K.doubt[K.doubt_v + i] += share * K.scale[n + K.n_rows + k]
+            share = abs(K.acc[o_B + k * n + i]) * lightness(K, i) / (size + 1e-300)
+            K.doubt[K.doubt_v + i] += EPS * ROUGH * share * K.scale[n + K.n_rows + k]
             if K.row_level[k] == 0:
-                K.doubt[K.doubt_x + i] += share * K.scale[n + k]
+                K.doubt[K.doubt_x + i] += share * missed
                 if K.stabilized == 0:
-                    K.doubt[K.doubt_v + i] += share * (K.scale[n + k] + loose) / h
+                    K.doubt[K.doubt_v + i] += EPS * ROUGH * share * (K.scale[n + k] + loose) / h
     for i in range(K.n_v):
         K.doubt[K.doubt_x + i] += h * K.doubt[K.doubt_v + i]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -82,3 +84,46 @@ def test_an_event_on_the_speed_of_a_block_happens_as_friction_stops_it(scheme):
         stop = speed / (friction * G)
         run = mbd.simulate(model, start, scheme, dt=2e-3, until=stop + 0.2)
         assert [event.time for event in run.events if event.name == "stops"] == [pytest.approx(stop, rel=1e-6)]
+
+
+EVERY_SCHEME = [
+    mbd.HHT(0.05), mbd.HHT(0.05, formulation="index3"), mbd.GeneralizedAlpha(0.7), mbd.Newmark(), mbd.RadauIIA(),
+    mbd.RungeKutta853(), mbd.RungeKutta4(),
+]  # fmt: skip
+
+
+def wheel(seed):
+    """A wheel without a rim on spokes, and an event 'touch' on the gap of the second one."""
+    rng = np.random.default_rng(seed)
+    spokes, length, slope = int(rng.integers(6, 11)), rng.uniform(0.5, 1.5), rng.uniform(0.08, 0.15)
+    half = math.pi / spokes
+    gain = 4.0 * G / length * math.sin(half) * math.sin(slope)
+    model = mbd.Model("wheel", gravity=mbd.on_slope(slope))
+    hub = mbd.RigidBody("hub", rng.uniform(0.5, 2.0), (0.0, 0.0, rng.uniform(0.01, 0.1)))
+    model.connect(mbd.Planar("wheel", model.ground.origin, hub.origin))
+    tips = [hub.point(length * math.sin(2 * half * k), -length * math.cos(2 * half * k)) for k in range(spokes)]
+    for k, tip in enumerate(tips):
+        model.constrain(mbd.Unilateral(f"spoke {k + 1}", mbd.touchdown(tip)))
+    model.constrain(mbd.Event("touch", mbd.touchdown(tips[1]), direction=-1))
+    speed = 1.2 * math.cos(2 * half) * math.sqrt(gain) / math.sin(2 * half)
+    return model, mbd.assemble(
+        model, closed="spoke 1", position={"wheel.angle": half}, velocity={"wheel.angle": -speed}
+    )
+
+
+@pytest.mark.parametrize("scheme", EVERY_SCHEME, ids=repr)
+@pytest.mark.parametrize("seed", range(4))
+def test_an_event_on_a_gap_happens_as_the_contact_closes_and_never_while_it_holds(seed, scheme):
+    """Newton's method left 2e-13 m of the gap that is held, which a later step took away: an event."""
+    model, start = wheel(seed)
+    run = mbd.simulate(model, start, scheme, dt=10.0 ** np.random.default_rng(seed).uniform(-3.3, -2.3), until=1.6)
+    closed = [event.time for event in run.events if (event.kind, event.name) == ("closed", "spoke 2")]
+    assert closed and closed == [event.time for event in run.events if event.kind == "event"]
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA()], ids=repr)
+def test_an_event_on_the_gap_of_a_contact_is_a_section_of_a_gait_as_the_contact_is(scheme):
+    model, start = wheel(3)
+    contact, event = (mbd.limit_cycle(model, start, scheme, dt=1e-3, section=name) for name in ("spoke 2", "touch"))
+    assert event.period == pytest.approx(contact.period, rel=1e-9)
+    np.testing.assert_allclose(event.multipliers, contact.multipliers, rtol=0, atol=1e-7)
