@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         Controller as Controller,
         Event as Event,
         HystereticStop as HystereticStop,
+        Impulse as Impulse,
         KnifeEdge as KnifeEdge,
         MaxwellStop as MaxwellStop,
         Mode as Mode,
@@ -203,7 +204,8 @@ _HOMES = {
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
-    "mbd.constraints": "Ball Bilateral Controller Event HystereticStop KnifeEdge MaxwellStop Mode Nonholonomic Penalty "
+    "mbd.constraints": "Ball Bilateral Controller Event HystereticStop Impulse KnifeEdge MaxwellStop Mode Nonholonomic "
+    "Penalty "
     "PenaltyParameters Plane Rolling SampledLaw Transition Unilateral When cone disk_touchdown distance extension "
     "flexion height measure "
     "penalty_parameters profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",

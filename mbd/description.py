@@ -15,6 +15,7 @@ from mbd.bodies.values import Vector3, names_of, number, printable, triple
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
+from mbd.constraints.impulse import Impulse
 from mbd.constraints.machine import Machine
 from mbd.constraints.observation import Observation
 from mbd.errors import ModelError, UnknownNameError, nearest
@@ -201,6 +202,11 @@ class Description:
     def events(self) -> list[Event]:
         """The user's own events."""
         return [cast(Event, word) for word in self.constraints if word.kind == "event"]
+
+    @property
+    def impulses(self) -> list[Impulse]:
+        """Impulses that act as contacts close."""
+        return [word for word in self.constraints if isinstance(word, Impulse)]
 
     @property
     def machines(self) -> list[Machine]:

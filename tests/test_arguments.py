@@ -51,6 +51,7 @@ WORDS = {
     mbd.Bilateral: ("rail", mbd.flexion(HINGE)),
     mbd.Controller: ("brain", lambda time, values, state: None, 0.1),
     mbd.Event: ("event", mbd.flexion(HINGE)),
+    mbd.Impulse: ("kick", HINGE, 1.0, "foot"),
     mbd.HystereticStop: ("stop", mbd.flexion(HINGE), 1e3, 0.4, 0.01),
     mbd.MaxwellStop: ("stop", mbd.flexion(HINGE), 1e3, 1e3, 10.0),
     mbd.KnifeEdge: ("knife", ROD.end),

@@ -393,7 +393,7 @@ class Mechanism:
         lengths = (n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1)
         starts = list(accumulate(lengths, initial=0))
         M, f, R, B, h, rate, bias, captured, kinetic = (out[a:b] for a, b in pairwise(starts))
-        limits = out[starts[-1] :]
+        limits = out[starts[-1] : starts[-1] + layout.n_frictions]
         return AccelerationTerms(
             M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0]),
             limits,
@@ -405,7 +405,14 @@ class Mechanism:
         layout = self.layout
         n, rows = layout.n, layout.n_rows
         return {
-            "accelerations": n * n + n + 2 * n * rows + 3 * rows + layout.n_anchors + 1 + layout.n_frictions,
+            "accelerations": n * n
+            + n
+            + 2 * n * rows
+            + 3 * rows
+            + layout.n_anchors
+            + 1
+            + layout.n_frictions
+            + layout.n_v * len(self.equations.impulses),
             "guards": 4 * layout.n_contacts
             + (3 if self.equations.machines else 2) * len(self.equations.guards)
             + 3 * layout.n_frictions,

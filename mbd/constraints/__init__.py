@@ -7,6 +7,7 @@ from mbd.constraints.controller import Controller
 from mbd.constraints.disks import disk_touchdown
 from mbd.constraints.event import Event
 from mbd.constraints.hysteretic_stop import HystereticStop
+from mbd.constraints.impulse import Impulse
 from mbd.constraints.knife_edge import KnifeEdge
 from mbd.constraints.law import Closing, Drag, Equation, Law
 from mbd.constraints.maxwell_stop import MaxwellStop
@@ -29,8 +30,8 @@ from mbd.constraints.user_measure import measure
 
 __all__ = [
     "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "HystereticStop",
-    "KnifeEdge", "Law", "MaxwellStop", "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters", "Plane",
-    "Rolling", "SampledLaw", "Transition", "Unilateral", "VelocityConstraint", "When", "cone", "disk_touchdown",
-    "distance", "extension", "flexion", "height", "measure", "penalty_parameters", "profile_touchdown",
-    "rolling_touchdown", "separation", "sphere_touchdown", "touchdown", "twist",
+    "Impulse", "KnifeEdge", "Law", "MaxwellStop", "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters",
+    "Plane", "Rolling", "SampledLaw", "Transition", "Unilateral", "VelocityConstraint", "When", "cone",
+    "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
+    "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown", "twist",
 ]  # fmt: skip

@@ -16,7 +16,7 @@ from mbd.tape.node import Scalar
 
 __all__ = ["KINDS", "Constraint", "VelocityConstraint"]
 
-KINDS = ("bilateral", "nonholonomic", "unilateral", "penalty", "event", "machine")
+KINDS = ("bilateral", "nonholonomic", "unilateral", "penalty", "event", "machine", "impulse")
 """What a constraint may be to the active-set manager."""
 
 
@@ -29,7 +29,8 @@ class Constraint(Parameterized, ABC):
         """What it is to the active-set manager.
 
         'bilateral' (rows that always act), 'nonholonomic' (those on velocities), 'unilateral' (rows that close and
-        open), 'penalty' (a force law that does), 'event', or 'machine' (discrete states).
+        open), 'penalty' (a force law that does), 'event', 'machine' (discrete states), or
+        'impulse'.
         """
 
     @abstractmethod
@@ -37,7 +38,7 @@ class Constraint(Parameterized, ABC):
         """The frames, joints and named quantities it refers to."""
 
     def act(self, scope: Scope, hold: Hold) -> Law:
-        """Its rows or forces, and when they act; of every kind but 'event' and 'machine'.
+        """Its rows or forces, and when they act; of every kind but 'event', 'machine' and 'impulse'.
 
         Parameters
         ----------
@@ -95,7 +96,7 @@ class Constraint(Parameterized, ABC):
         if self.kind == "event":
             lacks = [name for name in ("guard", "direction", "terminal", "reset") if not hasattr(self, name)]
             return [f"{title} is an event without {', '.join(lacks)}; use mbd.Event"] if lacks else []
-        if self.kind == "machine" or type(self).act is not Constraint.act:
+        if self.kind in ("machine", "impulse") or type(self).act is not Constraint.act:
             return []
         return [
             f"{title} has no act(scope, hold), which says by which rows or force it acts: it would act by none; return "

@@ -17,6 +17,7 @@ from mbd.equations.effects import causes, effect_of, weight_of
 from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.gathered import Gathered
+from mbd.equations.impulses import impulses_of
 from mbd.equations.laws import Laws
 from mbd.equations.machines import declare_machines, machine_guards
 from mbd.equations.magnitudes import of_directions
@@ -111,6 +112,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         constraints.take_machines(
             *machine_guards(scope, model.machines, model.contacts, model.events, model.parameters)
         )
+    constraints.impulses += impulses_of(scope, dynamics, model.impulses, model.contacts, gathered)
     rests: list[Node] = []
     with gathered.catch():
         rests = state_balance(scope, [*(pair for cause in found for pair in cause.rates), *constraints.rates])
@@ -136,7 +138,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         anatomy=tuple((each.name, each.anatomy) for each in model.joints if each.anatomy),
         shapes=(*shapes_of(model), *(() if plan.planar else solids_of(model))),
         mirror=None if plan.planar else partial(signs_in_a_mirror, plan.edges, model.gravity),
-        machines=tuple(constraints.machines),
+        machines=tuple(constraints.machines), impulses=tuple(constraints.impulses),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
         facings=_facings(scope, constraints),

@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from mbd.constraints.impulse import Impulse
 from mbd.equations import equations as records
 from mbd.equations.contacts import laws
 from mbd.equations.coordinate_scope import CoordinateScope, identifier
@@ -13,6 +14,7 @@ from mbd.equations.dynamics import Work
 from mbd.equations.effects import causes, effect_of
 from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.gathered import Gathered
+from mbd.equations.impulses import impulses_of
 from mbd.equations.laws import Laws
 from mbd.equations.machines import declare_machines, machine_guards
 from mbd.equations.observations import offer_observations
@@ -142,6 +144,7 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
         effects=effects, kinetic=kinetic, potential=potential, compose=None, output=outputs, output_names=outputs.names,
         velocity_names=tuple(f"{c.name}.rate" for c in system.coordinates), frictions=tuple(known.frictions),
         machines=tuple(known.machines),
+        impulses=tuple(known.impulses),
         observations=tuple((each.name, each.unit) for each in system.observations),
     )  # fmt: skip
 
@@ -168,6 +171,8 @@ def _laws(system: EnergyDescription, lowering: Lowering, gathered: Gathered) -> 
     laws(scope, scope, (), always, system.contacts, system.events, gathered, before=known, written=written)
     with gathered.catch():
         known.take_machines(*machine_guards(scope, system.machines, system.contacts, system.events, system.parameters))
+    words = [word for word in system.words if isinstance(word, Impulse)]
+    known.impulses += impulses_of(scope, scope, words, system.contacts, gathered)
     return known
 
 

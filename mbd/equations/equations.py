@@ -247,6 +247,20 @@ class Machine:
 
 
 @dataclass(frozen=True)
+class StrikeImpulse:
+    """An impulse of the user as a contact closes.
+
+    contact : number of that contact; order : 0 before, 1 with, 2 after its impact
+    vector : w P on the tape, generalized (n_v)
+    """
+
+    name: str
+    contact: int
+    order: int
+    vector: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
 class Turn:
     """The angle between the frames of a cut joint in the plane, a sum of coordinates and of whole turns.
 
@@ -381,6 +395,7 @@ class Equations:
     turns : of the cut joints, see `Turn`
     facings : of the cut joints whose rows hold sines, see `Facing`
     machines : discrete states, see `Machine`
+    impulses : of the user, as contacts close
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     markers : full names of the named points, which pages show
     observations : (name, unit) of the results of users' own; anatomy : (joint, joint of the body) of those that are one
@@ -415,6 +430,7 @@ class Equations:
     chart: Chart | None = None
     markers: tuple[str, ...] = ()
     machines: tuple[Machine, ...] = ()
+    impulses: tuple[StrikeImpulse, ...] = ()
     observations: tuple[tuple[str, str], ...] = ()
     anatomy: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()

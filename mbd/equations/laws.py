@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from mbd.equations.equations import Contact, Effect, Friction, Guard, Machine, Row
+from mbd.equations.equations import Contact, Effect, Friction, Guard, Machine, Row, StrikeImpulse
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Laws"]
@@ -36,6 +36,7 @@ class Laws:
     idle: list[tuple[str, str]] = field(default_factory=list)
     rates: list[tuple[Node, Scalar]] = field(default_factory=list)
     machines: list[Machine] = field(default_factory=list)
+    impulses: list[StrikeImpulse] = field(default_factory=list)
 
     def take_machines(self, machines: Sequence[Machine], guards: Sequence[Guard]) -> None:
         """Add machines, and their transitions behind users' events."""

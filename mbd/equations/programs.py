@@ -206,7 +206,8 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     out += [value for machine in equations.machines for value in machine.captured]
     out += [value for contact in equations.contacts for value in contact.captured]
     out += [tape.input("anchor", turn.anchor) for turn in equations.turns]
-    return [*out, equations.kinetic, *(friction.limit_at_speed(smooth) for friction in equations.frictions)]
+    out += [equations.kinetic, *(friction.limit_at_speed(smooth) for friction in equations.frictions)]
+    return out + [entry for impulse in equations.impulses for entry in impulse.vector]
 
 
 def guards(equations: Equations) -> list[Node]:

@@ -39,7 +39,7 @@ class ActiveSetManager:
         self._row_level = [int(row.is_velocity) for row in equations.rows]
         self._row_friction = [row.friction for row in equations.rows]
         self.frictions = equations.frictions
-        self.machines = equations.machines
+        self.machines, self.impulses = equations.machines, equations.impulses
         self._first_anchor = equations.n_held_by_machines
         self.rolling: dict[str, tuple[int, ...]] = {}  # rows of wheels that roll while a contact is closed, by name
         own = {contact.name for contact in equations.contacts}
@@ -136,6 +136,8 @@ class ActiveSetManager:
             "normal": normals, "when_start": starts, "when_target": targets, "when_after": afters,
             "while_kind": while_kind, "while_target": while_target, "anchor_start": anchors,
             "direction": [guard.direction for guard in self.guards], **self._transitions(),
+            "impulse_contact": [each.contact for each in self.impulses],
+            "impulse_order": [each.order for each in self.impulses],
         }  # fmt: skip
         tables = ContactTables({name: np.array(values, dtype=np.int64) for name, values in integers.items()})
         tables["restitution"] = np.array([contact.restitution for contact in self.contacts], dtype=float)

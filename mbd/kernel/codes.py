@@ -20,7 +20,7 @@ DOUBTFUL_START, NEEDS_PYTHON = 40, 41
     CROSS_BRIEF, CROSS_BACK,
 ) = range(13)  # fmt: skip
 """Kinds of fired guards."""
-LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED = range(5)
+LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED, LOG_PUSHED = range(6)
 """Kinds in the log."""
 UNKNOWN = -9
 """State of a friction before the first restart, in `was`: what it begins with is no event [-]."""

@@ -38,7 +38,7 @@ def room_to_log(K: Sizes) -> int:
     singular configuration does; an impact each contact at most three times: released by one that strikes, closed, and
     opened again.
     """
-    return int(5 * K.n_contacts + 2 * K.n_frictions + 2 * K.n_guards + 64 * K.n_machines + 8)
+    return int(5 * K.n_contacts + 2 * K.n_frictions + 2 * K.n_guards + 64 * K.n_machines + K.n_impulses + 8)
 
 
 def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -> None:

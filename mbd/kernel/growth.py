@@ -70,7 +70,7 @@ def take_back(K: Guards, at_y: int, at_D: int, part: float, time: float) -> None
     call(K, COMPOSE, K.q1)
 
 
-def growth_of_states(K: Kernel, h: float, t1: float, stretch: float, part: float, at_y: int, at_D: int) -> float:
+def growth_of_states(K: Switching, h: float, t1: float, stretch: float, part: float, at_y: int, at_D: int) -> float:
     """ζ of the first-order states alone: what they owe to the change of the motion, as ``ż = v``, is no growth."""
     for i in range(K.n):
         K.y1[i] = K.inside[at_y + i] - (part * K.inside[at_D + i] if i >= K.n_v else 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.candidate import carry
-from mbd.kernel.codes import LOG_EVENT, LOG_SLIPPED, LOG_STUCK
+from mbd.kernel.codes import LOG_EVENT, LOG_PUSHED, LOG_SLIPPED, LOG_STUCK
 from mbd.kernel.cones import phase_of
 from mbd.kernel.records import Reals, Switching
 
@@ -55,6 +55,6 @@ def is_awaited(K: Switching, first: int) -> bool:
             index += K.flag_user
         elif kind == LOG_STUCK or kind == LOG_SLIPPED:
             index += K.flag_friction
-        if K.notify[index] == 1:
+        if kind != LOG_PUSHED and K.notify[index] == 1:
             return True
     return False

@@ -21,6 +21,7 @@ from mbd.kernel.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STIL
 from mbd.kernel.guards import gap_scale, is_watched
 from mbd.kernel.impact import impact
 from mbd.kernel.impact_solve import strikes
+from mbd.kernel.impulses import AFTER, BEFORE, BESIDE, push
 from mbd.kernel.records import Balance, ContactForces, Guards, Mechanism, Switching
 from mbd.kernel.restart import active_rows, capture, consistent, evaluate, evaluate_loaded, limit_of, row_speed
 
@@ -76,7 +77,12 @@ def close_by_impact(K: Switching, fastest: float) -> int:
     slow = fastest < K.rest_speed or (K.plastic_impact == 1 and fastest == 0.0)  # a rebound too small to rise at all
     if not slow:
         release_for(K, 0)
-    status = impact(K, slow)
+    status = 0
+    if K.n_impulses > 0 and not slow:
+        status = push(K, BEFORE)
+        status = push(K, BESIDE) if status == 0 else status
+    if status == 0:
+        status = impact(K, slow)
     if status != 0:
         return status
     count = 0
@@ -107,7 +113,7 @@ def close_by_impact(K: Switching, fastest: float) -> int:
             log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
     if not slow:
         release_for(K, 1)
-    return 0
+    return push(K, AFTER) if K.n_impulses > 0 and not slow else 0
 
 
 def loss_of(K: ContactForces, row: int) -> float:

@@ -15,7 +15,7 @@ __all__ = ["arrays_of_run", "arrays_within", "expect", "of_kind"]
 
 STATE = {"q": "q", "v": "v", "z": "z", "a": "v", "s": "z", "lam": "lam"}
 """Parts of the state, each with the one whose shape it has."""
-KINDS = ("closed", "opened", "event", "stuck", "slipped")
+KINDS = ("closed", "opened", "event", "stuck", "slipped", "pushed")
 """Kinds of events."""
 
 

@@ -261,6 +261,11 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
     for event in hits:
         together.setdefault(event.row, []).append(event)
     impacts: dict[str, Vector] = defaultdict(lambda: np.zeros(len(left)))
+    kicks: dict[str, Vector] = defaultdict(lambda: np.zeros(len(left)))
+    for event in record.events:
+        if event.kind == "pushed" and after[event.row]:
+            kicks[event.name][event.row] -= event.energy_loss
+            left[event.row] += event.energy_loss
     for row, struck in sorted(together.items()):
         for name, loss in _losses(struck).items():
             impacts[name][row] -= loss
@@ -269,7 +274,8 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
     beyond = np.zeros(len(left))
     beyond[list(together)] = left[list(together)]
     beyond[reset] = 0.0
-    parts = [Part(f"{name} impact", "impact", np.cumsum(taken)) for name, taken in impacts.items()]
+    parts = [Part(name, "force", np.cumsum(given)) for name, given in kicks.items()]
+    parts += [Part(f"{name} impact", "impact", np.cumsum(taken)) for name, taken in impacts.items()]
     parts.append(Part("resets", "reset", np.cumsum(np.where(reset, left, 0.0))))
     return [*parts, Part("drives at impacts", "constraint", np.cumsum(beyond))] if driven else parts
 

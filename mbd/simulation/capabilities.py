@@ -109,6 +109,11 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
         texts.append(scheme.check_tolerance(len(held)))
         found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
     found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in texts if text]
+    if equations.impulses and options.get("contact") == "nonsmooth":
+        found.append(
+            f"contact='nonsmooth' locates no strike at which {_listed([each.name for each in equations.impulses])} "
+            "could act; use contact='events'"
+        )
     if equations.compose is not None and not scheme.any_chart:
         found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
     return found

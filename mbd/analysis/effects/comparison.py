@@ -61,6 +61,7 @@ def _possible(events: Sequence[EventRecord], equations: Equations | None) -> lis
     contacts = {contact.name for contact in equations.contacts}
     frictions = {friction.name for friction in equations.frictions}
     known = {"closed": contacts, "opened": contacts, "stuck": frictions, "slipped": frictions}
+    known["pushed"] = {each.name for each in equations.impulses}
     return [event for event in events if event.kind == "event" or event.name in known[event.kind]]
 
 

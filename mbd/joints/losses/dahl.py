@@ -60,7 +60,8 @@ class Dahl(Loss):
     def rates(self, rate: Scalar, scope: Scope, owner: str) -> StateRates:
         """ż = v − |v| σ z/T."""
         share = self.force(rate, scope, owner) / scope.parameter(owner, "torque", self.torque)
-        return [(scope.state(owner, "deflection", 0.0), rate - abs(rate) * share)]
+        speed: Scalar = abs(rate)
+        return [(scope.state(owner, "deflection", 0.0), rate - speed * share)]
 
     def elastic(self, scope: Scope, owner: str) -> Scalar:
         """½ σ z²."""

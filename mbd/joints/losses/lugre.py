@@ -84,7 +84,8 @@ class LuGre(Loss):
         )
         z: Node = scope.state(owner, "deflection", 0.0)
         steady = kinetic + (static - kinetic) * exp(-((rate / speed) ** 2))
-        return [(z, rate - stiffness * abs(rate) * z / steady)]
+        fast: Scalar = abs(rate)
+        return [(z, rate - stiffness * fast * z / steady)]
 
     def elastic(self, scope: Scope, owner: str) -> Scalar:
         """½ σ₀ z²."""

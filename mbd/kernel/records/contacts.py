@@ -22,6 +22,11 @@ class Contacts(SchemeAbilities):
     while_target: Integers = integers()
     anchor_start: Integers = integers()
     restitution: Reals = reals()
+    impulse_contact: Integers = integers()  # whose closing an impulse of the user waits for
+    impulse_order: Integers = integers()  # 0 before its impact, 1 with it, 2 after it
+    pushes: Reals = reals(lambda s: s.n_impulses * s.n_v)  # w P of each
+    pushed_from: Reals = reals(lambda s: s.n)  # velocities before them
+    pushed_closing: Integers = integers(lambda s: s.n_contacts)  # who closes in the impact beside them
     closed: Integers = integers(lambda s: s.n_contacts, kept=True)
     armed: Integers = integers(lambda s: s.n_contacts, kept=True)
     touched: Integers = integers(lambda s: s.n_contacts, kept=True)

@@ -19,6 +19,7 @@ class Sizes(Record):
     n_guards: int  # of the user
     n_frictions: int
     n_machines: int  # discrete states with transitions
+    n_impulses: int  # of the user, as contacts close
     n_cones: int  # pairs of frictions that slide together, those of contacts in space
     o_q: int  # offsets into the block
     o_x: int
@@ -57,6 +58,7 @@ class Sizes(Record):
     acc_limit: int = formula(
         lambda s: s.n * s.n + s.n + 2 * s.n * s.n_rows + 3 * s.n_rows + s.n_anchors + 1
     )  # where the largest frictions begin, behind the kinetic energy
+    acc_impulse: int = formula(lambda s: s.acc_limit + s.n_frictions)  # where w P of the user's impulses begin
     at_gap_rate: int = formula(lambda s: s.n_contacts)  # where gap rates begin among guard values, behind the gaps
     at_force: int = formula(lambda s: 2 * s.n_contacts)  # forces of penalty contacts
     at_condition: int = formula(lambda s: 3 * s.n_contacts)  # measures by which contacts are watched

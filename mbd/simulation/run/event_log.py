@@ -10,7 +10,7 @@ from mbd.results.record import EventRecord
 
 __all__ = ["EventLog", "Impulses"]
 
-KINDS = ("closed", "opened", "event", "stuck", "slipped")
+KINDS = ("closed", "opened", "event", "stuck", "slipped", "pushed")
 """Kinds of events by their numbers in the log."""
 FIRST = 5
 """Place of the first impulse in a line: time, kind, number, energy loss and row come before."""
@@ -31,7 +31,14 @@ class EventLog:
     def __init__(self, manager: ActiveSetManager) -> None:
         frictions = [friction.name for friction in manager.frictions]
         guards = [guard.name for guard in manager.guards]
-        self._names = (manager.names, manager.names, guards, frictions, frictions)
+        self._names = (
+            manager.names,
+            manager.names,
+            guards,
+            frictions,
+            frictions,
+            [each.name for each in manager.impulses],
+        )
         self._bearers: list[Bearer] = [(contact.name, _place(contact.rows)) for contact in manager.contacts]
         joints = [friction for friction in manager.frictions if friction.contact < 0]
         self._bearers += [(friction.name, _place((friction.row,))) for friction in joints]

@@ -110,6 +110,7 @@ class Stepper:
             n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
             n_frictions=layout.n_frictions, n_machines=len(self.manager.machines),
+            n_impulses=len(self.manager.impulses),
             n_cones=sum(f.partner >= 0 for f in self.manager.frictions) // 2,
             n_watched=self.mechanism.sizes["guards"],
             n_judged=layout.n_frictions
