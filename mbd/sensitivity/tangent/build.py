@@ -21,7 +21,11 @@ __all__ = ["entry"]
 
 ENTRY = "mbd_tangent_kernel"
 LEVEL = 2
-HELD = ("locate.locate", "locate.find_jump", "hooks.scheme_error", "restart.refresh_scales", "restart.weigh")
+HELD = (
+    "locate.locate", "locate.find_jump", "hooks.scheme_error", "restart.refresh_scales", "restart.weigh",
+    "schemes.iteration.residual_size", "schemes.iteration.is_below_floors", "guards.judge", "guards.is_quiet",
+    "guard_substeps.parts_to_take", "resolution.judge_change",
+)  # fmt: skip
 """Functions without derivatives: instants are found by values, sizes of forces and of errors judge only."""
 
 
