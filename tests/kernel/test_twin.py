@@ -18,6 +18,7 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import Mode
 from mbd.testing.mechanisms import random_body, random_frame
+from tests.comparisons import at_least, compared
 from tests.equations.mechanisms import four_bar, furnished, random_tree
 from tests.joints.quaternion_ball import CayleyBall, QuaternionBall
 from tests.simulation.mechanisms import ball, box, falling, kneed_walker, kneed_walker_start, pendulum, run
@@ -154,7 +155,8 @@ def random_mechanism(seed, spatial, loops):
     return model
 
 
-@settings(max_examples=6)
+@at_least(4)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 40), spatial=st.booleans(), loops=st.booleans(), scheme=st.sampled_from(sorted(SCHEMES)))
 def test_integrator_advance_and_the_compiled_kernel_agree_on_random_mechanisms(seed, spatial, loops, scheme):
     integrator = SCHEMES[scheme]
@@ -169,6 +171,7 @@ def test_integrator_advance_and_the_compiled_kernel_agree_on_random_mechanisms(s
     fast = mbd.simulate(model, start, integrator, dt=dt, until=steps * dt, on_failure="return")
     if not fast.success:
         return
+    compared()
     mechanism = mechanism_of(model)
     manager = ActiveSetManager(mechanism.equations)
     system = Stepper(mechanism, manager, integrator, mechanism.parameters(), dt, {"capacity": 8}).system

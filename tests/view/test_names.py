@@ -20,6 +20,7 @@ from mbd.bodies.values import printable
 from mbd.results import archive
 from mbd.view.page import html
 from mbd.view.posture import instant
+from tests.comparisons import at_least, compared
 
 ODD = ("_left", "$m", "$a$ b_c^{", r"50 \frac", "a & b < c", "колено", "膝")
 CONTROL = ("a\x1b[2Jb", "a\nb", "a\rb", "a\x00", "a\u202eb", "a\x9b", "a\u2028b", "\ud800x")
@@ -137,6 +138,7 @@ def tags_of_a_plain_name() -> tuple[list[str], list[str]]:
     return Elements(html(run)).tags, Elements(run._repr_html_()).tags
 
 
+@at_least(10)
 @settings(max_examples=25, deadline=None)
 @given(name=NAMES)
 def test_any_name_is_refused_or_kept_in_pages_tables_and_files(name, tmp_path_factory):
@@ -147,6 +149,7 @@ def test_any_name_is_refused_or_kept_in_pages_tables_and_files(name, tmp_path_fa
         told = str(refused)
         assert told.splitlines() == [told] and not any(category(sign) in ("Cc", "Cs") for sign in told)
         return
+    compared()
     page, shown = Elements(html(run)), Elements(run._repr_html_())
     assert (page.tags, shown.tags) == tags_of_a_plain_name()
     assert page.texts[page.tags.index("title")].startswith(name)

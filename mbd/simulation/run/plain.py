@@ -17,9 +17,8 @@ from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.mass_ratios import LOSS
 from mbd.kernel.records import Kernel
-from mbd.kernel.restart import MOST_LOADS, evaluate, fill_block, refresh_scales, take_consistent
+from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales, take_consistent
 from mbd.kernel.schemes.memory import start_step
-from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.user_calls import call_user
 from mbd.state import Mode, State
@@ -298,7 +297,6 @@ class PlainScheme:
         self.memory = memory
         K.near_singular = 0
         K.slope[:] = getattr(memory, "slope", 0.0)
-        forget_row_norms(K)
         fill_block(K, K.time, K.q, K.y)
         refresh_scales(K)
         return 0
@@ -332,9 +330,6 @@ class PlainScheme:
         K.q1[:], K.y1[:], K.rate1[:], K.aux1[:] = result.state.q, y, rate, rate
         K.lam1[:] = 0.0
         K.lam1[rows] = lam
-        if K.singular_size == 1 and rows:
-            evaluate(K, t1, K.q1, K.y1)
-            note_row_norms(K)
         fill_block(K, t1, K.q1, K.y1)
         K.block[K.o_a : K.o_a + K.n] = rate
         K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
@@ -348,8 +343,6 @@ class PlainScheme:
 
     def accept(self, K: Kernel, h: float) -> None:
         """The candidate becomes the accepted state, its memory the memory."""
-        if K.singular_size == 1 and K.n_active > 0:
-            accept_row_norms(K, h)
         self.memory = self.pending
         K.slope[:] = (K.rate1 - K.rate) / h
         K.lam_slope[:] = (K.lam1 - K.lam) / h
