@@ -284,6 +284,8 @@ class Description:
         for name in names:
             if name not in known:
                 raise UnknownNameError("without: " + nearest(name, known, "joint, loss, force or constraint"))
+        own = {id(word): word.without_parameters(set(model.parameters)) for word in model.machines}
+        model.constraints = [left for word in model.constraints if (left := own.get(id(word), word)) is not None]
         gone = set(self.parameters) - set(model.parameters)
         gone |= {parameter for parameter in self.tunable if parameter.rpartition(".")[0] in names}
         model.tunable = tuple(parameter for parameter in self.tunable if parameter not in gone)

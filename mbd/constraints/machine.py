@@ -8,7 +8,7 @@ among the states, and one cause: a guard that crosses zero, or something else th
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from mbd.constraints.base import Constraint
@@ -99,6 +99,10 @@ class Machine(Constraint):
     def held_parameters(self) -> Mapping[str, int]:
         """Parameters of other words that are among the numbers that it holds, with the number of the field."""
         return {}
+
+    def without_parameters(self, known: Collection[str]) -> Machine | None:
+        """What is left of it where only these parameters exist, which it may set; None where nothing is."""
+        return self
 
     @abstractmethod
     def changes(self, scope: Scope, held: Sequence[Node]) -> Sequence[Change]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive
@@ -241,6 +241,11 @@ class Mode(Machine):
     def parameters_by_state(self) -> Mapping[str, Mapping[str, float]]:
         """`sets`."""
         return self.sets
+
+    def without_parameters(self, known: Collection[str]) -> Mode:
+        """Without what it sets in vain."""
+        left = {name: values for name, values in self.sets.items() if name in known}
+        return self if len(left) == len(self.sets) else replace(self, sets=left)
 
     def changes(self, scope: Scope, held: Sequence[Node]) -> Sequence[Change]:
         """Its transitions, one for each source."""

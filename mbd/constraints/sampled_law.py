@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
@@ -166,6 +166,15 @@ class SampledLaw(Machine):
     def held_parameters(self) -> Mapping[str, int]:
         """The parameters that it sets."""
         return {name: FIRST + k for k, name in enumerate(self.outputs) if "." in name}
+
+    def without_parameters(self, known: Collection[str]) -> SampledLaw | None:
+        """Without the outputs that would be set in vain."""
+        left = {name: law for name, law in self.outputs.items() if "." not in name or name in known}
+        if len(left) == len(self.outputs) or not left:
+            return self if left else None
+        gone = set(self.outputs) - set(left)
+        steps = {name: step for name, step in self.resolution.items() if name not in gone}
+        return replace(self, outputs=left, resolution=steps)
 
     # how it changes -------------------------------------------------------------------------------------------------
     def changes(self, scope: Scope, held: Sequence[Node]) -> Sequence[Change]:

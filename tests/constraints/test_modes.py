@@ -197,6 +197,14 @@ def test_springs_and_dampers_take_numbers_by_state() -> None:
     assert np.max(np.abs(one.energy.numerical)) < 1e-9
 
 
+def test_effects_of_a_machine_are_left_out_with_what_it_sets_of_them() -> None:
+    model = knee()
+    bare = model.without("knee loss")
+    assert bare.check() == [] and model.check() == []
+    assert "knee loss.coefficient.pull" not in bare.parameters
+    assert {"drive", "knee loss"} <= set(map(str, model.cost().effects))
+
+
 def test_a_run_that_goes_on_or_was_saved_is_the_same_to_the_bit(tmp_path: Any) -> None:
     model = knee()
     start = mbd.assemble(model, {"knee.angle": 0.8})
