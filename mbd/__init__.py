@@ -97,6 +97,8 @@ if TYPE_CHECKING:
         Spring as Spring,
         TabulatedSpring as TabulatedSpring,
         TorsionSpring as TorsionSpring,
+        bias_forces as bias_forces,
+        mass_matrix as mass_matrix,
     )
     from mbd.gait.basin.basin import basin as basin
     from mbd.gait.basin.result import Basin as Basin
@@ -224,7 +226,8 @@ _HOMES = {
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
-    "mbd.forces": "Applied Bushing DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring",
+    "mbd.forces": "Applied Bushing DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring "
+    "bias_forces mass_matrix",
     "mbd.gait.basin.basin": "basin",
     "mbd.gait.basin.result": "Basin",
     "mbd.gait.branch": "Branch branch",

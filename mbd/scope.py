@@ -78,5 +78,8 @@ class Scope(ParameterSource, Protocol):
     def state_names(self, mode: str) -> Sequence[str]:
         """The states of a mode, whose number is the named quantity `mode`."""
 
+    def inertia(self, coordinates: Sequence[str]) -> tuple[Sequence[Sequence[Node]], Sequence[Node]]:
+        """M and h of some coordinates, ``M q̈ + h = τ``."""
+
     def state(self, owner: str, field: str, initial: float) -> Node:
         """A first-order state z of the owner (registered on first use); its rate is given in `Action.rates`."""

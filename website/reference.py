@@ -14,7 +14,8 @@ GROUPS = {
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
     "Nonholonomic Event Mode Transition SampledLaw Controller When touchdown rolling_touchdown profile_touchdown "
     "disk_touchdown sphere_touchdown Plane Ball height flexion extension cone twist distance separation measure",
-    "Forces": "Spring Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Applied Potential Samples",
+    "Forces": "Spring Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Applied Potential Samples "
+    "mass_matrix bias_forces",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load batch Batch sweep Sweep latin_hypercube sobol",

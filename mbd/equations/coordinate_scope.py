@@ -82,6 +82,10 @@ class CoordinateScope(ParameterScope):
             raise UnknownNameError(nearest(name, self.known, "quantity", "Known are"))
         return self.tape.lift(self.known[found])
 
+    def inertia(self, coordinates: Sequence[str]) -> NoReturn:
+        """Energies are given as a whole, forces on them among their laws."""
+        raise ModelError("mass_matrix and bias_forces are of a Model; a Lagrangian's forces know its energies")
+
     def offer(self, name: str, value: Scalar) -> None:
         """Let words and expressions ask for one more quantity."""
         self.known[name] = value

@@ -101,6 +101,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     vectors = all(joint.is_vector for joint in plan.edges)
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
     dynamics = Dynamics(moving, masses, scope.placement, scope.views, scope.inputs)
+    scope.offer_inertia(dynamics)
     gathered = Gathered()
     found = causes(scope, (*plan.edges, *plan.cut), model.forces, gathered)
     work = sum((cause.work for cause in found), Work())

@@ -12,6 +12,7 @@ from mbd.bodies.base import Body, Frame
 from mbd.bodies.values import Vector3
 from mbd.configuration import Configuration
 from mbd.equations import changes
+from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Chart, Coordinate, Turn
 from mbd.equations.headings import Headings, direction, spin
 from mbd.equations.kinematic_proxies import KinematicProxies
@@ -79,6 +80,8 @@ class DerivationContext(ParameterScope):
         self.gravity = tuple(self.parameters.node(f"gravity.{a}", g) for a, g in zip(AXES, gravity, strict=True))
         self.states: list[tuple[Coordinate, Node]] = []
         self._joints: dict[str, JointMotion] = {}
+        self._dynamics: Dynamics | None = None
+        self._inertia: tuple[list[list[Node]], list[Node]] | None = None
         self.bodies = self._grown(ground)
         values: list[Scalar] = [node for joint in tree for node in self._tree_motion(joint).coordinates]
         values += [self.own_angle(*key) for key in self.carried]
@@ -193,6 +196,34 @@ class DerivationContext(ParameterScope):
         """A named quantity of the configuration or the velocity, or a parameter."""
         value = None if self.quantities.offers(name) else self.parameters.declared(name)
         return self.quantities(name) if value is None else self.parameter(*_owner_and_field(name), value)
+
+    def offer_inertia(self, dynamics: Dynamics) -> None:
+        """Let laws ask for mass matrices."""
+        self._dynamics = dynamics
+
+    def inertia(self, coordinates: Sequence[str]) -> tuple[list[list[Node]], list[Node]]:
+        """M and h of some coordinates of the tree, ``M q̈ + h = τ``, of masses and weight alone.
+
+        Raises
+        ------
+        UnknownNameError
+            for names of no coordinate of the tree.
+        """
+        known: dict[str, int] = {}
+        for joint in self.tree:
+            first = self._edges[joint.name].first
+            names = joint.velocity_names if not joint.is_vector else joint.coordinate_names
+            known |= {name: first + k for k, name in enumerate(names)}
+            known |= {joint.name: first} if len(joint.freedoms) == 1 else {}
+        unknown = [name for name in coordinates if name not in known]
+        if unknown or self._dynamics is None:
+            raise UnknownNameError([nearest(name, known, "coordinate of the tree") for name in unknown])
+        places = [known[name] for name in coordinates]
+        if self._inertia is None:
+            still: dict[Node, float] = dict.fromkeys(self.inputs.a, 0.0)
+            self._inertia = self._dynamics.mass_matrix(), substitute(self._dynamics.balance(Work()), still)
+        M, h = self._inertia
+        return [[M[i][j] for j in places] for i in places], [h[i] for i in places]
 
     def state(self, owner: str, field: str, initial: float) -> Node:
         """A first-order state; registered on first use."""

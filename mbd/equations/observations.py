@@ -61,6 +61,9 @@ class _ObservingScope:
     def time(self) -> Node:
         return self._scope.time
 
+    def inertia(self, coordinates: Sequence[str]) -> tuple[Sequence[Sequence[Node]], Sequence[Node]]:
+        return self._scope.inertia(coordinates)
+
     def state_names(self, mode: str) -> Sequence[str]:
         return self._scope.state_names(mode)
 

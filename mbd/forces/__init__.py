@@ -5,6 +5,7 @@ from mbd.forces.base import Action, Force
 from mbd.forces.bushing import Bushing
 from mbd.forces.damper import Damper
 from mbd.forces.dc_motor import DCMotor
+from mbd.forces.inertia import bias_forces, mass_matrix
 from mbd.forces.motor import Motor
 from mbd.forces.potential import Potential
 from mbd.forces.samples import Samples
@@ -14,5 +15,5 @@ from mbd.forces.torsion_spring import TorsionSpring
 
 __all__ = [
     "Action", "Applied", "Bushing", "DCMotor", "Damper", "Force", "Motor", "Potential", "Samples", "Spring",
-    "TabulatedSpring", "TorsionSpring",
+    "TabulatedSpring", "TorsionSpring", "bias_forces", "mass_matrix",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import ByMode
 from mbd.bodies.values import is_number, number
 from mbd.errors import ModelError, UnknownNameError
+from mbd.forces.inertia import InertialArgument
 from mbd.forces.samples import Samples
 from mbd.forces.scipy_curves import is_curve
 from mbd.joints.base import Joint
@@ -30,8 +31,8 @@ INCREMENT = "+"
 Mention: TypeAlias = Frame | Joint | str
 """What a word refers to: a frame, a joint, or the name of a quantity."""
 
-ArgumentSpec: TypeAlias = tuple[tuple[str, Mention | float], ...]
-"""(label, what it stands for): the name of a quantity, a frame (its position), a joint (its coordinates), a number."""
+ArgumentSpec: TypeAlias = tuple[tuple[str, Mention | float | InertialArgument], ...]
+"""(label, what it stands for): the name of a quantity, a frame, a joint (its coordinates), a number, M or h."""
 
 
 def is_single(value: Any) -> bool:
@@ -85,10 +86,12 @@ def arguments_of(values: Any, what: str) -> ArgumentSpec:
     entries = list(values.items()) if isinstance(values, Mapping) else [values] if isinstance(values, str) else values
     if not isinstance(entries, Iterable) or isinstance(entries, bytes | type | Samples):
         raise ModelError(f"{what}: arguments must be a list such as ('t', 'left hip.angle'), got {values!r}")
-    result: list[tuple[str, Mention | float]] = []
+    result: list[tuple[str, Mention | float | InertialArgument]] = []
     for entry in entries:
         label, value = entry if isinstance(entry, tuple) and len(entry) == 2 else (None, entry)
-        if isinstance(value, Frame | Joint | str):
+        if isinstance(value, InertialArgument):
+            result.append((str(label or value.label), value))
+        elif isinstance(value, Frame | Joint | str):
             result.append((str(label or _label(value)), value))
         elif is_number(value) and label is not None:
             result.append((str(label), number(value, f"{what}, argument {label!r}")))
@@ -128,7 +131,9 @@ def resolved(arguments: ArgumentSpec, scope: Scope, owner: str) -> list[Argument
     """The scalars and triples that the arguments stand for."""
     result: list[Argument] = []
     for label, value in arguments:
-        if isinstance(value, Frame):
+        if isinstance(value, InertialArgument):
+            result.append((label, value.at(scope)))
+        elif isinstance(value, Frame):
             result.append((label, scope.frame(value).position))
         elif isinstance(value, Joint):
             coordinates = scope.joint(value.name).coordinates

@@ -73,6 +73,10 @@ class FreeScope:
         """There are no modes."""
         raise UnknownNameError(f"this scope has no mode {mode!r}")
 
+    def inertia(self, coordinates: Sequence[str]) -> tuple[Sequence[Sequence[Node]], Sequence[Node]]:
+        """Bodies move freely here."""
+        raise UnknownNameError(f"this scope has no coordinates {tuple(coordinates)!r}")
+
     def state(self, owner: str, field: str, initial: float) -> Node:
         node = self.states.setdefault(f"{owner}.{field}", self.tape.input("z", len(self.states)))
         self.numbers.setdefault(node, initial)
