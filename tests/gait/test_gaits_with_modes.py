@@ -147,3 +147,37 @@ def test_a_gait_of_one_foot_has_derivatives_though_its_steps_have_no_length() ->
     np.testing.assert_allclose(gait.derivatives["period", "leg.time of thrust"], slope, rtol=1e-8)
     later = mbd.limit_cycle(model, gait.state, section="leg: wait to thrust")
     np.testing.assert_allclose(later.period, gait.period, rtol=1e-11)
+
+
+@pytest.mark.slow
+def test_a_sampled_law_whose_samples_restart_at_strikes_has_a_gait_and_its_derivatives() -> None:
+    plain, _ = walker()
+    model = plain.without("left hold", "right hold", "left back", "right back")
+    joints = {joint.name: joint for joint in model.joints}
+
+    def hold(q: Any, v: Any) -> Any:
+        return 100.0 * (q - math.pi) + 20.0 * v
+
+    model.apply(
+        mbd.SampledLaw("PD", 0.02, {"u": hold}, arguments=("waist.angle", "waist.rate"), delay=0.004,
+                       restart_on=("left foot", "right foot")),
+        mbd.Motor("hold", joints["waist"], torque=lambda u: -u, arguments=["PD.u"]),
+        *(mbd.Motor(f"{side} back", joints[f"{side} hip"], torque={side: lambda u: u}, by="stance", arguments=["PD.u"])
+          for side in ("left", "right")),
+    )  # fmt: skip
+    _, start = walker()
+    start = mbd.assemble(
+        model, {name: start[name] for name in ("left hip.angle", "right hip.angle", "waist.angle")},
+        {name: start[name] for name in ("left hip.rate", "right hip.rate", "waist.rate")}, closed=["left foot"],
+    )  # fmt: skip
+    gait = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+    np.testing.assert_allclose(gait.period, 0.74694, atol=1e-5)  # continuous feedback: 0.746772 s
+
+    def period(change: float) -> float:
+        values = {"PD.period": 0.02 + change}
+        return mbd.limit_cycle(
+            model, gait.state, section="right foot", mirror=("left", "right"), parameters=values
+        ).period
+
+    near, far = (period(h) - period(-h) for h in (1e-5, 2e-5))
+    np.testing.assert_allclose(gait.derivatives["period", "PD.period"], (8.0 * near - far) / 12e-5, rtol=1e-5)
