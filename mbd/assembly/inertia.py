@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.assembly.islands import alike_islands, islands_of_rows
 from mbd.assembly.not_finite import first_cause, tape_inputs
 from mbd.assembly.posture import Posture
 from mbd.compile.mechanism import AccelerationTerms
@@ -38,7 +39,7 @@ def undetermined(work: Posture) -> list[str]:
         cause = first_cause(equations, inputs, when=" at the start")
         return [cause or "a mass or a derivative is not finite at the start; check the parameters and functions used"]
     faults, lost = [], []
-    for _, motion in _weak_motions(matrix):
+    for _, motion in _weak_motions(matrix, n):
         weights = np.abs(motion)
         place = int(np.argmax(weights))
         if np.max(weights[:n], initial=0.0) <= 1e-6 * weights[place]:
@@ -63,7 +64,7 @@ def lost_inertia(work: Posture) -> str:
     matrix = _equations(terms, list(work.manager.active_rows(work.flags)))
     if not np.isfinite(matrix).all():
         return ""
-    for size, motion in reversed(_weak_motions(matrix)):
+    for size, motion in reversed(_weak_motions(matrix, n)):
         if np.max(np.abs(motion[:n_v]), initial=0.0) > 1e-6 * np.max(np.abs(motion)):
             name = work.equations.velocity_names[int(np.argmax(np.abs(motion[:n_v])))].removesuffix(".rate")
             return lost_sentence(name, size) if _share(work, motion[:n], terms.M) > SQUARED_ROUND_OFF else ""
@@ -76,13 +77,20 @@ def _equations(terms: AccelerationTerms, picked: list[int]) -> Matrix:
     return np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
 
 
-def _weak_motions(matrix: Matrix) -> list[tuple[float, Vector]]:
+def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
     """Unknowns that the equations, scaled, hardly determine, the weakest last, with their relative singular values."""
     scale = np.sqrt(np.max(np.abs(matrix), axis=1))
     scale[scale == 0.0] = 1.0
-    _, sizes, right = np.linalg.svd(matrix / np.outer(scale, scale))
-    relative = sizes / max(sizes[0], 1e-300)
-    return [(float(size), way / scale) for size, way in zip(relative, right, strict=True) if size < SUSPECT]
+    scaled, found, largest = matrix / np.outer(scale, scale), list[tuple[float, Vector]](), 1e-300
+    for islands in alike_islands(scaled, n):
+        _, sizes, right = np.linalg.svd(scaled[islands[:, :, np.newaxis], islands[:, np.newaxis]])
+        largest = max(largest, float(np.max(sizes)))
+        for place, k in zip(*np.nonzero(sizes < len(matrix) * SUSPECT), strict=True):
+            motion = np.zeros(len(matrix))
+            motion[islands[place]] = right[place, k]
+            found.append((float(sizes[place, k]), motion / scale))
+    weak = [(size / largest, motion) for size, motion in found if size / largest < SUSPECT]
+    return sorted(weak, key=lambda each: -each[0])
 
 
 def lost_sentence(name: str, size: float) -> str:
@@ -115,11 +123,21 @@ def _share(work: Posture, motion: Vector, M: Matrix) -> float:
 def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
     """Motions that the rows allow and whose kinetic energy would be negative."""
     scale = np.sqrt(np.abs(np.diag(M)) + 1e-300)
-    free = np.linalg.svd(B / scale, full_matrices=True)[2][len(B) :].T if len(B) else np.eye(len(M))
-    values, directions = np.linalg.eigh(free.T @ (M / np.outer(scale, scale)) @ free)
-    if not len(values) or values[0] > -1e-9:
+    scaled, rows = M / np.outer(scale, scale), B / scale
+    least, motion = -1e-9, np.zeros(0)
+    for own, lines in islands_of_rows(scaled, rows):
+        held = lines.shape[1]
+        free = np.linalg.svd(rows[lines[:, :, np.newaxis], own[:, np.newaxis]])[2][:, held:] if held else None
+        block = scaled[own[:, :, np.newaxis], own[:, np.newaxis]]
+        values, directions = np.linalg.eigh(block if free is None else free @ block @ np.swapaxes(free, 1, 2))
+        if values.size and np.min(values[:, 0]) <= least:
+            place = int(np.argmin(values[:, 0]))
+            least, motion = float(values[place, 0]), np.zeros(len(M))
+            way = directions[place, :, 0]
+            motion[own[place]] = np.abs(way if free is None else free[place].T @ way)
+    if not len(motion):
         return []
-    motion = np.abs(free @ directions[:, 0]) / scale
+    motion = motion / scale
     name = work.equations.velocity_names[int(np.argmax(motion))].removesuffix(".rate")
     guilty = [
         f"{each.name!r} is {value:g}"

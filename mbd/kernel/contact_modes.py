@@ -16,7 +16,8 @@ from mbd.kernel.codes import (
 from mbd.kernel.complementarity import complementarity
 from mbd.kernel.cones import aim, follows, hold_directions
 from mbd.kernel.impact_solve import strikes
-from mbd.kernel.records import Balance, Frictions, Guards, Sizes, Switching
+from mbd.kernel.islands import find_islands
+from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Sizes, Switching
 from mbd.kernel.restart import active_rows, capture, evaluate, row_speed, take_consistent
 from mbd.kernel.roots import sqrt
 from mbd.kernel.saddle import solve_rows
@@ -210,34 +211,87 @@ def find_painleve_contacts(K: Balance) -> int:
     """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
 
     ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,
-    Eur. J. Mech. A 18:653). K.jump and K.impulse are kept.
+    Eur. J. Mech. A 18:653). Contacts of different islands are tested together, one of each in a turn. K.jump and
+    K.impulse are kept.
     """
-    n = K.n
+    turns = take_turns(K)
+    if turns == 0:
+        return -1
+    K.trial_jump[: K.n] = K.jump[: K.n]
+    K.trial[: K.n_rows] = K.impulse[: K.n_rows]
+    K.bias[: K.n_rows] = 0.0
+    found = -1
+    for turn in range(turns):
+        if found < 0 and push_on(K, turn, -1) == 0:
+            found = approaching(K, turn)
+            continue
+        for c in range(K.n_contacts):  # one of them cannot be solved for: each alone
+            if found < 0 and K.turn[c] == turn and push_on(K, turn, c) == 0 and approaches(K, c):
+                found = c
+    K.jump[: K.n] = K.trial_jump[: K.n]
+    K.impulse[: K.n_rows] = K.trial[: K.n_rows]
+    return found
+
+
+def take_turns(K: Balance) -> int:
+    """K.turn of each contact that slides, −1 of others: its number among those of its island; how many turns."""
+    turns = 0
+    for c in range(K.n_contacts):
+        K.turn[c] = -1
+        K.cone_flags[c] = K.active[c]
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
-        if c < 0 or K.sticks[f] == 1 or K.slip[f] == 0.0 or K.loose[f] > 0 or K.closed[c] == 0:
-            continue
-        normal = K.normal[c]
-        for i in range(n):
-            K.trial_jump[i] = K.jump[i]
-            K.force[i] = -K.acc[K.acc_R + i * K.n_rows + normal]
-        for k in range(K.n_rows):
-            K.trial[k] = K.impulse[k]
-            K.bias[k] = 0.0
-        before = K.active[c]
-        K.active[c] = 1
-        K.parting[c] = 1
-        status = solve_rows(K, active_rows(K, K.active), True)
-        K.parting[c] = 0
-        K.active[c] = before
-        gained = 0.0
-        alone = 0.0  # of the same push if no other row held
-        for j in range(n):
-            slope = K.acc[K.acc_B + normal * n + j]
-            gained += slope * K.jump[j]
-            alone += slope * slope / K.acc[j * n + j] if K.acc[j * n + j] > 0.0 else 0.0
-        K.jump[:n] = K.trial_jump[:n]
-        K.impulse[: K.n_rows] = K.trial[: K.n_rows]
-        if status == 0 and gained < -1e-9 * alone:
-            return int(c)
+        if c >= 0 and K.sticks[f] == 0 and K.slip[f] != 0.0 and K.loose[f] == 0 and K.closed[c] == 1:
+            K.turn[c] = 0
+            K.active[c] = 1
+            turns = 1
+    if turns == 0:
+        return 0
+    m = active_rows(K, K.active)
+    islands = find_islands(K, m)
+    K.own_columns[:islands] = 0
+    for k in range(m):
+        c = K.row_contact[K.rows[k]]
+        if c >= 0 and K.turn[c] == 0 and K.row_normal[K.rows[k]] == 1:
+            island = K.island[K.n + k]
+            K.turn[c] = K.own_columns[island]
+            K.own_columns[island] += 1
+            turns = max(turns, K.own_columns[island])
+    for c in range(K.n_contacts):
+        K.active[c] = K.cone_flags[c]
+    return turns
+
+
+def push_on(K: Balance, turn: int, only: int) -> int:
+    """K.jump under a push of one on each contact of a turn, or on `only` one of them; a status."""
+    K.force[: K.n] = 0.0
+    for c in range(K.n_contacts):
+        if K.turn[c] == turn and (only < 0 or only == c):
+            K.active[c] = K.parting[c] = 1
+            for i in range(K.n):
+                K.force[i] -= K.acc[K.acc_R + i * K.n_rows + K.normal[c]]
+    status = solve_rows(K, active_rows(K, K.active), True)
+    for c in range(K.n_contacts):
+        if K.turn[c] == turn:
+            K.parting[c] = 0
+            K.active[c] = K.cone_flags[c]
+    return int(status)
+
+
+def approaching(K: ContactForces, turn: int) -> int:
+    """The first contact of a turn that approaches under its push, −1 if none does."""
+    for c in range(K.n_contacts):
+        if K.turn[c] == turn and approaches(K, c):
+            return c
     return -1
+
+
+def approaches(K: ContactForces, c: int) -> bool:
+    """Whether a contact approaches in K.jump, beyond round-off of the same push where no other row held."""
+    gained = 0.0
+    alone = 0.0
+    for j in range(K.n):
+        slope = K.acc[K.acc_B + K.normal[c] * K.n + j]
+        gained += slope * K.jump[j]
+        alone += slope * slope / K.acc[j * K.n + j] if K.acc[j * K.n + j] > 0.0 else 0.0
+    return gained < -1e-9 * alone

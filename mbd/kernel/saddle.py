@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.codes import CONFLICT, DEPENDENT, EPS, NOT_FINITE
+from mbd.kernel.islands import find_islands, gather_island, saddle_entry
 from mbd.kernel.linear import MOST_ROUND_OFF, eliminate, factor, round_off, sum_of_sizes
 from mbd.kernel.ordered import LOSS_AT_ONCE, OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_ordered
 from mbd.kernel.records import Balance, DependentRows, Equations
-from mbd.kernel.redundancy import find_dependent, find_shares, shared, sharing, spread, take_shares
+from mbd.kernel.redundancy import find_dependent, find_shares, sharing, spread, take_shares
 
 __all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_at", "solve_rows"]
 
@@ -175,32 +176,56 @@ def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
     o = 0 if together else order_at(K, m)
     if o > 0 and factor_ordered(K, K.acc, o, OF_ACCELERATIONS, LOSS_AT_ONCE):  # far from any loss of rank
         return solve_in_order(K, m)
+    islands = 1
+    if together:  # shares of dependent rows may couple any two
+        K.island[:size] = 0
+    else:
+        islands = find_islands(K, m)
+    K.impulse[: K.n_rows] = 0.0
+    rank = 0
+    last = size
+    for island in range(islands):
+        members = gather_island(K, m, island)
+        found = solve_island(K, members, together, tolerance)
+        if found < 0:
+            return found
+        for k in range(members):
+            if k < found:
+                K.columns[rank + k] = K.members[K.own_columns[k]]
+            else:
+                last -= 1
+                K.columns[last] = K.members[K.own_columns[k]]
+        rank += found
+    return rank
+
+
+def solve_island(K: Balance, size: int, together: bool, tolerance: float) -> int:
+    """w and λ of the unknowns in K.members, which nothing couples to others; the rank, or minus a failure."""
+    n = K.n
     A = K.kkt
-    for i in range(n):
-        A[i * size : i * size + n] = K.acc[i * n : i * n + n]
-        for k in range(m):
-            A[i * size + n + k] = K.acc[K.acc_R + i * K.n_rows + K.rows[k]]
-            if together:
-                A[i * size + n + k] += shared(K, i, K.rows[k])
-        K.rhs[i] = -K.force[i]
-    for k in range(m):
-        row = K.rows[k]
-        A[(n + k) * size : (n + k) * size + n] = K.acc[K.acc_B + row * n : K.acc_B + row * n + n]
-        A[(n + k) * size + n : (n + k) * size + n + m] = 0.0
-        K.rhs[n + k] = -K.bias[row]
+    for a in range(size):
+        u = K.members[a]
+        for b in range(size):
+            A[a * size + b] = saddle_entry(K, u, K.members[b], together)
+        K.rhs[a] = -K.force[u] if u < n else -K.bias[K.rows[u - n]]
     if not sum_of_sizes(A, size * size) + sum_of_sizes(K.rhs, size) < 1e300:
         return -NOT_FINITE
-    rank = int(eliminate(A, size, K.rhs, K.columns, K.work, tolerance))
+    rank = int(eliminate(A, size, K.rhs, K.own_columns, K.work, tolerance))
     for k in range(rank):
         K.least_pivot = min(K.least_pivot, abs(A[k * size + k]))
     if rank < 0:
-        K.failure_index = K.columns[-1 - rank]
+        K.failure_index = K.members[K.own_columns[-1 - rank]]
         for k in range(-1 - rank, size):
-            i = K.columns[k]
+            i = K.members[K.own_columns[k]]
             if i < n and K.acc[i * n + i] > 0.0:
                 K.failure_index = i
         return -CONFLICT
-    take_solution(K, m)
+    for a in range(size):
+        u = K.members[a]
+        if u < n:
+            K.jump[u] = K.rhs[a]
+        else:
+            K.impulse[K.rows[u - n]] = K.rhs[a]
     return rank
 
 

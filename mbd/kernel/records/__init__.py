@@ -23,7 +23,7 @@ anchors. An index that is itself read from an array stays within these because o
 
 row_contact, row_friction, friction_row, friction_contact, normal, while_target, when_target, anchor_start
     by the active set, from the equations; no run writes them.
-rows, columns, pivots, support, cone_rows, event_kind, event_index
+rows, columns, pivots, support, cone_rows, members, own_columns, event_kind, event_index
     by the kernel, in the loop that counts them, before they are read.
 mode_code, mode_order, orders
     by `Stepper.add_mode`, for the mode whose number is below n_modes.

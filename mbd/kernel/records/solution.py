@@ -58,6 +58,7 @@ class Complementarity(SchemeAbilities):
     cone_normal: Integers = integers(lambda s: s.n_contacts)  # its number among the unknowns, −1 for none
     cone_flags: Integers = integers(lambda s: 2 * s.n_contacts + s.n_frictions)  # branches before such a problem
     cone_dropped: Integers = integers(lambda s: s.n_unknowns)  # dependent rows before it
+    turn: Integers = integers(lambda s: s.n_contacts)  # in which each is tested for Painlevé's paradox, −1 for none
     cone_slips: Reals = reals(lambda s: s.n_frictions)
     brink: Reals = reals(lambda s: s.n_rows)  # multipliers at the largest load that sticks: see `mbd.kernel.cone_loads`
     rise: Reals = reals(lambda s: s.n_frictions)  # what a push of one more adds to each limit
@@ -107,6 +108,9 @@ class LinearAlgebra(SchemeAbilities):
     spare: Reals = reals(lambda s: 2 * s.n_kkt * (s.n_kkt + 1) + s.n + 2 * s.n_rows + s.n_rows * s.n)
     pivots: Integers = integers(lambda s: s.n_kkt)
     columns: Integers = integers(lambda s: s.n_kkt)
+    island: Integers = integers(lambda s: s.n_kkt)  # number of the island of each unknown: see `mbd.kernel.islands`
+    members: Integers = integers(lambda s: s.n_kkt)  # unknowns of one
+    own_columns: Integers = integers(lambda s: s.n_kkt)  # `columns` of one
 
 
 class Results(SchemeAbilities):

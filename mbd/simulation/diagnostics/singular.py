@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbd.assembly.islands import islands_of_rows
 from mbd.kernel import codes
 
 if TYPE_CHECKING:
@@ -171,5 +172,14 @@ def _part_left(terms: AccelerationTerms, rows: Sequence[int]) -> tuple[float, in
     jacobian = terms.B[list(rows)] / np.sqrt(np.where(mass > 0.0, mass, 1.0))
     if not np.isfinite(jacobian).all():
         return np.inf, 0, 0.0
-    left, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
-    return float(sizes[-1]), int(np.argmax(np.abs(left[:, -1]))), float(sizes[0])
+    least, weakest, largest = np.inf, 0, 0.0
+    for own, lines in islands_of_rows(np.zeros_like(terms.M), jacobian):
+        if not lines.shape[1]:
+            continue
+        left, sizes, _ = np.linalg.svd(jacobian[lines[:, :, np.newaxis], own[:, np.newaxis]], full_matrices=False)
+        smallest = sizes[:, -1] if own.shape[1] >= lines.shape[1] else np.zeros(len(lines))
+        place, largest = int(np.argmin(smallest)), max(largest, float(np.max(sizes, initial=0.0)))
+        if smallest[place] < least:
+            part = np.abs(left[place, :, -1]) if own.shape[1] else np.ones(1)
+            least, weakest = float(smallest[place]), int(lines[place, np.argmax(part)])
+    return least, weakest, largest
