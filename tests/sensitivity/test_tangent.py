@@ -14,6 +14,7 @@ from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.run_data import unknown
 from mbd.sensitivity.tangent.printer import LANES, tangent_text
 from mbd.sensitivity.walk import Walk
+from tests.gait.test_gaits_with_modes import walker as walker_with_modes
 from tests.sensitivity.test_cones import box
 from tests.sensitivity.turns import judged
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
@@ -112,6 +113,14 @@ def test_a_walker_by_every_scheme(forced):
     runs = [mbd.simulate(model, start, scheme, dt=0.005, until="right foot") for scheme in SCHEMES]
     assert all(len(run.events) == 4 for run in runs)
     assert max(both(forced, *((run, names) for run in runs))) < 2e-8
+
+
+def test_modes_with_timers_and_memories_have_derivatives_without_a_form_of_their_own(forced):
+    model, start = walker_with_modes(remembers=True)
+    names = ["left hip.angle.rate", "waist.angle", "torso.mass"]
+    runs = [mbd.simulate(model, start, scheme, dt=0.005, until=1.2) for scheme in (SCHEMES[0], SCHEMES[3])]
+    assert sum(event.kind == "event" for event in runs[0].events) == 4
+    assert max(both(forced, *((run, names) for run in runs))) < 1e-8
 
 
 @pytest.mark.parametrize(

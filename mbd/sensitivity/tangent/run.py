@@ -75,6 +75,7 @@ class TangentStepper(Stepper):
         """Parameters that have derivatives."""
         self.places = tuple(places)
         self._programs = list(derivatives_of_programs(self.mechanism, self.places))
+        assert len(self._programs) == len(self.functions)  # in the same order
 
     def add_mode(self) -> None:
         count = int(self.kernel.n_modes)
