@@ -25,7 +25,7 @@ from mbd.equations.cost import operations
 from mbd.equations.derivation import derive
 from mbd.kernel.active_set import ActiveSetManager
 
-__all__ = ["flight", "measure", "on_two_feet"]
+__all__ = ["flight", "measure", "on_two_feet", "pinocchio_tree"]
 
 DT, STEPS = 1e-3, 200
 CALLS = 200
@@ -112,8 +112,8 @@ def _step(title: str, samples: Mapping[str, Samples], name: str, other: float | 
     return Figure(title, value, "µs", None, yardstick, other, aim, spread=long.spread)
 
 
-def _of_pinocchio() -> Callable[[], None] | None:
-    """Calls of `computeABADerivatives` for the tree of the person in flight."""
+def pinocchio_tree() -> tuple[Any, Any] | None:
+    """The module of pinocchio and the tree of the person in flight; None where it is not installed."""
     try:
         import pinocchio as pin
     except ImportError:
@@ -127,6 +127,15 @@ def _of_pinocchio() -> Callable[[], None] | None:
         held[body.name] = parent
         solid = pin.Inertia(body.mass, np.array(body.center.offset), np.diag(body.inertia))
         tree.appendBodyToJoint(parent, solid, pin.SE3.Identity())
+    return pin, tree
+
+
+def _of_pinocchio() -> Callable[[], None] | None:
+    """Calls of `computeABADerivatives` for that tree."""
+    found = pinocchio_tree()
+    if found is None:
+        return None
+    pin, tree = found
     data, nv = tree.createData(), tree.nv
     q, v = pin.integrate(tree, pin.neutral(tree), np.linspace(-0.3, 0.4, nv)), np.linspace(-1.0, 1.0, nv)
 

@@ -11,7 +11,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from benchmarks import basins, compiling, counts, cycles, derivatives, gait, people, startup, steps, watching
+from benchmarks import (
+    basins,
+    compiling,
+    counts,
+    cycles,
+    derivatives,
+    gait,
+    laboratory,
+    people,
+    startup,
+    steps,
+    watching,
+)
 from benchmarks.figures import Figure
 from benchmarks.handwritten import FLAGS, compiler, compiler_version
 
@@ -19,7 +31,19 @@ __all__ = ["BASELINE", "GROUPS", "RESULTS", "Record", "load", "measure"]
 
 HERE = Path(__file__).parent
 BASELINE, RESULTS = HERE / "baseline.json", HERE / "results.json"
-GROUPS = ("counts", "steps", "watching", "gait", "cycles", "basins", "derivatives", "compiling", "people", "startup")
+GROUPS = (
+    "counts",
+    "steps",
+    "watching",
+    "gait",
+    "cycles",
+    "basins",
+    "derivatives",
+    "compiling",
+    "people",
+    "laboratory",
+    "startup",
+)
 C_STEP = "step, compass, 4 dof + 2 rows, index 3"
 
 
@@ -66,6 +90,8 @@ def measure(repeats: int, groups: Iterable[str] = GROUPS) -> Record:
         figures += compiling.measure(repeats)
     if "people" in groups:
         figures += people.measure(repeats)
+    if "laboratory" in groups:
+        figures += laboratory.measure(repeats)
     if "startup" in groups:
         figures += startup.measure(repeats)
     return Record(tuple(figures), {**_machine(), "load before": busy, "load after": load(), "repeats": repeats})

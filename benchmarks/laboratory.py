@@ -1,0 +1,98 @@
+"""A gait laboratory's day: moments and postures of a person of 34 degrees of freedom, frame by frame.
+
+Inverse dynamics is measured from arrays of angles to moments by name, beside pinocchio's `rnea` of the same tree called
+frame by frame from Python where that is installed; inverse kinematics from 40 markers with errors of 5 mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+import mbd
+from benchmarks.figures import Figure, interleaved
+from benchmarks.people import pinocchio_tree
+from benchmarks.stopwatch import processor_seconds
+from mbd.compile.background import finish
+from mbd.compile.mechanisms import mechanism_of
+from mbd.laboratory.marker_program import marker_program
+
+__all__ = ["measure"]
+
+FRAMES, MARKED = 2000, 500
+"""Frames of inverse dynamics, and of inverse kinematics."""
+PLACES = [(0.06, -0.05, 0.08), (-0.07, -0.2, -0.05), (0.03, -0.3, 0.1)]
+"""Markers on each segment [m]; 40 of them are taken."""
+
+
+def measure(repeats: int) -> list[Figure]:
+    """Microseconds of a frame."""
+    person = mbd.human(70.0, 1.75)
+    names = [f"{name} {k}" for name in person.bodies for k in range(len(PLACES))][:40]
+    for name in names:
+        segment, _, place = name.rpartition(" ")
+        mbd.Marker(name, person.bodies[segment], PLACES[int(place)])
+    model = mbd.Model("patient")
+    model.connect(*person.joints)
+    motion, recording = _motion(model, FRAMES), _recording(model, person, names)
+    tasks: dict[str, Callable[[], float]] = {
+        "moments": partial(processor_seconds, mbd.inverse_dynamics, model, motion),
+        "postures": partial(processor_seconds, mbd.inverse_kinematics, model, recording),
+    }
+    for task in tasks.values():
+        task()
+    finish()
+    calls = _rnea()
+    if calls is not None:
+        tasks["pinocchio"] = partial(processor_seconds, calls)
+    samples = interleaved(tasks, repeats)
+    other = samples["pinocchio"].least / FRAMES * 1e6 if calls is not None else None
+    yardstick, ratio = ("", None) if other is None else ("rnea from Python", 1.5)
+    moments, postures = samples["moments"], samples["postures"]
+    value = moments.least / FRAMES * 1e6
+    return [
+        Figure("inverse dynamics, a frame", value, "µs", 20.0, yardstick, other, ratio, moments.spread),
+        Figure("inverse kinematics, a frame", postures.least / MARKED * 1e6, "µs", 1000.0, spread=postures.spread),
+    ]
+
+
+def _motion(model: mbd.Model, count: int) -> dict[str, np.ndarray]:
+    """All coordinates with rates and accelerations."""
+    equations, rng = mechanism_of(model).equations, np.random.default_rng(0)
+    whole = equations.configuration
+    q = whole.normalise(rng.normal(size=(count, equations.n_q)))
+    motion = {"time": np.arange(float(count))} | dict(zip(whole.names, q.T, strict=True))
+    for name in equations.velocity_names:
+        motion[name], motion[f"{name.removesuffix('.rate')}.acceleration"] = rng.normal(size=(2, count))
+    return motion
+
+
+def _recording(model: mbd.Model, person: mbd.Human, names: list[str]) -> mbd.Recording:
+    """A smooth motion of all joints, filmed."""
+    mechanism, rng = mechanism_of(model), np.random.default_rng(1)
+    time, n_v = np.arange(MARKED) / 100.0, mechanism.equations.n_v
+    x = 0.2 * rng.normal(size=n_v) * np.sin(5.0 * time[:, None] + 3.0 * rng.normal(size=n_v))
+    start = mbd.assemble(model, position=person.standing(0.3))
+    q = mechanism.equations.configuration.compose(np.array(start.q), x)
+    places, _ = marker_program(mechanism, names, [], [], []).at_all(time, q, mechanism.parameters())
+    places = places + 0.005 * rng.normal(size=places.shape)
+    return mbd.Recording(time, {name: places[:, 3 * k : 3 * k + 3] for k, name in enumerate(names)})
+
+
+def _rnea() -> Callable[[], None] | None:
+    """As many calls of `rnea` as there are frames."""
+    found = pinocchio_tree()
+    if found is None:
+        return None
+    pin, tree = found
+    data, nv, rng = tree.createData(), tree.nv, np.random.default_rng(2)
+    q = [pin.integrate(tree, pin.neutral(tree), each) for each in rng.normal(size=(FRAMES, nv))]
+    v, a = rng.normal(size=(2, FRAMES, nv))
+
+    def calls() -> None:
+        for k in range(FRAMES):
+            pin.rnea(tree, data, q[k], v[k], a[k])
+
+    return calls
