@@ -93,6 +93,7 @@ if TYPE_CHECKING:
         DCMotor as DCMotor,
         Motor as Motor,
         Potential as Potential,
+        Rotor as Rotor,
         Samples as Samples,
         Spring as Spring,
         TabulatedSpring as TabulatedSpring,
@@ -226,7 +227,7 @@ _HOMES = {
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
-    "mbd.forces": "Applied Bushing DCMotor Damper Motor Potential Samples Spring TabulatedSpring TorsionSpring "
+    "mbd.forces": "Applied Bushing DCMotor Damper Motor Potential Rotor Samples Spring TabulatedSpring TorsionSpring "
     "bias_forces mass_matrix",
     "mbd.gait.basin.basin": "basin",
     "mbd.gait.basin.result": "Basin",

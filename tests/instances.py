@@ -188,6 +188,7 @@ FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
         "force in axes of its body",
         lambda a, b, joint: mbd.Applied("force", a, force=(2.0, 3.0, 4.0), torque=(0.5, -1.0, 2.0), axes=a),
     ),
+    ("rotor", lambda a, b, joint: mbd.Rotor("force", joint, 2e-3, ratio=9.0)),
     (
         "bushing",
         lambda a, b, joint: mbd.Bushing(

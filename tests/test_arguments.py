@@ -47,6 +47,7 @@ WORDS = {
     mbd.Samples: ([0.0, 1.0], [0.0, 1.0]),
     mbd.Spring: ("spring", *FRAMES, 1.0),
     mbd.TabulatedSpring: ("spring", HINGE, (-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)),
+    mbd.Rotor: ("rotor", HINGE, 1e-3),
     mbd.TorsionSpring: ("spring", HINGE, 1.0),
     mbd.Bilateral: ("rail", mbd.flexion(HINGE)),
     mbd.Controller: ("brain", lambda time, values, state: None, 0.1),

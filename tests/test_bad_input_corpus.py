@@ -109,7 +109,7 @@ EXAMPLES: dict[str, Any] = {
 """A right argument by the name of its parameter."""
 
 OWN: dict[tuple[str, str], Any] = {
-    ("Stribeck", "kinetic"): 0.4, ("LuGre", "kinetic"): 0.4,
+    ("Stribeck", "kinetic"): 0.4, ("LuGre", "kinetic"): 0.4, ("Rotor", "inertia"): 1e-3,
     ("Applied", "force"): (1.0, 0.0, 0.0), ("accuracy", "until"): 0.1, ("effects", "until"): 0.1,
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
     ("Nonholonomic", "arguments"): ("hinge.rate",), ("Rolling", "center"): END,

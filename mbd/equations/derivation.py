@@ -32,6 +32,7 @@ from mbd.equations.states import state_balance
 from mbd.equations.switching_times import table_faults
 from mbd.equations.whole_body import offer_whole_body
 from mbd.errors import ModelError
+from mbd.forces.rotor import Rotor
 from mbd.joints.reflected import signs_in_a_mirror
 from mbd.tape.derivatives import live
 from mbd.tape.functions import cos
@@ -101,10 +102,12 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
     vectors = all(joint.is_vector for joint in plan.edges)
     masses = {body.body.name: body.body.mass_properties(scope) for body in moving}
     dynamics = Dynamics(moving, masses, scope.placement, scope.views, scope.inputs)
-    scope.offer_inertia(dynamics)
+    scope.offer_inertia(dynamics, [force for force in model.forces if isinstance(force, Rotor)])
     gathered = Gathered()
     found = causes(scope, (*plan.edges, *plan.cut), model.forces, gathered)
-    work = sum((cause.work for cause in found), Work())
+    work = sum((cause.work + cause.inertia for cause in found), Work())
+    kinetic = sum((cause.kinetic for cause in found if cause.kinetic is not None), dynamics.kinetic())
+    found = [cause for cause in found if cause.works]
     joints = (*plan.edges, *plan.cut)
     written = {name for controller in model.controllers for name in controller.writes}
     always = [*model.bilaterals, *model.nonholonomic]
@@ -130,7 +133,7 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         name=model.name, tape=scope.tape, coordinates=scope.coordinates,
         states=tuple(coordinate for coordinate, _ in scope.states), parameters=scope.parameters.found,
         balance=tuple(balance), rows=tuple(constraints.rows), contacts=tuple(constraints.contacts),
-        guards=tuple(constraints.guards), effects=effects, kinetic=dynamics.kinetic(), potential=potential,
+        guards=tuple(constraints.guards), effects=effects, kinetic=kinetic, potential=potential,
         compose=None if vectors else scope.composed, chart=scope.inputs.chart, configuration=scope.configuration,
         idle=tuple(constraints.idle), output=outputs, output_names=outputs.names,
         velocity_names=scope.configuration.velocity_names, notes=plan.notes,

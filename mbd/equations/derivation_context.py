@@ -22,6 +22,7 @@ from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.parameter_scope import ParameterScope
 from mbd.equations.placement import Placement
 from mbd.errors import UnknownNameError, nearest
+from mbd.forces.rotor import Rotor
 from mbd.joints.base import Joint, row_unit
 from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.tape.derivatives import jvp, live, substitute
@@ -81,6 +82,7 @@ class DerivationContext(ParameterScope):
         self.states: list[tuple[Coordinate, Node]] = []
         self._joints: dict[str, JointMotion] = {}
         self._dynamics: Dynamics | None = None
+        self._rotors: list[Rotor] = []
         self._inertia: tuple[list[list[Node]], list[Node]] | None = None
         self.bodies = self._grown(ground)
         values: list[Scalar] = [node for joint in tree for node in self._tree_motion(joint).coordinates]
@@ -197,12 +199,12 @@ class DerivationContext(ParameterScope):
         value = None if self.quantities.offers(name) else self.parameters.declared(name)
         return self.quantities(name) if value is None else self.parameter(*_owner_and_field(name), value)
 
-    def offer_inertia(self, dynamics: Dynamics) -> None:
-        """Let laws ask for mass matrices."""
-        self._dynamics = dynamics
+    def offer_inertia(self, dynamics: Dynamics, rotors: Sequence[Rotor]) -> None:
+        """Let laws ask for mass matrices, of bodies and of the rotors on joints of the tree."""
+        self._dynamics, self._rotors = dynamics, [each for each in rotors if each.joint.name in self._edges]
 
     def inertia(self, coordinates: Sequence[str]) -> tuple[list[list[Node]], list[Node]]:
-        """M and h of some coordinates of the tree, ``M q̈ + h = τ``, of masses and weight alone.
+        """M and h of some coordinates of the tree, ``M q̈ + h = τ``, of masses, rotors and weight alone.
 
         Raises
         ------
@@ -221,7 +223,11 @@ class DerivationContext(ParameterScope):
         places = [known[name] for name in coordinates]
         if self._inertia is None:
             still: dict[Node, float] = dict.fromkeys(self.inputs.a, 0.0)
-            self._inertia = self._dynamics.mass_matrix(), substitute(self._dynamics.balance(Work()), still)
+            M = [list(line) for line in self._dynamics.mass_matrix()]
+            for rotor in self._rotors:
+                k = self._edges[rotor.joint.name].first
+                M[k][k] = M[k][k] + rotor.reflected(self)
+            self._inertia = M, substitute(self._dynamics.balance(Work()), still)
         M, h = self._inertia
         return [[M[i][j] for j in places] for i in places], [h[i] for i in places]
 

@@ -30,6 +30,7 @@ class Cause:
     column : its kind in the energy ledger, '' for the usual one of its kind
     work : its virtual work, positive on the left-hand side; power : what it gives to the mechanism [W], None if nothing
     potential : stored energy [J]; rates : ż of its first-order states
+    inertia : virtual work of what it moves besides the bodies; kinetic : the energy of that [J]
     """
 
     name: str
@@ -39,10 +40,17 @@ class Cause:
     power: Node | None = None
     potential: Node | None = None
     rates: tuple[tuple[Node, Scalar], ...] = ()
+    inertia: Work = field(default_factory=Work)
+    kinetic: Node | None = None
 
     @property
     def acts(self) -> bool:
         """Whether anything of it is left after folding."""
+        return self.works or self.kinetic is not None
+
+    @property
+    def works(self) -> bool:
+        """Whether it is more than inertia: an effect."""
         parts = [*self.work.multipliers, *self.work.forces]
         return bool(self.rates) or any(not isinstance(part, float) and not part.is_zero for part in parts)
 
@@ -98,6 +106,8 @@ def _force(force: Force, scope: DerivationScope) -> Cause:
     _apply(cause, action.pairs, scope)
     if action.potential is not None:
         _store(cause, action.potential, scope)
+    for velocity, mass in action.inertias:
+        _carry(cause, scope.tape.lift(velocity), scope.tape.lift(mass), scope)
     if action.dissipation is not None:
         _dissipate(cause, scope.tape.lift(action.dissipation), scope)
     return cause
@@ -109,7 +119,11 @@ def _action(force: Force, scope: DerivationScope) -> Action:
     action = called(force, "act", "act(scope)", scope)
     if not isinstance(action, Action):
         raise ModelError(f"{title}: act(scope) must return an mbd.forces.Action, got {action!r}")
-    for field_name, example in (("pairs", "(velocity, force)"), ("rates", "(state, its rate)")):
+    for field_name, example in (
+        ("pairs", "(velocity, force)"),
+        ("rates", "(state, its rate)"),
+        ("inertias", "(velocity, inertia)"),
+    ):
         given = getattr(action, field_name)
         if not has_pairs(given):
             raise ModelError(
@@ -132,6 +146,15 @@ def _apply(cause: Cause, pairs: Iterable[tuple[Scalar, Scalar]], scope: Derivati
         cause.work.on_velocity(lift(velocity), -lift(force))
         power = lift(force * velocity)
         cause.power = power if cause.power is None else cause.power + power
+
+
+def _carry(cause: Cause, velocity: Node, mass: Node, scope: DerivationScope) -> None:
+    """T = ½ J u² with u = φ̇(q, t): ``d/dt ∂T/∂v − ∂T/∂q`` is J u̇ on u."""
+    if mass.is_zero:
+        return
+    cause.inertia.on_velocity(velocity, mass * scope.change(velocity))
+    energy = 0.5 * mass * scope.real(velocity) * scope.real(velocity)
+    cause.kinetic = energy if cause.kinetic is None else cause.kinetic + energy
 
 
 def _dissipate(cause: Cause, D: Node, scope: DerivationScope) -> None:

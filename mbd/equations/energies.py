@@ -123,7 +123,9 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     scope.parameters.expect(system.parameters)
     gathered = Gathered()
     found = causes(scope, (), system.applied, gathered)
-    acting = scope.generalized(sum((cause.work for cause in found), Work()))
+    acting = scope.generalized(sum((cause.work + cause.inertia for cause in found), Work()))
+    carried = sum((cause.kinetic for cause in found if cause.kinetic is not None), tape.zero)
+    found = [cause for cause in found if cause.works]
     balance = [r + f for r, f in zip(balance, acting, strict=True)]
     known = _laws(system, lowering, gathered)
     with gathered.catch():
@@ -133,7 +135,7 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     potential = V
     for effect in effects[len(own) :]:
         potential = potential if effect.potential is None else potential + effect.potential
-    kinetic = energy_of_motion(lowering)
+    kinetic = energy_of_motion(lowering) + carried
     outputs = _outputs(system, lowering, known, effects, kinetic, potential)
     offer_observations(outputs, scope, system.observations)
     return Equations(

@@ -8,12 +8,13 @@ from mbd.forces.dc_motor import DCMotor
 from mbd.forces.inertia import bias_forces, mass_matrix
 from mbd.forces.motor import Motor
 from mbd.forces.potential import Potential
+from mbd.forces.rotor import Rotor
 from mbd.forces.samples import Samples
 from mbd.forces.spring import Spring
 from mbd.forces.tabulated_spring import TabulatedSpring
 from mbd.forces.torsion_spring import TorsionSpring
 
 __all__ = [
-    "Action", "Applied", "Bushing", "DCMotor", "Damper", "Force", "Motor", "Potential", "Samples", "Spring",
+    "Action", "Applied", "Bushing", "DCMotor", "Damper", "Force", "Motor", "Potential", "Rotor", "Samples", "Spring",
     "TabulatedSpring", "TorsionSpring", "bias_forces", "mass_matrix",
 ]  # fmt: skip

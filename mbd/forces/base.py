@@ -29,12 +29,14 @@ class Action:
     potential : V, stored energy [J]; ∂V/∂q enters f
     dissipation : D(v) [W]; ∂D/∂v enters f
     rates : (state z, its rate ż) of first-order states of the force
+    inertias : (u, J) with the kinetic energy ``½ J u²``: u is the rate of a function of the posture, J a constant
     """
 
     pairs: tuple[tuple[Scalar, Scalar], ...] = ()
     potential: Scalar | None = None
     dissipation: Scalar | None = None
     rates: tuple[tuple[Node, Scalar], ...] = ()
+    inertias: tuple[tuple[Scalar, Scalar], ...] = ()
 
 
 class Result(NamedTuple):

@@ -124,8 +124,8 @@ def _words(findings: Findings, force: Force, scope: FreeScope, action: Action) -
     findings.holds("it finds no fault with itself", not faults, "; ".join(faults), "its own faults() complains")
     kinds, law = ("potential", "loss", "applied"), "kind agrees with the action"
     findings.holds(law, force.kind in kinds, f"kind {force.kind!r}", f"kind is one of {kinds}")
-    stores = action.potential is not None
-    sentence = f"kind is {force.kind!r}, and act() gives {'a' if stores else 'no'} potential"
+    stores = action.potential is not None or bool(action.inertias)
+    sentence = f"kind is {force.kind!r}, and act() gives {'a' if stores else 'no'} potential or inertia"
     agrees = stores if force.kind == "potential" else not stores or force.kind == "loss"  # springs beside dampers
     findings.holds(law, agrees, sentence, "the energy ledger files it by its kind")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.values import number
@@ -60,7 +61,7 @@ class Dahl(Loss):
     def rates(self, rate: Scalar, scope: Scope, owner: str) -> StateRates:
         """ż = v − |v| σ z/T."""
         share = self.force(rate, scope, owner) / scope.parameter(owner, "torque", self.torque)
-        speed: Scalar = abs(rate)
+        speed: Any = abs(rate)
         return [(scope.state(owner, "deflection", 0.0), rate - speed * share)]
 
     def elastic(self, scope: Scope, owner: str) -> Scalar:

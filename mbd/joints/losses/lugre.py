@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.values import number
@@ -84,7 +85,7 @@ class LuGre(Loss):
         )
         z: Node = scope.state(owner, "deflection", 0.0)
         steady = kinetic + (static - kinetic) * exp(-((rate / speed) ** 2))
-        fast: Scalar = abs(rate)
+        fast: Any = abs(rate)
         return [(z, rate - stiffness * fast * z / steady)]
 
     def elastic(self, scope: Scope, owner: str) -> Scalar:
