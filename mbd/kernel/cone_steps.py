@@ -13,7 +13,7 @@ A motion that only comes close to rest turns around it in shortened steps, and s
 from __future__ import annotations
 
 from mbd.kernel.codes import STICK
-from mbd.kernel.cone_turns import STABLE, fastest_turn
+from mbd.kernel.cone_turns import STABLE, estimated_turn_rate
 from mbd.kernel.cones import HELD, ONSET, aim, along, speed_of_both
 from mbd.kernel.contact_modes import STILL
 from mbd.kernel.guards import judge
@@ -64,6 +64,7 @@ AT_REST = 1e-10
 def approached_end(K: Guards, t1: float) -> float:
     """Where the step that was to end at t1 ends; K.hold tells which directions are held in it."""
     end = t1
+    rest = 0.0  # time until all that is held is at rest, if it is known
     for f in range(K.n_frictions):
         if K.partner[f] > f and K.slip[f] != 0.0:
             p = K.partner[f]
@@ -86,9 +87,10 @@ def approached_end(K: Guards, t1: float) -> float:
             line = across <= LINE * speed * change
             if straight and (ends or line or h < SHORTEST * K.dt):
                 K.hold[f] = K.hold[p] = HELD
+                rest = max(rest, speed * speed / fall)
             elif fall > 0.0 or across * h > PART * speed * speed:
                 end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
-    if K.begun_step > 0.0 and not turns(K):  # what is held needs the whole step to come to rest
+    if 0.0 < LONGER * K.begun_step < FAR * rest and not turns(K):  # what is held needs a step in which it comes to rest
         K.begun_step = 0.0
     if K.begun_step > 0.0:
         K.begun_step *= LONGER
@@ -97,8 +99,8 @@ def approached_end(K: Guards, t1: float) -> float:
         else:
             K.begun_step = 0.0
     if K.explicit == 1 and K.adaptive == 0:
-        fastest = fastest_turn(K)
-        K.turning_step = max(STABLE / fastest, BRIEFEST_TURN * K.dt) if fastest > 0.0 else 0.0
+        rate = estimated_turn_rate(K)
+        K.turning_step = max(STABLE / rate, BRIEFEST_TURN * K.dt) if rate > 0.0 else 0.0
         if 0.0 < K.turning_step < end - K.time:
             end = K.time + K.turning_step
     return end

@@ -8,20 +8,21 @@ from mbd.kernel.contact_modes import STILL
 from mbd.kernel.records import Guards
 from mbd.kernel.restart import evaluate
 
-__all__ = ["STABLE", "fastest_turn"]
+__all__ = ["STABLE", "estimated_turn_rate"]
 
 STABLE = 2.0
-"""Step times the fastest turn of a direction by friction that explicit schemes take [-].
+"""Step times the estimated rate at which friction turns directions that explicit schemes take [-].
 
 Beyond 2.785 that of order 4 lets what is across the direction grow from round-off until γ has turned away; at the onset
-the true rate is up to a quarter above the one that `fastest_turn` finds.
+true rates were found up to 1.24 times those of `estimated_turn_rate`, so that steps stay below 2.48.
 """
 
 
-def fastest_turn(K: Guards) -> float:
-    """Rate [1/s] at which friction turns γ that it does not point along, Σ limit/(m (‖γ‖ + s)), at most.
+def estimated_turn_rate(K: Guards) -> float:
+    """Estimated rate [1/s] at which friction turns γ that it does not point along, Σ limit/(m (‖γ‖ + s)).
 
-    It is large where γ is small, just after sliding has begun: an explicit scheme must follow it.
+    It is no bound: m is that of the diagonal of M alone, and pushes follow the direction. It is large where γ is small,
+    just after sliding has begun: an explicit scheme must follow it.
     """
     rate = 0.0
     for f in range(K.n_frictions):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import PULL
 from mbd.kernel.cone_contacts import all_hold
-from mbd.kernel.cone_turns import STABLE, fastest_turn
+from mbd.kernel.cone_turns import STABLE, estimated_turn_rate
 from mbd.kernel.cones import HELD, aim, along, pull_of_both
 from mbd.kernel.contact_modes import STILL
 from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
@@ -36,7 +36,7 @@ def hold_for_step(K: Guards, h: float) -> None:
             ay = K.guards0[K.at_slip_rate + p]
             held = FAR * h * sqrt(ax * ax + ay * ay) > sqrt(x * x + y * y)
             K.hold[f] = K.hold[p] = HELD if held else 0.0
-    if K.explicit == 1 and h * fastest_turn(K) > STABLE:
+    if K.explicit == 1 and h * estimated_turn_rate(K) > STABLE:
         hold_all(K)
 
 

@@ -107,7 +107,7 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     while h > SHORTEST * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
         h *= SHORTENING
         status = judged_step(K, h, K.time + h)
-    if K.n_cones > 0 and is_rough(status) and K.explicit == 0 and K.strategy == 0:
+    if K.n_cones > 0 and is_rough(status) and K.strategy == 0:
         status = step_while_turning(K, h)
         h = K.step_taken
     if h < full and (K.paired_step == FIRST or K.paired_step == ALONE):

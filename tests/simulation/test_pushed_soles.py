@@ -46,6 +46,7 @@ def pushed_foot(seed: int, grows: bool) -> tuple[mbd.Model, mbd.State]:
         (1, True, mbd.HHT(0.05), 0.5),
         (7, False, mbd.RadauIIA(), 0.5),
         (23, False, mbd.HHT(0.05), 0.35),
+        (73, True, mbd.RungeKutta853(), 0.45),
     ],
 )
 def test_a_pushed_foot_tips_and_slides_on_its_corners(seed, grows, scheme, until):
