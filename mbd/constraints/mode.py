@@ -39,7 +39,8 @@ class Transition:
     after : time in the state after which it happens [s], > 0; a number is the parameter '<name of the mode>.<source>
         to <target>.after', a text the name of a parameter or quantity, whose value as time passes counts
     only_while : it happens only while this holds at its instant: a contact is closed ('right foot'), another mode is
-        in a state ('other: stance'), or a measure is positive
+        in a state ('other: stance'), or a measure is positive. Where it does not hold, the instant has passed: a timer
+        begins again as the state is entered again
     direction : of `when`: −1 as it falls through zero, +1 as it rises, 0 both
     """
 
@@ -265,7 +266,7 @@ class Mode(Machine):
                     if isinstance(each.after, str):
                         limit: Scalar = scope.named(each.after)
                     else:
-                        limit = scope.parameter(self.name, f"{source} to {each.target}.after", each.after)
+                        limit = scope.parameter(self.name, self._timer(name), each.after)
                     guard, direction = (scope.time - held[SINCE]) - limit, 1
                 found.append(Change(
                     name, self.states.index(source), self.states.index(each.target), guard, direction, each.on or "",
@@ -284,6 +285,10 @@ class Mode(Machine):
             if target is None or not only or target in only:
                 found[place] = gap_of(what, scope)
         return found
+
+    def _timer(self, event: str) -> str:
+        """The name of the parameter of a timer among those of the mode: 'stance to swing.after'."""
+        return f"{event.removeprefix(self.name + SEPARATOR)}.after"
 
     def _event_names(self) -> dict[tuple[Transition, str], str]:
         """The names of the events of its transitions: 'knee phase: stance to swing'."""
@@ -311,9 +316,11 @@ class Mode(Machine):
     def parameters(self) -> dict[str, float]:
         """Times of timers, its own numbers, those that it sets, and those of its measures."""
         found = {f"{self.name}.{label}": value for label, value in self.numbers.items()}
+        names = self._event_names()
         for each in self.transitions:
             if isinstance(each.after, float):
-                found |= {f"{self.name}.{source} to {each.target}.after": each.after for source in each.source}
+                timers = (self._timer(names[each, source]) for source in each.source)
+                found |= {f"{self.name}.{timer}": each.after for timer in timers}
             for word in (each.when, each.only_while):
                 found |= word.parameters() if isinstance(word, Measure) else {}
         for name, values in self.sets.items():

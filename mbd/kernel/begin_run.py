@@ -120,7 +120,9 @@ def set_side(K: Switching, e: int) -> None:
     fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
     doubt = guard_round_off(K, e, K.time, K.q, K.y)
-    if abs(value) <= doubt:
+    if abs(value) <= doubt and K.n_machines > 0 and K.guard_timed[e] == 1:
+        value = -1.0  # a timer that is due
+    elif abs(value) <= doubt:
         value = rate if abs(rate) * K.step > doubt else 0.0
     K.side[e] = 0.0
     K.passing[e] = 0

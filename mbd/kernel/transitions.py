@@ -28,6 +28,8 @@ def find_due(K: Guards) -> None:
         m = K.guard_machine[e]
         if m < 0 or K.guard_timed[e] == 0 or int(K.anchors[K.machine_start[m]]) != K.guard_source[e]:
             continue
+        if K.side[e] > 0.0:  # it has passed while its condition did not hold
+            continue
         due = K.time - K.guards0[K.at_user + e]
         if K.due_guard < 0 or due < K.due_time:
             K.due_time = due

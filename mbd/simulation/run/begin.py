@@ -143,6 +143,8 @@ def set_side(run: RunData, e: int, guards: Vector) -> None:
     n_contacts, n_guards = run.kernel.n_contacts, run.kernel.n_guards
     value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
     doubt = run.stepper.guard_round_off(e)
-    if abs(value) <= doubt:
+    if abs(value) <= doubt and run.manager.guards[e].is_timer:
+        value = -1.0  # it is due
+    elif abs(value) <= doubt:
         value = rate if abs(rate) * run.kernel.step > doubt else 0.0
     run.kernel.side[e] = float(np.sign(value))
