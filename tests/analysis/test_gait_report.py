@@ -255,7 +255,12 @@ def test_runs_stand_beside_each_other_and_gaits_for_runs():
     both = mbd.gait_report(walk(), Gait(), strides=1)
     first, second = "kneed walker (1)", "kneed walker (2)"
     assert [each.name for each in both.walks] == [first, second]
-    assert both.heads[:4] == ("quantity", f"{first}: left", f"{first}: right", f"{first}: Robinson [%]")
+    assert both.heads[:4] == (
+        "quantity",
+        f"{first}: left",
+        f"{first}: right",
+        f"{first}: symmetry index (Robinson) [%]",
+    )
     assert both.walks[0]["speed"] == both.walks[1]["speed"]
     assert "energy of a stride" in repr(both) and "<table" in both._repr_html_()
 

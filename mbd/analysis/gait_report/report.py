@@ -87,7 +87,9 @@ class GaitReport:
         found = ["quantity"]
         for name, walk in own:
             lead = f"{name}: " if name else ""
-            found += [f"{lead}{side.name}" for side in walk.sides] + [f"{lead}{self.symmetry} [{unit}]"]
+            found += [f"{lead}{side.name}" for side in walk.sides] + [
+                f"{lead}symmetry index ({self.symmetry}) [{unit}]"
+            ]
         return tuple(found)
 
     def rows(self) -> list[tuple[str, ...]]:
