@@ -95,7 +95,7 @@ def tangent_run(
         run.begin_tangents(programs.places)
         run.at_start()
         run.seed(start.p[:, some], of_q[:, some], start.y[:, some], start.anchors[:, some], of_e[:, some])
-        _require_same(rows, run, *run.complete())
+        _require_same(rows, run)
         runs.append((run, some.stop - some.start))
 
     def joined(parts: Sequence[Matrix]) -> Matrix:
@@ -198,16 +198,20 @@ def _repeated(rows: RunRows, controller: Any) -> Any:
     return again
 
 
-def _require_same(rows: RunRows, run: TangentRun, trajectory: Any, problem: str) -> None:
-    """Raise where the run with derivatives is another than the run."""
+def _require_same(rows: RunRows, run: TangentRun) -> None:
+    """Go to the end; raise where the run with derivatives is another than the run."""
+    problem, _ = run.march()
     if problem:
         raise AnotherRun(f"the same run with derivatives failed: {problem}")
-    if [(each.kind, each.name) for each in trajectory.events] != [(each.kind, each.name) for each in rows.run.events]:
+    run.collect()
+    run.count_turns()
+    run.stepper.keep_row()
+    run.collect()
+    if [(each.kind, each.name) for each in run.events] != [(each.kind, each.name) for each in rows.run.events]:
         raise AnotherRun("the same run with derivatives has other events, by round-off")
-    q, mine = rows.record.q[-1], trajectory.record.q[-1]
-    if len(rows.record.time) != len(trajectory.time) or not np.max(np.abs(q - mine), initial=0.0) <= SAME * max(
-        1.0, float(np.max(np.abs(q), initial=0.0))
-    ):
+    q = rows.record.q[-1]
+    off = float(np.max(np.abs(q - run.kernel.q[: len(q)]), initial=0.0))
+    if run.stored != len(rows.record.time) or not off <= SAME * max(1.0, float(np.max(np.abs(q), initial=0.0))):
         raise AnotherRun("the same run with derivatives ends elsewhere, by round-off")
 
 
