@@ -30,6 +30,7 @@ from mbd.hardcases import (
     singular_poses,
     sleighs,
     starts,
+    straight_slides,
     tables_and_jumps,
     tiny_steps,
     user_force,
@@ -44,8 +45,8 @@ __all__ = ["CASES"]
 MODULES = (
     absent_effects, balls, blocks, clearances, cradles, driven_leg, four_bars, frictions, governor, grazes, hills,
     knees, light_links, long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations,
-    shakers, singular_poses, sleighs, starts, tables_and_jumps, tiny_steps, user_force, vanishing_forces,
-    walls, wheel,
+    shakers, singular_poses, sleighs, starts, straight_slides, tables_and_jumps, tiny_steps, user_force,
+    vanishing_forces, walls, wheel,
 )  # fmt: skip
 
 
