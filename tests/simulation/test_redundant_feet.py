@@ -189,3 +189,25 @@ def test_tables_pushed_a_little_above_their_limit_slide_on_in_non_smooth_steps(s
         ends = np.array([[each[f"float.{name}"][-1] for name in ("x.rate", "y.rate", "angular_velocity.z")]
                          for each in (run, located)])  # fmt: skip
         assert ends[0] == pytest.approx(ends[1], abs=5.0 * dt / 0.1 * np.max(np.abs(ends[1]))), seed
+
+
+@pytest.mark.parametrize(
+    ("center", "dt", "least"),
+    [(FEET[3][0], 4e-3, 1.9), ((2.0, 0.5), 4e-3, 1.9), ((0.3, 0.1), 1e-3, 1.85)],
+    ids=["a foot", "afar", "beside a foot"],
+)
+def test_a_table_that_turns_and_stops_is_of_second_order(center, dt, least):
+    """Beside a foot its direction turns within a few steps, so that the order of 2 shows from 1 ms on only."""
+    model, rate = table(FEET[3]), 2.0
+    speed = {"float.x.rate": rate * center[1], "float.y.rate": -rate * center[0], "float.angular_velocity.z": rate}
+    start = mbd.assemble(
+        model, position={"float.z": HEIGHT}, velocity=speed, closed=[each.name for each in model.constraints]
+    )
+
+    def end(scheme, dt):
+        run = mbd.simulate(model, start, scheme, dt=dt, until=0.6)
+        return np.array([run[f"float.{name}"][-1] for name in ("x", "y", "rotation_vector.z")])
+
+    exact = end(mbd.RadauIIA(), 5e-4)
+    errors = [np.max(np.abs(end(mbd.HHT(0.05), step) - exact)) for step in (dt, 0.5 * dt)]
+    assert least < np.log2(errors[0] / errors[1]) < 2.1
