@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         Plane as Plane,
         Rolling as Rolling,
         SampledLaw as SampledLaw,
+        SpringLeg as SpringLeg,
         Transition as Transition,
         Unilateral as Unilateral,
         When as When,
@@ -208,10 +209,9 @@ _HOMES = {
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
     "mbd.constraints": "Ball Bilateral Controller Event HystereticStop Impulse KnifeEdge MaxwellStop Mode Nonholonomic "
-    "Penalty "
-    "PenaltyParameters Plane Rolling SampledLaw Transition Unilateral When cone disk_touchdown distance extension "
-    "flexion height measure "
-    "penalty_parameters profile_touchdown rolling_touchdown separation sphere_touchdown touchdown twist",
+    "Penalty PenaltyParameters Plane Rolling SampledLaw SpringLeg Transition Unilateral When cone disk_touchdown "
+    "distance extension flexion height measure penalty_parameters profile_touchdown rolling_touchdown separation "
+    "sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.laboratory.assignment": "assign_plates",
     "mbd.laboratory.force_plate": "ForcePlate",

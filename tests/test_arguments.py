@@ -53,6 +53,7 @@ WORDS = {
     mbd.Controller: ("brain", lambda time, values, state: None, 0.1),
     mbd.Event: ("event", mbd.flexion(HINGE)),
     mbd.Impulse: ("kick", HINGE, 1.0, "foot"),
+    mbd.SpringLeg: ("leg", ROD.end, 1e4, 1.0, 1.2),
     mbd.HystereticStop: ("stop", mbd.flexion(HINGE), 1e3, 0.4, 0.01),
     mbd.MaxwellStop: ("stop", mbd.flexion(HINGE), 1e3, 1e3, 10.0),
     mbd.KnifeEdge: ("knife", ROD.end),

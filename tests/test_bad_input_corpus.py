@@ -93,6 +93,8 @@ EXAMPLES: dict[str, Any] = {
     "size": 1.0,
     "on": "foot",
     "share": 0.4,
+    "hip": END,
+    "touchdown_angle": 1.2,
     "travel": 0.01,
     "branch_stiffness": 1.0,
     "branch_damping": 1.0,

@@ -22,6 +22,7 @@ from mbd.constraints.rolling_touchdown import profile_touchdown, rolling_touchdo
 from mbd.constraints.rules import When
 from mbd.constraints.sampled_law import SampledLaw
 from mbd.constraints.sphere_touchdown import sphere_touchdown
+from mbd.constraints.spring_leg import SpringLeg
 from mbd.constraints.surfaces import Plane
 from mbd.constraints.touchdown import touchdown
 from mbd.constraints.turning_measures import cone, twist
@@ -31,7 +32,7 @@ from mbd.constraints.user_measure import measure
 __all__ = [
     "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "HystereticStop",
     "Impulse", "KnifeEdge", "Law", "MaxwellStop", "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters",
-    "Plane", "Rolling", "SampledLaw", "Transition", "Unilateral", "VelocityConstraint", "When", "cone",
+    "Plane", "Rolling", "SampledLaw", "SpringLeg", "Transition", "Unilateral", "VelocityConstraint", "When", "cone",
     "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
     "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown", "twist",
 ]  # fmt: skip

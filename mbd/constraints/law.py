@@ -70,7 +70,8 @@ class Equation:
 class Drag:
     """A force on the mechanism along a velocity while a contact is closed: its power is force · velocity.
 
-    part : its name in results, 'friction', or 'friction.forward'; drags that have it up to the point are one effect
+    part : its name in results, 'friction', or 'friction.forward'; drags that have it up to the point are one effect, in
+        the ledger of the kind 'friction', under another name of the kind 'penalty'
     may_fold : whether the mechanism may have no motion along it; it is left out then
     """
 

@@ -252,7 +252,8 @@ def _by_force(
         work = Work([], [], [velocity for _, velocity, _ in views], [-force for _, _, force in views])
         moving = [drags[k][1:] for k in own]
         along = dynamics.generalized(work)
-        found.effects.append(drag_effect(f"{word.name} {title}", number, moving, along, scope))
+        column = "friction" if title == "friction" else "penalty"
+        found.effects.append(drag_effect(f"{word.name} {title}", number, moving, along, scope, column))
     return Contact(
         word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,
         generalized=generalized, opens_on=at.opens_on, unit=f"{at.unit}/s" if fast else at.unit, drags=tuple(drags),

@@ -194,13 +194,15 @@ def penalty_effect(
 
 
 def drag_effect(
-    name: str, contact: int, drags: Sequence[tuple[Node, Node]], generalized: Sequence[Node], scope: DerivationScope
-) -> Effect:
+    name: str, contact: int, drags: Sequence[tuple[Node, Node]], generalized: Sequence[Node], scope: DerivationScope,
+    column: str = "friction",
+) -> Effect:  # fmt: skip
     """Forces along velocities, (velocity, force), while a contact is closed."""
     power = scope.tape.zero
     for velocity, force in drags:
         power = power + force * _of_motion(velocity, scope)
-    return Effect(name, "loss", partial(with_states, scope, generalized), power, contact=contact, column="friction")
+    forces = partial(with_states, scope, generalized)
+    return Effect(name, "loss", forces, power, contact=contact, column=column)
 
 
 def _of_motion(velocity: Node, scope: DerivationScope) -> Node:

@@ -136,11 +136,17 @@ def _works(
             moved = [Part(power.name, power.kind, moved[0].energy + work)]
         else:
             part = Part(power.name, power.kind, work)
-            is_own_law = power.kind == "penalty" and power.lost is None
+            is_own_law = power.kind == "penalty" and power.lost is None and not _shares_its_energy(power, found)
             named.append(_withheld_if_unsure(part, float(np.sum(unsure)), least) if is_own_law else part)
         gives = power.name not in lending and np.max(value, initial=0.0) > 0.0
         doubt[0 if gives else 1 :, 1:] += unsure
     return named, moved, np.cumsum(doubt, axis=1)
+
+
+def _shares_its_energy(power: Power, found: list[Power]) -> bool:
+    """Whether a penalty contact acts along other directions too: 'leg' may give what 'leg thrust' takes."""
+    others = [other.name for other in found if other.kind == "penalty" and other.name != power.name]
+    return any(name.startswith(f"{power.name} ") or power.name.startswith(f"{name} ") for name in others)
 
 
 def _trapezoid(time: Vector, power: Vector) -> Vector:
