@@ -37,7 +37,7 @@ def net_moments(equations: Any, ground: Collection[str]) -> Mapping[str, Node]:
             if effect.kind == "gravity" or of_ground or effect.name in dry:
                 continue
             switch = tape.one if effect.contact < 0 else tape.input("switch", effect.contact)
-            for name, force in zip(names, effect.generalized(), strict=True):
+            for name, force in zip(names, effect.generalized(), strict=False):  # first-order states stand behind
                 total[name] = total[name] - switch * force
         x, v = ([tape.input(kind, k) for k in range(len(names))] for kind in ("x", "v"))
         for number, row in enumerate(equations.rows):

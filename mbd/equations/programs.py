@@ -38,8 +38,8 @@ from mbd.tape.node import Node, Scalar
 
 __all__ = [
     "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "free_rates",
-    "guard_terms", "guards", "increment_rates", "is_judged", "mass_matrix", "newton", "residual", "row_forces",
-    "scales", "switched_balance",
+    "guard_terms", "guards", "increment_rates", "is_judged", "loaded_balance", "mass_matrix", "newton",
+    "residual", "row_forces", "scales", "switched_balance",
 ]  # fmt: skip
 
 
@@ -302,7 +302,26 @@ def _balance(
 
     Of rows on velocities λ_k ∂rate_k/∂v.
     """
-    inputs, forces = Inputs.of(equations), _forces(equations, rows, penalties, sliding, rubbed)
+    return _pushed(equations, _forces(equations, rows, penalties, sliding, rubbed))
+
+
+def loaded_balance(equations: Equations) -> list[Node]:
+    """r with every row, dry friction too, acting by its multiplier, and penalties behind switches.
+
+    The multiplier of a friction acts along its slide of now, whatever place its row holds while it sticks.
+    """
+    inputs = Inputs.of(equations)
+    switches = [(c, equations.tape.input("switch", c)) for c in range(len(equations.contacts))]
+    plain = [k for k, row in enumerate(equations.rows) if row.friction < 0]
+    values, multipliers, rates, forces = _forces(equations, plain, switches, ())
+    rates = [*rates, *(friction.rate for friction in equations.frictions)]
+    forces = [*forces, *(inputs.lam[friction.row] for friction in equations.frictions)]
+    return _pushed(equations, (values, multipliers, rates, forces))
+
+
+def _pushed(equations: Equations, forces: Forces) -> list[Node]:
+    """The balance with these forces."""
+    inputs = Inputs.of(equations)
     values, multipliers, rates, rubbing = forces
     if not values and not rates:
         return list(equations.balance)

@@ -17,7 +17,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
-from mbd.equations.programs import row_forces, switched_balance
+from mbd.equations.programs import loaded_balance, row_forces
 from mbd.errors import CapabilityError, ModelError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
@@ -158,7 +158,7 @@ def _program(equations: Equations) -> list[Node]:
     CapabilityError
         where forces depend on the multipliers of these rows by more than R.
     """
-    r = switched_balance(equations)
+    r = loaded_balance(equations)
     rows = list(equations.bilateral)
     columns = row_forces(equations, r, rows) if rows else []
     wide = [entry for column in columns for entry in column[: equations.n_v]]

@@ -335,7 +335,7 @@ def record_of(mechanism: Mechanism, motion: Motion, parameters: Vector | Matrix)
             f"inverse dynamics of a recorded motion does not know {equations.states[0].name!r}, a state of a force; "
             "leave the force out by model.without(…), or give a run"
         )
-    return replace(record, phase=_sliding(equations, record)) if equations.frictions else record
+    return _sliding(equations, record) if equations.frictions else record
 
 
 def _with_forces(equations: Equations, record: Record, run: Trajectory) -> Record:
@@ -376,17 +376,18 @@ def _copy(names: list[str], others: list[str], into: NDArray[Any], source: NDArr
             into[:, k] = source[:, places[name]]
 
 
-def _sliding(equations: Equations, record: Record) -> NDArray[np.int8]:
+def _sliding(equations: Equations, record: Record) -> Record:
     """Dry friction of joints slides in the direction of its rate; that of open contacts is off."""
-    phase = record.phase.copy()
+    phase, lam = record.phase.copy(), record.lam.copy()
     always = [k for k, friction in enumerate(equations.frictions) if friction.contact < 0]
-    rates = array_function([equations.frictions[k].rate for k in always])
+    nodes = [equations.frictions[k].rate for k in always] + [equations.frictions[k].sliding for k in always]
     inputs = {
         "t": record.time, "q": record.q, "v": record.v, "z": record.z, "a": record.a, "s": record.s, "lam": record.lam,
         "anchor": np.zeros((len(record.time), equations.n_anchors)), "switch": record.closed,
         "slip": np.zeros_like(phase),
     }  # fmt: skip
-    found = rates(inputs, record.parameters_at(np.arange(len(record.time), dtype=np.intp)))
-    for k, rate in zip(always, found, strict=True):
+    found = array_function(nodes)(inputs, record.parameters_at(np.arange(len(record.time), dtype=np.intp)))
+    for k, rate, limit in zip(always, found[: len(always)], found[len(always) :], strict=True):
         phase[:, k] = np.sign(rate)
-    return phase
+        lam[:, equations.frictions[k].row] = np.sign(rate) * limit
+    return replace(record, phase=phase, lam=lam)

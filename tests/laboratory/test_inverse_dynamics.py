@@ -130,6 +130,67 @@ def test_the_contact_forces_of_a_run_leave_the_torque_of_its_motor():
     assert whole["hip.net_moment"] == pytest.approx(net, abs=1e-8)
 
 
+def test_friction_that_sticks_and_slides_acts_as_in_the_run():
+    model = mbd.Model("rod")
+    rod = mbd.Link("rod", mass=2.0, length=1.0, center=0.5, inertia=0.3)
+    pin = mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Coulomb(2.0))
+    model.connect(pin)
+    model.apply(mbd.Motor("drive", pin, torque=lambda t: 6.0 * mbd.sin(3.0 * t)))
+    run = mbd.simulate(model, mbd.assemble(model), mbd.RungeKutta853(), tol=1e-8, until=2.0)
+    assert {event.kind for event in run.events} == {"slipped"}
+    passive = model.without("drive")
+    assert mbd.inverse_dynamics(passive, run)["pin.moment"] == pytest.approx(run["drive.torque"], abs=1e-9)
+    time_ = np.linspace(0.0, 2.0, 300)
+    seen = run.at(time_)
+    recorded = {"time": time_} | {f"pin.{part}": seen[f"pin.{part}"] for part in ("angle", "rate", "acceleration")}
+    found = mbd.inverse_dynamics(passive, recorded)["pin.moment"]
+    slides = np.abs(seen["pin.rate"]) > 1e-6
+    assert found[slides] == pytest.approx(seen["drive.torque"][slides], abs=1e-9)
+
+
+def test_a_box_that_slides_in_space_has_no_residual():
+    model = mbd.Model("box")
+    box = mbd.RigidBody("box", mass=2.0, inertia=(0.1, 0.1, 0.1))
+    arm = mbd.Link("arm", mass=1.0, length=0.5, center=0.2, inertia=(0.02, 0.001, 0.02))
+    pin = mbd.Revolute("pin", box.origin, arm.start)
+    model.connect(mbd.Free("base", model.ground.origin, box.origin), pin)
+    feet = [box.point(x, -0.3, z) for x, z in ((-0.2, -0.2), (0.2, -0.2), (0.0, 0.2))]
+    names = [f"foot {k}" for k in range(3)]
+    model.constrain(*(mbd.Unilateral(n, mbd.touchdown(f), friction=0.5) for n, f in zip(names, feet, strict=True)))
+    model.apply(mbd.Motor("drive", pin, torque=lambda t: 4.0 * mbd.sin(8.0 * t)))
+    start = mbd.assemble(model, position={"base.y": 0.3}, velocity={"base.x": 0.5}, closed=names)
+    run = mbd.simulate(model, start, mbd.RadauIIA(), tol=1e-7, until=0.3)
+    found = mbd.inverse_dynamics(model.without("drive"), run)
+    assert found["pin.moment"] == pytest.approx(run["drive.torque"], abs=1e-8)
+    assert np.abs(found["base.residual_force"]).max() < 1e-6
+    assert np.abs(found["base.residual_moment"]).max() < 1e-6
+
+
+def test_states_of_forces_are_those_of_the_run():
+    model = mbd.Model("rod")
+    rod = mbd.Link("rod", mass=2.0, length=1.0, center=0.5, inertia=0.3)
+    pin = mbd.Revolute("pin", model.ground.origin, rod.start)
+    model.connect(pin)
+    model.apply(mbd.DCMotor("motor", pin, resistance=1.0, inductance=0.01, constant=0.1, voltage=1.0))
+    run = mbd.simulate(model, mbd.assemble(model, position={"pin.angle": 0.8}), mbd.RadauIIA(), tol=1e-8, until=0.3)
+    found = mbd.inverse_dynamics(model, run)
+    assert np.abs(found["pin.moment"]).max() < 1e-9
+    assert found["pin.net_moment"] == pytest.approx(run["motor.torque"], abs=1e-9)
+    with pytest.raises(mbd.CapabilityError, match=r"does not know 'motor\.current'"):
+        mbd.inverse_dynamics(model, {"time": [0.0], "pin.angle": [0.0]})
+
+
+def test_a_lagrangian_gives_generalized_forces():
+    import sympy
+
+    theta = mbd.Coordinate("theta")
+    model = mbd.Lagrangian("pendulum", [theta], kinetic=theta.v**2, potential=-3.0 * sympy.cos(theta.q))
+    time_ = np.linspace(0.0, 1.0, 101)
+    found = mbd.inverse_dynamics(model, {"time": time_, "theta": np.sin(time_)})
+    expected = -2.0 * np.sin(time_) + 3.0 * np.sin(np.sin(time_))
+    assert found["theta.moment"][5:-5] == pytest.approx(expected[5:-5], abs=1e-4)
+
+
 def four_bar(drive=None):
     model = mbd.Model("four-bar")
     crank = mbd.Link("crank", mass=1.0, length=0.1, center=0.03, inertia=0.005)
