@@ -137,7 +137,7 @@ def random_box(seed):
         return
     compared()
     most = 1e-7 if "slipped" in kinds else 1e-8
-    assert found is None or np.all(found[0] <= np.maximum(most, 2.0 * found[1])), found
+    assert found is None or np.all(found[0] <= np.maximum(most, 2.0 * found[1])), (seed, found)
 
 
 @pytest.mark.parametrize("dt", [0.005, 0.008])
