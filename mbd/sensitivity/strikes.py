@@ -42,7 +42,7 @@ def struck(
     names = " and ".join(repr(name) for name in sorted(closing))
     which = f"the impact of {names} at t = {before.t:.9g} s (law {law!r}): "
     who = _partners(rows, programs, mode, closing, restitutions)
-    _refuse_falling(programs, who, law, which)
+    _leave_falling(programs, who, law, which)
     if law != "newton" and len(who.touched) > (1 if law == "sequential" else 0):
         try:
             _refuse_chance(programs, before, mode, who, fired)
@@ -101,14 +101,13 @@ def refuse_touching_by_chance(
         raise OneSidedError(str(refused(which + str(reason)))) from None
 
 
-def _refuse_falling(programs: Programs, who: Struck, law: str, which: str) -> None:
+def _leave_falling(programs: Programs, who: Struck, law: str, which: str) -> None:
     """Friction that changes with its slip: its size is that before the impact, in a plane its direction that after."""
     frictions, contacts = programs.equations.frictions, programs.equations.contacts
     falling = [contacts[each.contact].name for each in frictions
                if each.falls and each.contact in who.touched and (each.partner >= 0 or law != "newton")]  # fmt: skip
     if falling:
-        instead = "take a constant coefficient of friction" + ("" if law == "newton" else ", or impact='newton'")
-        raise refused(f"{which}the friction of {falling[0]!r} changes with its slip", instead)
+        raise unknown(f"{which}the friction of {falling[0]!r} changes with its slip")
 
 
 def _refuse_chance(programs: Programs, before: Motion, mode: Mode, who: Struck, fired: int) -> None:

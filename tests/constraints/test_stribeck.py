@@ -118,19 +118,19 @@ def test_an_impact_has_the_size_of_the_slip_before_it(space, speed):
     assert against == pytest.approx([0.6, -0.8] if space else [1.0], abs=1e-9)
 
 
-def test_derivatives_of_an_impact_follow_the_size_of_its_slip():
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+def test_derivatives_of_an_impact_follow_the_size_of_its_slip(space):
     law = mbd.Stribeck(0.8, 0.4, 1.5)
     ends = []
-    for speed in (2.0 - 1e-4, 2.0 + 1e-4):
-        model, start = thrown(law, speed, False)
+    for change in (-1e-4, 1e-4):
+        model, start = thrown(law, 2.0, space)
+        speeds = {"place.x": start["place.x.rate"] + change, **({"place.z": 1.6} if space else {})}
+        start = mbd.assemble(model, position={"place.y": 0.1}, velocity=speeds)
         ends.append(mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.16)["place.x"][-1])
-    model, start = thrown(law, 2.0, False)
+    model, start = thrown(law, 2.0, space)
     run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.16, wrt=["place.x.rate"])
-    slope = (ends[0] - ends[1]) / 2e-4
+    slope = (ends[1] - ends[0]) / 2e-4
     assert run.sensitivities["place.x", "place.x.rate"] == pytest.approx(slope, rel=1e-6)
-    model, start = thrown(law, 2.0, True)
-    with pytest.raises(mbd.CapabilityError, match="the friction of 'foot' changes with its slip"):
-        mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.16, wrt=["place.x.rate"])
 
 
 @pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
