@@ -67,6 +67,13 @@ def test_a_pushed_foot_tips_and_slides_on_its_corners(seed, grows, scheme, until
         assert np.max(np.diff(run.energy[f"sole corner {k} friction"])) <= 1e-9 * np.max(run.energy["kinetic"])
 
 
+def test_switches_without_end_of_an_undamped_scheme_name_a_damped_one():
+    """At 0.452 s this foot meets a Painlevé paradox, before which its force alternates with Newmark's scheme."""
+    model, start = pushed_foot(105, False)
+    run = mbd.simulate(model, start, mbd.Newmark(), dt=2e-3, until=0.5, on_failure="return")
+    assert "at one instant" in run.message and "damps forces that alternate: take mbd.HHT(0.05)" in run.message
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA(), mbd.Newmark()], ids=str)
 def test_pushed_feet_come_to_the_end_of_their_runs(scheme):

@@ -274,8 +274,8 @@ def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[Eve
         message = f"more than {most} switches" if many else "the same switches again and again"
         return (
             f"{message} at one instant: {_last_events(events)}; they "
-            f"follow each other without motion; {_sticking(stepper, events)}give a contact a release rule, friction or "
-            "a penalty law, or an event a reset that leaves zero"
+            f"follow each other without motion; {_undamped(stepper)}{_sticking(stepper, events)}"
+            "give a contact a release rule, friction or a penalty law, or an event a reset that leaves zero"
         )
     if status == codes.NO_IMPACT:
         return (
@@ -294,6 +294,14 @@ def _no_contact(stepper: Stepper, status: int, closed: str, events: Sequence[Eve
         f"makes it approach{closed}; rigid bodies with Coulomb friction have no motion there: lower the "
         "friction coefficient, or make the contact compliant with mbd.Penalty"
     )
+
+
+def _undamped(stepper: Stepper) -> str:
+    """What to try where nothing damps contact forces that alternate from step to step."""
+    v = stepper.kernel
+    if v.explicit or v.estimates or v.gamma != 0.5 or v.alpha_m != v.alpha_f:
+        return ""
+    return "nothing in the scheme damps forces that alternate: take mbd.HHT(0.05); "
 
 
 def _why_singular(stepper: Stepper) -> str:
