@@ -83,10 +83,7 @@ class TangentStepper(Stepper):
         code = self.modes[-1]
         self.kernel.mode_code[PROGRAMS * count + 3] = len(self.functions)
         self.functions.append(code.residual)
-        if self._maker().__name__ == "mode":
-            self._programs += derivatives_of_modes(self.mechanism, code, self.stabilized, self.places)
-        else:
-            self._programs += [self._programs[2]] * (len(self.functions) - len(self._programs))
+        self._programs += derivatives_of_modes(self.mechanism, code, self.stabilized, self.places)
 
     def _advance_compiled(self) -> int:
         for name in TABLE.real_arrays:
