@@ -104,6 +104,11 @@ EXAMPLES: dict[str, Any] = {
     "time": (0.0, 1.0, 2.0),
     "torque": 1.0,
     "until": 0.0,
+    "states": ("swing", "stance"),
+    "period": 0.1,
+    "outputs": {"u": lambda angle: -angle},
+    "source": "swing",
+    "target": "stance",
     "update": lambda time, values, state: None,
     "values": (0.0, 1.0, 2.0),
     "voltage": 1.0,
@@ -111,6 +116,10 @@ EXAMPLES: dict[str, Any] = {
 """A right argument by the name of its parameter."""
 
 OWN: dict[tuple[str, str], Any] = {
+    ("SampledLaw", "arguments"): ("hinge.angle",), ("Transition", "on"): "foot",
+    ("Mode", "transitions"): (
+        mbd.Transition("swing", "stance", after=0.1), mbd.Transition("stance", "swing", after=0.1),
+    ),
     ("Stribeck", "kinetic"): 0.4, ("LuGre", "kinetic"): 0.4, ("Rotor", "inertia"): 1e-3,
     ("Applied", "force"): (1.0, 0.0, 0.0), ("accuracy", "until"): 0.1, ("effects", "until"): 0.1,
     ("Controller", "period"): 0.1, ("Event", "direction"): 0, ("Marker", "place"): (0.1, 0.2), ("Motor", "torque"): 1.0,
@@ -175,6 +184,7 @@ RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
 """Words whose runs take seconds: what is no number at all is tried."""
 RESULTS |= {"Human"}
+RESULTS |= {"bias_forces", "mass_matrix"}  # they take names alone
 GAITS = {"basin", "find_gait", "limit_cycle"}
 """Words that make so many runs that they take machine code."""
 

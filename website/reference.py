@@ -10,12 +10,13 @@ GROUPS = {
     "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody Marker box cylinder disk rod segment "
     "sphere Domain on_slope human Human",
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Spherical Free Weld "
-    "Viscous Quadratic Coulomb Stribeck AffineFriction PinFriction Tabulated Valves Dissipation",
+    "Viscous Quadratic Coulomb Stribeck Dahl LuGre AffineFriction PinFriction Tabulated Valves Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
-    "Nonholonomic Event Mode Transition SampledLaw Controller When touchdown rolling_touchdown profile_touchdown "
-    "disk_touchdown sphere_touchdown Plane Ball height flexion extension cone twist distance separation measure",
-    "Forces": "Spring Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Applied Potential Samples "
-    "mass_matrix bias_forces",
+    "Nonholonomic MaxwellStop HystereticStop Event Impulse Mode Transition SampledLaw Controller When touchdown "
+    "rolling_touchdown profile_touchdown disk_touchdown sphere_touchdown Plane Ball height flexion "
+    "extension cone twist distance separation measure",
+    "Forces": "Spring SpringLeg Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Rotor Applied "
+    "Potential Samples mass_matrix bias_forces",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load batch Batch sweep Sweep latin_hypercube sobol",

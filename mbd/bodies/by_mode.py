@@ -68,6 +68,8 @@ def by_mode_of(value: Any, by: Any, what: str, each: Callable[[Any, str], Any]) 
     if isinstance(value, ByMode):
         return value
     if not isinstance(value, Mapping):
+        if by is not None and (not isinstance(by, str) or not by):
+            raise ModelError(f"{what}: by is the name of a mode, got {by!r}")
         return each(value, what)
     if not isinstance(by, str) or not by:
         raise ModelError(f"{what} is given by state; name the mode too: by='knee phase'")

@@ -54,7 +54,8 @@ class Transition:
 
     def __post_init__(self) -> None:
         put, title = object.__setattr__, f"Transition({self.source!r}, {self.target!r})"
-        sources = (self.source,) if isinstance(self.source, str) else tuple(self.source)
+        several = isinstance(self.source, Iterable) and not isinstance(self.source, str)
+        sources = tuple(self.source) if several else (self.source,)
         if not sources or not all(isinstance(each, str) and each for each in (*sources, self.target)):
             raise ModelError(f"{title} needs the names of the states that it leaves and enters")
         put(self, "source", sources)
@@ -87,7 +88,10 @@ def _measured(value: Any, what: str) -> Measure:
     if isinstance(value, Measure):
         return value
     if isinstance(value, str) or is_expression(value) or callable(value):
-        return measure(value)
+        try:
+            return measure(value)
+        except ModelError as error:
+            raise ModelError(f"{what}: {error}") from error
     raise ModelError(f"{what} is a measure, the name of a quantity, or a function of quantities, got {value!r}")
 
 
@@ -148,6 +152,14 @@ class Mode(Machine):
             raise ModelError(f"{title} needs the names of two states at least, such as ('stance', 'swing')")
         if len(set(states)) < len(states) or any(SEPARATOR in each for each in states):
             raise ModelError(f"{title}: give each state a name of its own, without '{SEPARATOR}'")
+        for kind in ("remembers", "numbers", "sets"):
+            given = getattr(self, kind)
+            if not isinstance(given, Mapping) or not all(isinstance(each, str) and each for each in given):
+                raise ModelError(f"{kind} of {title} maps names to what they stand for, got {given!r}")
+        if not isinstance(self.transitions, Iterable) or isinstance(self.transitions, str):
+            raise ModelError(f"transitions of {title} are a list of mbd.Transition, got {self.transitions!r}")
+        if self.start is not None and not isinstance(self.start, str):
+            raise ModelError(f"start of {title} is the name of a state, got {self.start!r}")
         put(self, "states", states)
         put(self, "start", states[0] if self.start is None else self.start)
         put(self, "transitions", tuple(self.transitions))
@@ -155,7 +167,11 @@ class Mode(Machine):
         if wrong:
             raise ModelError(f"{title}: transitions are mbd.Transition(source, target, …), got {wrong[0]!r}")
         put(self, "remembers", {str(label): _stored(value, self, label) for label, value in self.remembers.items()})
-        put(self, "numbers", {str(each): number(value, f"{each} of {title}") for each, value in self.numbers.items()})
+        put(
+            self,
+            "numbers",
+            {str(each): number(value, f"{each!r} of numbers of {title}") for each, value in self.numbers.items()},
+        )
         put(self, "sets", {name: _numbers(values, self, name) for name, values in self.sets.items()})
         if faults := [*self._name_faults(), *self._label_faults()]:
             raise ModelError(faults)

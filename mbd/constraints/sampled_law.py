@@ -91,6 +91,10 @@ class SampledLaw(Machine):
             put(self, kind, dict(given))
         if not self.outputs:
             raise ModelError(f"{title} has no outputs; give at least one, such as {{'knee motor.torque': f}}")
+        for kind in ("start", "resolution"):
+            given = getattr(self, kind)
+            if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
+                raise ModelError(f"{kind} of {title} maps names to numbers, got {given!r}")
         put(self, "start", {name: number(x, f"start of {name!r} of {title}") for name, x in self.start.items()})
         put(self, "resolution", {name: number(x, f"resolution of {name!r}") for name, x in self.resolution.items()})
         on = (self.restart_on,) if isinstance(self.restart_on, str) else self.restart_on

@@ -49,19 +49,19 @@ def judge_straight_slides(integrator: Any) -> Outcome:
     figures, curves = list[Figure](), list[Curve]()
     for how in steps:
         limit = 1e-8 if "dt" in how else 10.0 * numbers["tol"]
-        said = "" if "dt" in how else f", tol = {numbers['tol']:g}"
+        setting = "" if "dt" in how else f", tol = {numbers['tol']:g}"
         block = mbd.simulate(*sliding_block(), integrator, until=numbers["block_until"], **how)
         ball = mbd.simulate(*rolling_ball(), integrator, until=numbers["ball_until"], **how)
         instants = [next((e.time for e in run.events if e.kind == "stuck"), np.inf) for run in (block, ball)]
         figures += [
-            Figure(f"error of the instants of rest and of rolling [s]{said}",
+            Figure(f"error of the instants of rest and of rolling [s]{setting}",
                    max(abs(instants[0] - stop), abs(instants[1] - grip)), limit),
-            Figure(f"error of the places at the end [m]{said}",
+            Figure(f"error of the places at the end [m]{setting}",
                    max(abs(block["slide.x"][-1] - way), abs(ball["place.x"][-1] - place)), limit),
-            Figure(f"moved to the side [m]{said}",
+            Figure(f"moved to the side [m]{setting}",
                    float(max(np.max(np.abs(block["slide.z"])), np.max(np.abs(ball["place.z"])))), 1e-12),
         ]  # fmt: skip
-        curves.append(Curve(f"speed of the ball{said}", ball.t, ball["place.x.rate"], y_label="[m/s]"))
+        curves.append(Curve(f"speed of the ball{setting}", ball.t, ball["place.x.rate"], y_label="[m/s]"))
     return Outcome(figures, curves)
 
 

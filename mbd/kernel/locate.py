@@ -191,7 +191,7 @@ def find_jump(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def jumps_over_stop(K: Guards, h: float) -> bool:
+def jumps_over_stop(K: Switching, h: float) -> bool:
     """Whether an angle leads past its stop in a step and jumps back to the open side, as a twist does at half a turn.
 
     The contact is open at both ends of the step; the rates there lead to its other side: K.failure_index.

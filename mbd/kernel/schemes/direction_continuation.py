@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import NOT_CONVERGED, STAGNATED
 from mbd.kernel.cones import HELD, ONSET, fill_slips
-from mbd.kernel.records import Mechanism
+from mbd.kernel.records import ContactRows, Frictions
 
 __all__ = ["FOLLOWS", "OWN", "begin_continuation", "continue_directions", "wants_continuation"]
 
@@ -25,7 +25,7 @@ HOLD_FACTOR = 0.25
 """Each K.hold over the one before [-]."""
 
 
-def wants_continuation(K: Mechanism, status: int) -> bool:
+def wants_continuation(K: Frictions, status: int) -> bool:
     """Whether Newton's method has failed in a step in which friction follows γ in a plane."""
     if K.n_cones == 0 or K.strategy == 1 or not (status == NOT_CONVERGED or status == STAGNATED):
         return False
@@ -35,7 +35,7 @@ def wants_continuation(K: Mechanism, status: int) -> bool:
     return found
 
 
-def begin_continuation(K: Mechanism) -> float:
+def begin_continuation(K: Frictions) -> float:
     """Hold all directions; what they did is kept. The hold."""
     for f in range(K.n_frictions):
         K.own_hold[f] = K.hold[f]
@@ -43,7 +43,7 @@ def begin_continuation(K: Mechanism) -> float:
     return HELD
 
 
-def continue_directions(K: Mechanism, hold: float, status: int) -> float:
+def continue_directions(K: ContactRows, hold: float, status: int) -> float:
     """The hold after a solution with this one, in the block; `OWN` where it is the last, or there is no solution."""
     smaller = FIRST_HOLD if hold == HELD else HOLD_FACTOR * hold
     if status != 0 or smaller < ONSET:
