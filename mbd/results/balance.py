@@ -25,7 +25,7 @@ from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
 from mbd.tape.node import Tape
 
-__all__ = ["Balance", "Solved", "put"]
+__all__ = ["Balance", "Held", "Solved", "put", "saddle"]
 
 DEPENDENCE = 1e-6
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-].
@@ -74,7 +74,7 @@ class Solved:
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
+class Held:
     """Rows that hold in one mode.
 
     every : their numbers; kept : those of an independent set, ascending
@@ -96,7 +96,7 @@ class Balance:
         self.states, self.equations = states, states.equations
         self.terms, self.follows = _terms(self.equations)
         self.rubs = any(getattr(contact, "drags", ()) and contact.rows for contact in self.equations.contacts)
-        self._held: dict[bytes, _Held] = {}
+        self._held: dict[bytes, Held] = {}
 
     @staticmethod
     def serves(equations: Equations) -> bool:
@@ -120,20 +120,19 @@ class Balance:
 
     def _solve_in(self, mode: NDArray[np.int8], rows: Rows, mine: Flags, found: Solved) -> None:
         """The same in one mode; `mine` are the places of the results."""
-        key = mode.tobytes()
-        held = self._held[key] if key in self._held else self._held.setdefault(key, self._rows_of(mode))
+        held = self.rows_in(mode)
         slides = bool(np.any(np.abs(rows.phase) == 1)) or self.rubs
         turns = MOST_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):
-            M, f, R, B, _, bias, limits = self.terms_at(replace(rows, lam=lam))
+            M, f, R, B, _, _, bias, limits = self.terms_at(replace(rows, lam=lam))
             forces, spread = R[:, :, held.kept], None
             if held.depend:
                 dependence, weight = _dependence(M, B, held), self._shares(held, limits)
                 spread = _shared(dependence, weight, held) if slides else _least_norm(dependence, weight)
             if slides and spread is not None:  # how a load is shared moves the mechanism
                 forces = R[:, :, held.every] @ spread
-            rate, force, size, sound = _saddle(M, f, forces, B[:, held.kept], bias[:, held.kept])
+            rate, force, size, sound = saddle(M, f, forces, B[:, held.kept], bias[:, held.kept])
             before, lam = lam, np.zeros_like(rows.lam)
             lam[:, held.every] = force if spread is None else (spread @ force[:, :, None])[:, :, 0]
             change = np.max(np.abs(lam - before), axis=1, initial=0.0)
@@ -162,7 +161,7 @@ class Balance:
         size = np.hypot(x, y)
         return np.divide(x, size, out=np.zeros_like(x), where=size > 0.0)
 
-    def _shares(self, held: _Held, limits: Matrix) -> Matrix:
+    def _shares(self, held: Held, limits: Matrix) -> Matrix:
         """W of the rows that hold (k, every): 1, or the limit of the friction that holds one over the largest."""
         largest = np.max(limits, axis=1, initial=0.0)
         weight = np.ones((len(limits), len(held.every)))
@@ -174,15 +173,20 @@ class Balance:
         return weight
 
     def terms_at(self, rows: Rows) -> tuple[Any, ...]:
-        """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), ḣ (k, m), γ (k, m), limits of frictions (k, n_frictions)."""
+        """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), h, ḣ, γ (k, m), limits of frictions (k, n_frictions)."""
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
         flat = np.array(self.terms(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source))).T
         cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
-        M, f, R, B, _, rates, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
+        M, f, R, B, h, rates, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
         limits = rest[:, rest.shape[1] - len(self.equations.frictions) :]
-        return M.reshape(count, n, n), f, R.reshape(count, n, m), B.reshape(count, m, n), rates, bias, limits
+        return M.reshape(count, n, n), f, R.reshape(count, n, m), B.reshape(count, m, n), h, rates, bias, limits
 
-    def _rows_of(self, mode: NDArray[np.int8]) -> _Held:
+    def rows_in(self, mode: NDArray[np.int8]) -> Held:
+        """The rows that hold in a mode: flags of contacts, then phases of frictions."""
+        key = mode.tobytes()
+        return self._held[key] if key in self._held else self._held.setdefault(key, self._rows_of(mode))
+
+    def _rows_of(self, mode: NDArray[np.int8]) -> Held:
         """The rows that hold in a mode, judged at stored states."""
         contacts = len(self.equations.contacts)
         closed, phase = mode[:contacts], mode[contacts:]
@@ -191,7 +195,7 @@ class Balance:
             if (row.contact < 0 or closed[row.contact]) and (row.friction < 0 or phase[row.friction] == STICKS)
         ]  # fmt: skip
         if not every:
-            return _Held([], [])
+            return Held([], [])
         record = self.states.record
         same = np.all(record.closed == closed, axis=1) & np.all(record.phase == phase, axis=1)
         places = np.flatnonzero(same)
@@ -201,7 +205,7 @@ class Balance:
         every = self._acting(every, there, B)
         # in the metric of M one light coordinate makes all rows that move it parallel; dependent rows are so in any
         independent = max(_independent(B[:, every] / _weights(M)), _independent(B[:, every]), key=len)
-        return _Held(every, [every[k] for k in independent])
+        return Held(every, [every[k] for k in independent])
 
     def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:
         """The rows whose Jacobian exceeds round-off of its parts; redundant ones of joints on one axis are not."""
@@ -226,7 +230,7 @@ def _weights(M: Any) -> Any:
     return np.where(found > 0.0, found, 1.0)[:, None, :]
 
 
-def _dependence(M: Any, B: Any, held: _Held) -> Any:
+def _dependence(M: Any, B: Any, held: Held) -> Any:
     """T (k, every, kept) of ``B = T B_kept``, by least squares on columns divided by √M_ii."""
     scaled = np.nan_to_num(B / _weights(M), posinf=0.0, neginf=0.0)
     basis, _ = np.linalg.qr(np.swapaxes(scaled[:, held.kept], 1, 2))
@@ -246,13 +250,13 @@ def _least_norm(dependence: Any, weight: Matrix) -> Any:
     return np.swapaxes(np.linalg.solve(square, np.swapaxes(heavy, 1, 2)), 1, 2)
 
 
-def _shared(dependence: Any, weight: Matrix, held: _Held) -> Any:
+def _shared(dependence: Any, weight: Matrix, held: Held) -> Any:
     """S (k, every, kept) of λ = S λ_kept with ``S = W T W_kept⁻¹``, the same λ, where λ_kept is part of it."""
     kept = [held.every.index(k) for k in held.kept]
     return weight[:, :, None] * dependence / weight[:, None, kept]
 
 
-def _saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Matrix, Vector, Flags]:
+def saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Matrix, Vector, Flags]:
     """a, λ and log |det| of ``M a + f + R λ = 0``, ``B a + γ = 0`` for each of k states, and where there are any."""
     count, n, m = len(f), f.shape[1], bias.shape[1]
     matrix = np.zeros((count, n + m, n + m))

@@ -24,6 +24,7 @@ from mbd.results.interpolation import Grid
 from mbd.results.names import AXES, rate_name, scalars_behind
 from mbd.results.orientations import ReadOff, read_off
 from mbd.results.polynomials import Places
+from mbd.results.projection import Projection
 from mbd.results.record import Record, Rows
 from mbd.results.stored_states import StoredStates, is_smooth
 from mbd.results.turning import turns_to
@@ -186,7 +187,9 @@ class ModelColumns(StoredStates, Columns):
         rougher = self.grid.rougher(rows, places, found, plain, smooth)
         if smooth and LedSteps.serves(self) and Balance.serves(self.equations):
             found = LedSteps(Restepping(self, self.balance)).at(rows, places, found)
-        return found, rougher
+        if self._onto is None:
+            return found, rougher
+        return self._onto.at(rows, places, found), self._onto.at(rows, places, rougher)
 
     @cached_property
     def _steps(self) -> Restepping | None:
@@ -195,6 +198,10 @@ class ModelColumns(StoredStates, Columns):
     @cached_property
     def _forces(self) -> Forces:
         return Forces(self.balance, self.rows, self._interpolated)
+
+    @cached_property
+    def _onto(self) -> Projection | None:
+        return Projection.of(self.balance) if self.equations.rows and Balance.serves(self.equations) else None
 
     @cached_property
     def balance(self) -> Balance:

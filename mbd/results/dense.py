@@ -20,6 +20,7 @@ from mbd.kernel.schemes.tableau import Tableau
 from mbd.results.balance import Balance, Solved, put
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Places
+from mbd.results.projection import Projection
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 
@@ -36,7 +37,7 @@ class Restepping:
 
     def __init__(self, states: StoredStates, balance: Balance) -> None:
         self.states, self.equations, self.balance = states, states.equations, balance
-        self.charts = Charts.of(states.equations)
+        self.charts, self.onto = Charts.of(states.equations), Projection.of(balance)
 
     @staticmethod
     def serves(states: StoredStates) -> bool:
@@ -58,11 +59,15 @@ class Restepping:
         begin, time = found.part(inside), places.time[inside]
         state, least = self._stepped(begin, (time - begin.time)[:, None])
         q, v, z = self._parts(begin, state)
-        end = self._rates(replace(begin, time=time, q=q, v=v, z=z))
+        there = replace(begin, time=time, q=q, v=v, z=z)
+        if self.onto is not None:
+            there = self.onto.at(rows, places.part(np.flatnonzero(inside)), there)
+            q, v = there.q, there.v
+        end = self._rates(there)
         changed: dict[str, Any] = {"time": time, "q": q, "v": v, "z": z, "lam": end.lam}
         changed["a"], changed["s"] = np.split(end.rate, [self.equations.n_v], axis=1)
-        there: dict[str, Any] = {name: put(getattr(found, name), inside, new) for name, new in changed.items()}
-        found = replace(found, **there)
+        new: dict[str, Any] = {name: put(getattr(found, name), inside, values) for name, values in changed.items()}
+        found = replace(found, **new)
         near = np.zeros(len(inside), dtype=bool)
         before, after = self._rates(begin).size, self._rates(rows.part(places.upper[inside])).size
         far = np.maximum(before, after)  # the row of an event may lie at the pose itself

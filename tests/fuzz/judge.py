@@ -21,7 +21,10 @@ __all__ = ["Judgement", "judge"]
 MOST = 48
 """Rows at which forces are balanced, at most."""
 FEW = 12
-"""Rows of a run that follows a tolerance below which steps are too long for laws from row to row."""
+"""Instants of a run that follows a tolerance below which steps are too long for laws from row to row.
+
+An event stores several rows of one instant, which are no steps.
+"""
 BRIEFEST = 3e-7
 """Duration of steps [s] in which round-off of positions of a metre is a velocity of 10⁻⁹ m/s."""
 SHARE = 1e-6
@@ -79,7 +82,7 @@ def _motion(found: Faults, run: mbd.Trajectory, told: Readings, smooth: bool) ->
     if any("not resolved by dt" in str(note) for note in run.stats["notes"]):
         return
     tol = float(run.settings.get("tol") or 0.0)
-    if tol and len(told) < FEW:
+    if tol and np.count_nonzero(np.diff(told.time) > 0.0) + 1 < FEW:
         return
     scheme, tied = run.settings["integrator"], bool(run.record.lam.shape[1])
     jumps = sum("beyond half a turn" in str(note) for note in run.stats["notes"])  # of a torque within a step

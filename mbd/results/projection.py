@@ -1,0 +1,96 @@
+"""States between the rows of a run led onto the constraints, which rows of the run satisfy and polynomials do not.
+
+A prescribed motion bends at every sample of a table, and rows of joints bend with the mechanism, so that what passes
+smoothly from row to row comes off them by its own error. Positions follow Newton's method in the metric of inertia,
+
+``M x + Bᵀ μ = 0,  B x = −(h − h*)``,  ``q ← q ⊕ x``,
+
+and velocities take one such step with ḣ; ``h* = (1 − ϑ) h₀ + ϑ h₁`` of the rows before and after, which in index 3
+miss ḣ = 0. Where the second correction is not less than half the first, as next to a pose in which B loses rank,
+Newton's method does not lead to the motion (Deuflhard 2004, Newton Methods for Nonlinear Problems, 2.1), and the state
+stays as it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mbd.arrays import Matrix
+from mbd.results.balance import Balance, Flags, saddle
+from mbd.results.charts import Charts
+from mbd.results.polynomials import Index, Places
+from mbd.results.record import Rows
+
+__all__ = ["Projection"]
+
+CORRECTIONS = 3
+"""Corrections of positions: an error of 0.01 is round-off after the third [-]."""
+SMALL = 1e-12
+"""Correction, of coordinates of size 1, that is no matter whatever the next one is [-]."""
+
+
+class Projection:
+    """Leads positions and velocities onto the rows that hold in the interval."""
+
+    def __init__(self, balance: Balance) -> None:
+        self.balance, self.equations = balance, balance.equations
+        self.charts = Charts.of(balance.equations)
+
+    @classmethod
+    def of(cls, balance: Balance) -> Projection | None:
+        """That of equations with rows whose positions can be moved, else None."""
+        equations = balance.equations
+        known = equations.compose is None or Charts.of(equations) is not None
+        return cls(balance) if known and equations.rows and Balance.serves(equations) else None
+
+    @np.errstate(all="ignore")
+    def at(self, rows: Rows, places: Places, found: Rows) -> Rows:
+        """The states `found` at places between `rows`, on the constraints as far as the rows are."""
+        modes = np.hstack([found.closed.astype(np.int8), found.phase])
+        q, v = found.q.copy(), found.v.copy()
+        inside = places.step > 0.0
+        patterns, group = np.unique(modes, axis=0, return_inverse=True)
+        for number, mode in enumerate(patterns):
+            kept = self.balance.rows_in(mode).kept
+            mine = np.flatnonzero(inside & (group.ravel() == number))
+            if kept and len(mine):
+                q[mine], v[mine] = self._led(kept, rows, places.part(mine), found.part(mine))
+        return replace(found, q=q, v=v)
+
+    def _led(self, kept: list[int], rows: Rows, places: Places, found: Rows) -> tuple[Matrix, Matrix]:
+        """q and v on the rows `kept`, in one mode."""
+        theta = places.theta[:, None]
+        first, last = (self._missed(kept, rows, places.lower, ends) for ends in (places.lower, places.upper))
+        aim, aim_rate = ((1.0 - theta) * a + theta * b for a, b in zip(first, last, strict=True))
+        led, good, before = found, np.ones(len(found), dtype=bool), np.full(len(found), np.inf)
+        for _ in range(CORRECTIONS):
+            x, sound = self._correction(kept, led, aim)
+            size = np.max(np.abs(x), axis=1, initial=0.0)
+            good &= sound & ((size < 0.5 * before) | (size <= SMALL))
+            led, before = replace(led, q=self._moved(led.q, x)), size
+            if np.all((size <= SMALL) | ~good):
+                break
+        change, sound = self._correction(kept, led, aim_rate, rates=True)
+        good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)
+        return np.where(good[:, None], led.q, found.q), np.where(good[:, None], found.v + change, found.v)
+
+    def _missed(self, kept: list[int], rows: Rows, lower: Index, ends: Index) -> tuple[Matrix, Matrix]:
+        """h and ḣ at the ends of intervals, in the mode of the interval."""
+        at = rows.part(ends)
+        at = replace(at, **{name: getattr(rows, name)[lower] for name in ("closed", "phase", "anchors", "source")})
+        _, _, _, _, h, rates, *_ = self.balance.terms_at(at)
+        return h[:, kept], rates[:, kept]
+
+    def _correction(self, kept: list[int], rows: Rows, aim: Matrix, rates: bool = False) -> tuple[Matrix, Flags]:
+        """x with B x = −(h − h*), or −(ḣ − ḣ*), and where it is determined."""
+        n_v = self.equations.n_v
+        M, _, _, B, h, speeds, *_ = self.balance.terms_at(rows)
+        B = B[:, kept, :n_v]
+        off = (speeds if rates else h)[:, kept] - aim
+        x, _, _, sound = saddle(M[:, :n_v, :n_v], np.zeros((len(rows), n_v)), np.swapaxes(B, 1, 2), B, off)
+        return x, sound
+
+    def _moved(self, q: Matrix, x: Matrix) -> Matrix:
+        return q + x if self.charts is None else self.charts.composed(q, x)

@@ -1,0 +1,84 @@
+"""Between the rows of a run its constraints hold as they do at rows, with every scheme and at every size of step.
+
+Rows of joints, of measures and of closed contacts are evaluated where nothing is stored; prescribed motions are
+compared with the tables that prescribe them, whose third derivative jumps within steps.
+"""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.hardcases.schemes import SCHEMES
+from tests.mechanisms_between_rows import KINDS
+
+ROUND_OFF = 2e-11
+"""What constraints miss beside what rows miss, of mechanisms of meters and seconds [m, rad, m/s, rad/s]."""
+
+
+def some_times(run: mbd.Trajectory, seed: int, count: int = 3) -> np.ndarray:
+    """Times within the steps of a run."""
+    rng, t = np.random.default_rng(seed), run.time
+    steps = np.flatnonzero(np.diff(t) > 1e-6)
+    return np.sort(np.concatenate([t[steps] + part * np.diff(t)[steps] for part in rng.uniform(0.05, 0.95, count)]))
+
+
+def missed(run: mbd.Trajectory, rows) -> tuple[np.ndarray, np.ndarray]:
+    """|h| and |ḣ| of the worst row that acts, at each of the states (k,)."""
+    columns, found = run.columns, []
+    equations = columns.equations
+    active = [
+        np.ones(len(rows), dtype=bool) if row.contact < 0 else rows.closed[:, row.contact].astype(bool)
+        for row in equations.rows if row.friction < 0
+    ]  # fmt: skip
+    for part in ("value", "rate"):
+        values = columns.evaluate([getattr(row, part) for row in equations.rows if row.friction < 0], rows)
+        found.append(np.max([np.abs(value) * acts for value, acts in zip(values, active, strict=True)], axis=0))
+    return found[0], found[1]
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("loop", 1), ("redundant", 1), ("standing", 2), ("turning", 1), ("turning", 5)]
+)
+def test_between_rows_constraints_hold_as_at_rows(kind, seed, name):
+    model, start = KINDS[kind](seed)
+    run = mbd.simulate(model, start, SCHEMES[name](), dt=0.01, until=0.2)
+    there = run.columns.between(run.columns.grid.places(some_times(run, seed)))
+    (h, rate), (most, fastest) = missed(run, there), missed(run, run.columns.rows)
+    assert np.max(h) <= np.max(most) + ROUND_OFF
+    assert np.max(rate) <= np.max(fastest) + ROUND_OFF
+
+
+def driven_chain(seed: int, cut: str) -> tuple[mbd.Model, mbd.State, dict[str, mbd.Samples]]:
+    """Two links whose joints repeat cycles of few samples; the seed odd, one of them has dry friction."""
+    rng = random.Random(seed)
+    model, end, tables = mbd.Model(f"driven {seed}", cut=cut), None, {}
+    for k in range(2):
+        link = mbd.Link(f"link {k}", 1.0, 0.4, 0.2, 0.01)
+        loss = mbd.Coulomb(0.1) if seed % 2 and k else None
+        joint = mbd.Revolute(f"joint {k}", model.ground.origin if end is None else end, link.start, loss=loss)
+        model.connect(joint)
+        t = np.linspace(0.0, rng.uniform(0.3, 0.5), 12)
+        values = rng.uniform(0.1, 0.3) * np.sin(2.0 * np.pi * t / t[-1]) + rng.uniform(0.01, 0.05) * (np.arange(12) % 2)
+        values[-1] = values[0]
+        table = mbd.Samples(t, values, periodic=True)
+        model.constrain(mbd.Bilateral(f"drive {k}", joint, value=table))
+        tables[joint.coordinate_names[0]], end = table, link.end
+    return model, mbd.assemble(model, position=dict.fromkeys(tables, 0.0), project=True), tables
+
+
+@pytest.mark.parametrize("scheme", [mbd.RungeKutta4(), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
+@pytest.mark.parametrize("cut", ["auto", "all"])
+@pytest.mark.parametrize("seed", range(2))
+def test_between_rows_a_drive_follows_its_table(seed, cut, scheme):
+    model, start, tables = driven_chain(seed, cut)
+    run = mbd.simulate(model, start, scheme, dt=0.015, until=0.15)
+    times = some_times(run, seed)
+    there = run.at(times)
+    for name, table in tables.items():
+        off = np.max(np.abs(there[name] - table(times)))
+        assert off <= ROUND_OFF, f"{name} is {off:.3g} off its table"
