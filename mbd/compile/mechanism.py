@@ -55,7 +55,7 @@ class AccelerationTerms:
     """The parts of ``M a + f + R λ = 0``, ``h``, ``ḣ``, ``ḧ = B a + bias`` of all rows, and what closing contacts hold.
 
     M (n, n), f (n,), R (n, n_rows), B (n_rows, n), h, rate, bias (n_rows,), captured (n_anchors,), kinetic [J],
-    limits (n_frictions,) largest frictions [N, N m].
+    limits (n_frictions,) largest frictions [N, N m], impulses (n_impulses, n_v) w P of the user's as contacts close.
     """
 
     M: Vector
@@ -68,6 +68,7 @@ class AccelerationTerms:
     captured: Vector
     kinetic: float
     limits: Vector
+    impulses: Vector
 
 
 Made = tuple[Mapping[str, Sequence[Node]], Facts]
@@ -393,10 +394,10 @@ class Mechanism:
         lengths = (n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1)
         starts = list(accumulate(lengths, initial=0))
         M, f, R, B, h, rate, bias, captured, kinetic = (out[a:b] for a, b in pairwise(starts))
-        limits = out[starts[-1] : starts[-1] + layout.n_frictions]
+        limits, impulses = np.split(out[starts[-1] :], [layout.n_frictions])
         return AccelerationTerms(
             M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0]),
-            limits,
+            limits, impulses.reshape(len(self.equations.impulses), layout.n_v),
         )  # fmt: skip
 
     @property

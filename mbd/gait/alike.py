@@ -1,9 +1,10 @@
 """Whether the two sides of a walker are alike, and whether a parameter keeps them so.
 
-A mirrored step repeats on the other side where the mechanism is its own mirror image: inertia, forces, rows, what
-contacts store as they close, gaps, conditions, limits of friction, restitutions, events and resets at some states are
-those of the mirrored states on the other side. A parameter keeps both sides alike where they are alike beside its value
-too. One comparison decides both, wherever parameters enter a mirrored gait.
+A mirrored step repeats on the other side where the mechanism is its own mirror image: inertia, forces, rows, forces of
+closed penalty contacts, gaps, conditions of contacts and transitions, limits of friction, restitutions, events, timers
+and resets, impulses at strikes, and what contacts and machines store at some states are those of the mirrored states on
+the other side. A parameter keeps both sides alike where they are alike beside its value too. One comparison decides
+both, wherever parameters enter a mirrored gait.
 """
 
 from __future__ import annotations
@@ -28,8 +29,11 @@ from mbd.sensitivity.resets import reset_expressions
 
 __all__ = ["moves_sides_alike", "require_alike", "sides_faults"]
 
-POSES = 2
-"""States at which a mechanism is compared with its mirror image [-]."""
+POSES = (0.4, 0.4, 2.5)
+"""Largest changes of coordinates at the states at which a mechanism is compared with its mirror image [m, rad].
+
+The wide one reaches stops and branches of laws that small motions do not.
+"""
 ALIKE = 1e-9
 """Difference, relative to the largest of its kind, below which two sides are alike [-]."""
 EFFECT = 1e-6
@@ -38,6 +42,9 @@ SHARE = 1e-2
 """Share of that change that two sides may differ by after it [-]."""
 WIDEST, GROWTH = 1e12, 30.0
 """Change of a parameter, over its value or 1, up to which an effect is looked for, and the factor of the next [-]."""
+
+EVENTS = slice(4, 7)
+"""Those of events among the numbers that are watched."""
 
 Pairs = list[tuple[Vector, Vector]]
 """Numbers of mirrored states, exchanged, and those of their images."""
@@ -74,8 +81,8 @@ def moves_sides_alike(
 ) -> bool:  # fmt: skip
     """Whether the sides change alike as a parameter does, so that they stay each other's image.
 
-    The change of the parameter grows until it changes something of the mechanism; a parameter that changes nothing
-    keeps both sides alike.
+    The change of the parameter grows until it changes something of the mechanism. If it changes nothing at the states
+    that are compared, its name decides: a parameter with a partner on the other side changes one side alone.
 
     Parameters
     ----------
@@ -92,7 +99,14 @@ def moves_sides_alike(
         if effect > EFFECT:
             return apart <= SHARE * effect
         h *= GROWTH
-    return True
+    return _changes_both(mechanism, mirror, vector(value), vector(value + EFFECT * (abs(value) or 1.0)))
+
+
+def _changes_both(mechanism: Mechanism, mirror: Mirror, here: Vector, beside: Vector) -> bool:
+    """Whether each parameter that has a partner on the other side changes only where its partner changes too."""
+    names = [parameter.name for parameter in mechanism.equations.parameters]
+    changed = {name for name, one, two in zip(names, here, beside, strict=False) if one != two}
+    return all(mirror.name(name) in changed for name in changed if mirror.name(name) in names)
 
 
 def _sentence(mechanism: Mechanism, mirror: Mirror, values: Mapping[str, float], different: float) -> str:
@@ -127,7 +141,7 @@ def _difference(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> flo
 
 
 def _size(numbers: Vector) -> float:
-    return _largest(numbers) or 1.0
+    return _largest(numbers[np.isfinite(numbers)]) or 1.0
 
 
 def _largest(numbers: Vector) -> float:
@@ -139,60 +153,96 @@ def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
     """What is compared, at some states with their mirror images."""
     layout, random = mechanism.layout, np.random.default_rng(3)
     configuration, found = mechanism.equations.configuration, list[tuple[Vector, Vector]]()
-    acting = [
-        e
-        for e, guard in enumerate(mechanism.equations.guards)
-        if guard.terminal or guard.reset is not None or guard.transition or guard.name == mirror.section
-    ]
+    acting = _acting(mechanism.equations, mirror)
+    places = _watched_places(mechanism.equations, mirror)
     order = np.concatenate([mirror.v, layout.n_v + mirror.z]).astype(np.intp)
     signs = np.ones(layout.n)
     if mirror.reflection is not None:
         signs[: layout.n_v] = mirror.reflection.v
-    for number in range(max([POSES, *(len(machine.states) for machine in mechanism.equations.machines)])):
+    for number in range(max([len(POSES), *(len(machine.states) for machine in mechanism.equations.machines)])):
+        # a state and its mirror image; machines and contacts hold something, as they do in motion
+        width = POSES[number % len(POSES)]
         q, y = (
-            np.array(configuration.defaults) + random.uniform(-0.4, 0.4, layout.n_q),
+            np.array(configuration.defaults) + random.uniform(-width, width, layout.n_q),
             random.uniform(-1, 1, layout.n),
         )
         q = configuration.normalise(q)
         image_q = mirror.of_q(q)
         image_y = np.concatenate([mirror.of_v(y[: layout.n_v]), y[layout.n_v :][mirror.z]])
         held = in_state(mechanism, number)
-        here, there = (_numbers(mechanism, parameters, *at) for at in (
-            (q, y, held), (image_q, image_y, mirror.of_anchors(held))))  # fmt: skip
+        storing = _storing(mechanism.equations)
+        held[storing] = random.uniform(0.1, 0.5, len(storing))
+        at, image = (q, y, held), (image_q, image_y, mirror.of_anchors(held))
+        here, there = _numbers(mechanism, parameters, *at), _numbers(mechanism, parameters, *image)
+        # numbers of the one in the places and with the signs of the other
         for mine, its in zip(here["matrices"], there["matrices"], strict=True):
             found.append((np.ravel(mine[np.ix_(order, order)] * np.outer(signs, signs)), np.ravel(its)))
         for mine, its in zip(here["vectors"], there["vectors"], strict=True):
             found.append((mine[order] * signs, its))
-        places = _watched_places(mechanism.equations, mirror)
         watched = [
             (mine[place], its) for place, mine, its in zip(places, here["watched"], there["watched"], strict=True)
         ]
-        watched[4:6] = [(mine[acting], its[acting]) for mine, its in watched[4:6]]
+        watched[EVENTS] = [(mine[acting], its[acting]) for mine, its in watched[EVENTS]]
         found += watched
-        found += _resets(mechanism, mirror, parameters, (q, y), (image_q, image_y))
+        found += [
+            (mirror.of_v(here["impulses"][mirror.name(contact), when]), its)
+            for (contact, when), its in there["impulses"].items()
+        ]
+        stored = mirror.of_anchors(here["stored"])
+        found += [(stored[[k]], there["stored"][[k]]) for k in storing]
+        found += _resets(mechanism, mirror, parameters, at, image)
     return found
 
 
-def _numbers(mechanism: Mechanism, parameters: Vector, q: Vector, y: Vector, anchors: Vector) -> dict[str, list[Any]]:
+def _acting(equations: Equations, mirror: Mirror) -> list[int]:
+    """Numbers of the events that change something: the motion, a machine, or where a return ends."""
+    causes = {number for guard in equations.guards if guard.transition is not None
+              for kind, number in guard.transition.causes if kind == "event"}  # fmt: skip
+    return [
+        e
+        for e, guard in enumerate(equations.guards)
+        if guard.terminal or guard.reset is not None or guard.transition or guard.name == mirror.section or e in causes
+    ]
+
+
+def _storing(equations: Equations) -> list[int]:
+    """Anchors that hold values, not numbers of states or of turns."""
+    machines = [anchor for machine in equations.machines for anchor in machine.anchors[1:]]
+    return machines + [anchor for contact in equations.contacts for anchor in contact.anchors]
+
+
+def _numbers(mechanism: Mechanism, parameters: Vector, q: Vector, y: Vector, anchors: Vector) -> dict[str, Any]:
     """What a state tells of a mechanism; of rows what depends neither on their order nor on their signs."""
     layout, equations = mechanism.layout, mechanism.equations
-    lam = -np.ones(layout.n_rows)
+    lam, n_c, n_g, n_f = -np.ones(layout.n_rows), len(equations.contacts), len(equations.guards), layout.n_frictions
     terms = mechanism.acceleration_terms(0.0, q, y, parameters, anchors, lam=lam)
+    # what is watched
     guards = np.zeros(max(mechanism.sizes["guards"], 1))
     mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, guards)
-    n_c, n_g = len(equations.contacts), len(equations.guards)
-    parts = np.split(guards[: 4 * n_c + 2 * n_g], np.cumsum([n_c, n_c, n_c, n_c, n_g]))
+    parts = np.split(guards, np.cumsum([n_c, n_c, n_c, n_c, n_g, n_g, n_f, 2 * n_f]))
+    slides, conditions = parts[6], parts[8][:n_g] if equations.machines else np.ones(n_g)
     both = [guard.direction == 0 for guard in equations.guards]  # the sign of their values tells nothing
-    parts[4:] = [np.where(both, np.abs(part), part) for part in parts[4:]]
+    events = [np.where(both, np.abs(part), part) for part in parts[4:6]]
+    # what acts while penalty contacts are closed and frictions slide
+    penalties = [c for c, contact in enumerate(equations.contacts) if contact.force is not None]
+    loaded = mechanism.acceleration_terms(0.0, q, y, parameters, anchors, penalties, np.sign(slides), lam)
+    # impulses by what they wait for
+    impulses = {(contact.name, when): np.zeros(layout.n_v) for contact in equations.contacts for when in range(3)}
+    for impulse, vector in zip(equations.impulses, terms.impulses, strict=True):
+        impulses[equations.contacts[impulse.contact].name, impulse.order] += vector
     return {
         "matrices": [terms.M, terms.B.T @ terms.B, terms.R @ terms.R.T],
-        "vectors": [terms.f, terms.B.T @ terms.rate, terms.B.T @ terms.bias, terms.B.T @ terms.h],
-        "watched": [*parts, terms.limits],
+        "vectors": [
+            terms.f, loaded.f - terms.f, terms.B.T @ terms.rate, terms.B.T @ terms.bias, terms.B.T @ terms.h,
+        ],
+        "watched": [*parts[:4], *events, conditions, loaded.limits],
+        "impulses": impulses,
+        "stored": terms.captured,
     }  # fmt: skip
 
 
 def _watched_places(equations: Equations, mirror: Mirror) -> list[NDArray[np.intp]]:
-    """From which places the image takes what is watched: four of contacts, two of events, limits of frictions."""
+    """From which places the image takes what is watched: four of contacts, three of events, limits of frictions."""
     names = [contact.name for contact in equations.contacts]
     contacts = np.array([names.index(mirror.name(name)) for name in names], dtype=np.intp)
     events = [guard.name for guard in equations.guards]
@@ -206,11 +256,11 @@ def _watched_places(equations: Equations, mirror: Mirror) -> list[NDArray[np.int
         others = frictions.get(mirror.name(name), [])
         if len(others) == len(places):
             limits[places] = others
-    return [*[contacts] * 4, *[partners] * 2, limits]
+    return [*[contacts] * 4, *[partners] * 3, limits]
 
 
 def _resets(
-    mechanism: Mechanism, mirror: Mirror, parameters: Vector, at: tuple[Vector, Vector], image: tuple[Vector, Vector]
+    mechanism: Mechanism, mirror: Mirror, parameters: Vector, at: tuple[Vector, ...], image: tuple[Vector, ...]
 ) -> Pairs:
     """The states after the resets of all events, of a state and of its image, as far as resets can be recorded."""
     guards = {guard.name: guard for guard in mechanism.equations.guards if guard.reset is not None}
@@ -225,7 +275,7 @@ def _resets(
 
 
 def _after(
-    mechanism: Mechanism, guard: Guard, parameters: Vector, q: Vector, y: Vector
+    mechanism: Mechanism, guard: Guard, parameters: Vector, q: Vector, y: Vector, anchors: Vector
 ) -> tuple[Vector, Vector] | None:  # fmt: skip
     """(q, y) after the reset of an event; None where it cannot be recorded."""
     equations, memory = mechanism.equations, mechanism.equations.memory
@@ -237,7 +287,7 @@ def _after(
         return None
     places, function = known
     out, after = np.zeros(len(places)), np.concatenate([q, y])
-    function(mechanism.block(0.0, q, y, np.zeros(mechanism.layout.n_anchors)), parameters, out)
+    function(mechanism.block(0.0, q, y, anchors), parameters, out)
     after[places] = out
     return after[: equations.n_q], after[equations.n_q :]
 

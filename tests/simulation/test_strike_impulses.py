@@ -93,6 +93,13 @@ def test_a_size_may_follow_the_motion_and_is_a_parameter():
     assert speeds(doubled)[1] < speeds(mbd.simulate(*wheel(), mbd.RungeKutta4(), dt=0.01, until=0.7))[1]
 
 
+BOTH = {
+    "parameters": {"push": 3.0},
+    "functions": {"push": lambda size: {"left push.size": size, "right push.size": size}},
+}
+"""One size of both feet's pushes."""
+
+
 @cache
 def pushed_gait() -> mbd.LimitCycle:
     """Case k5 in bodies: the trailing foot is pushed along its leg as the other one strikes."""
@@ -104,7 +111,7 @@ def pushed_gait() -> mbd.LimitCycle:
         model.constrain(push)
     angle, *rates = np.round(reference["state just after heel strike"].value, 3)
     start = standing(model, [angle, -angle, *rates], 0.0)
-    return mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"), wrt=("left push.size",))
+    return mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"), **BOTH)
 
 
 def test_the_gait_of_a_push_off_is_that_of_the_case():
@@ -116,7 +123,32 @@ def test_the_gait_of_a_push_off_is_that_of_the_case():
     real, imaginary = reference["Floquet"].value
     assert max(np.min(np.abs(real + 1j * imaginary - value)) for value in gait.multipliers) < 2e-8
     by = reference["d(period, step length, speed, largest |multiplier|) / d(push-off impulse P)"].value
-    assert abs(gait.derivatives["period", "left push.size"] - by[0]) < 1e-8
+    assert abs(gait.derivatives["period", "push"] - by[0]) < 1e-8
+
+
+def test_the_push_of_one_foot_is_refused_wherever_a_mirrored_gait_takes_it_and_right_over_a_stride():
+    gait = pushed_gait()
+    model, start = gait.map.model, gait.state
+    step = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+    calls = [
+        lambda name: step.derivatives["speed", name],
+        lambda name: step.derivatives["largest multiplier", name],
+        lambda name: step.at({name: 3.03}),
+        lambda name: mbd.branch(step, name, to=3.03),
+        lambda name: mbd.optimize(step, {name: (3.0, 2.9, 3.1)}, maximize="speed", progress=False),
+        lambda name: mbd.basin(model, step, {name: [3.0, 3.1]}, workers=1, progress=False),
+        lambda name: mbd.limit_cycle(
+            model, start, section="right foot", mirror=("left", "right"), parameters={name: 3.03}
+        ),
+    ]
+    for name in ("left push.size", "right push.size"):
+        for call in calls:
+            with pytest.raises(mbd.ModelError, match="mirror=.*(differently|another one).*mirror=None"):
+                call(name)
+    both = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"), dt=0.02, **BOTH)
+    stride = mbd.limit_cycle(model, start, section="right foot", dt=0.02)
+    sides = sum(stride.derivatives["speed", f"{side} push.size"] for side in ("left", "right"))
+    assert sides == pytest.approx(both.derivatives["speed", "push"], rel=1e-8)
 
 
 def test_an_impulse_about_a_joint_and_one_on_a_coordinate_are_alike():
