@@ -12,7 +12,7 @@ from benchmarks.stopwatch import processor_seconds
 from benchmarks.walkers import kneed_model
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.derivation import derive
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 
 __all__ = ["MODES", "measure", "python_loop"]
 

@@ -11,7 +11,7 @@ from benchmarks.walkers import compass, kneed_model, seven
 from mbd.equations import programs
 from mbd.equations.cost import operations as total
 from mbd.equations.derivation import derive
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 
 __all__ = ["measure"]
 

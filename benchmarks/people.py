@@ -23,7 +23,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equations import programs
 from mbd.equations.cost import operations
 from mbd.equations.derivation import derive
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 
 __all__ = ["flight", "measure", "on_two_feet", "pinocchio_tree"]
 

@@ -52,7 +52,8 @@ walker = kneed_walker()
 mbd.simulate(walker, kneed_walker_start(walker), mbd.HHT(alpha=0.05), dt=1e-3, until=2e-3)
 """
     needless = {*HEAVY} - {"llvmlite"} | {
-        "scipy", "numpy.random", "importlib.metadata", "mbd.kernel.translate", "mbd.simulation.diagnostics.replay",
+        "scipy", "numpy.random", "importlib.metadata", "mbd.kernel.translation.translate",
+        "mbd.simulation.diagnostics.replay",
     }  # fmt: skip
     loaded(program)  # the stepping kernel is built where this run is the first of its machine
     assert loaded(program).isdisjoint(needless)

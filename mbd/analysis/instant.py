@@ -18,13 +18,13 @@ from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError
 from mbd.integrators.hht import HHT
 from mbd.kernel import codes
-from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.cones import let_directions_go
-from mbd.kernel.contact_modes import resolve_contact_modes
-from mbd.kernel.guards import watch
+from mbd.kernel.algebra.redundancy import find_dependent, sharing, spread
+from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.kernel.contact.cones import let_directions_go
+from mbd.kernel.contact.contact_modes import resolve_contact_modes
+from mbd.kernel.events.guards import watch
 from mbd.kernel.records import Kernel
-from mbd.kernel.redundancy import find_dependent, sharing, spread
-from mbd.kernel.restart import active_rows
+from mbd.kernel.stepping.restart import active_rows
 from mbd.simulation.run.plain import MechanismSystem
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.run.stepper import Stepper

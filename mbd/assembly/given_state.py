@@ -15,7 +15,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
 __all__ = ["LARGEST_ANGLE", "GivenState", "beyond_angles", "fits", "given_state"]

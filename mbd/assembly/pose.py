@@ -12,7 +12,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 
 __all__ = ["Posture"]
 

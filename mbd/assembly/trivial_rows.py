@@ -19,7 +19,7 @@ from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.equations.equations import Equations, Row
 from mbd.equations.magnitudes import magnitudes
 from mbd.errors import ModelError
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 

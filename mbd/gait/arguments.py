@@ -9,7 +9,7 @@ from mbd.bodies.values import among, is_finite_number, named_number_faults, name
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
 __all__ = ["Functions", "check_arguments", "increments_named", "section_named"]

@@ -29,7 +29,7 @@ from mbd.errors import SimulationError
 from mbd.gait.heading import Heading
 from mbd.gait.machines import remembered, state_anchors
 from mbd.gait.whole_turns import unwound
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import Mode, State
 
 __all__ = ["Chart", "Section", "section_of"]

@@ -18,10 +18,10 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import CapabilityError, nearest
 from mbd.integrators.system import Point, StepReport, StepResult, System, Terms
 from mbd.kernel import codes
-from mbd.kernel.interpreted import InterpretedScheme
 from mbd.kernel.records import TABLE, Kernel
-from mbd.kernel.restart import consistent
 from mbd.kernel.schemes.contract import MEMORY, NO_SCHEME, Scheme, scheme_named
+from mbd.kernel.stepping.restart import consistent
+from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.state import Mode, State
 
 __all__ = [

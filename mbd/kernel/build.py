@@ -19,21 +19,23 @@ from mbd.kernel.schemes import contract
 
 if TYPE_CHECKING:  # the trees of the kernel's functions are made only where it is built
     from mbd.compile.host import Host
-    from mbd.kernel.tree import Function
+    from mbd.kernel.translation.tree import Function
 
 __all__ = ["compiled", "kernel_functions", "kernel_object", "kernel_text", "object_of", "source_digest"]
 
 ENTRY = "mbd_kernel"
 
 APART = (
-    "linear.factor", "linear.solve", "linear.solve_definite", "ordered.factor_ordered", "ordered.solve_ordered",
-    "ordered_complex.factor_pair_ordered", "ordered_complex.solve_pair_ordered",
-    "singular.gram_norms.pivoted_gram_norms_of_many", "guard_substeps.parts_to_take", "locate.locate",
-    "events.handle_event", "events.land", "resolution.look_closer", "singular.events.find_passed_events",
-    "singular.events.log_passed_events", "singular.events.refuses", "hooks.scheme_accept", "trial_step.brief_step",
-    "trial_step.share_multipliers", "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look",
-    "schemes.newton.retreat", "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step",
-    "restart.lower_to_step", "cone_steps.come_to_zero", "advance.advance", "begin_run.begin_run",
+    "algebra.linear.factor", "algebra.linear.solve", "algebra.linear.solve_definite",
+    "algebra.ordered.factor_ordered", "algebra.ordered.solve_ordered",
+    "algebra.ordered_complex.factor_pair_ordered", "algebra.ordered_complex.solve_pair_ordered",
+    "singular.gram_norms.pivoted_gram_norms_of_many", "events.guard_substeps.parts_to_take", "events.locate.locate",
+    "events.handling.handle_event", "events.handling.land", "stepping.resolution.look_closer",
+    "singular.events.find_passed_events", "singular.events.log_passed_events", "singular.events.refuses",
+    "hooks.scheme_accept", "stepping.trial_step.brief_step", "stepping.trial_step.share_multipliers",
+    "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look", "schemes.newton.retreat",
+    "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step", "stepping.restart.lower_to_step",
+    "contact.cone_steps.come_to_zero", "stepping.advance.advance", "stepping.begin_run.begin_run",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
@@ -110,17 +112,17 @@ def tag() -> str:
 
 def kernel_text() -> str:
     """The kernel in LLVM's words."""
-    from mbd.kernel.llvm import llvm_text
+    from mbd.kernel.translation.llvm import llvm_text
 
     return llvm_text(kernel_functions(), ENTRY)
 
 
 def kernel_functions() -> list[Function]:
     """The kernel as typed trees."""
-    from mbd.kernel.advance import advance
-    from mbd.kernel.many_runs import march_many
-    from mbd.kernel.memory_check import check_memory
-    from mbd.kernel.translate import Source, functions_of, translate
+    from mbd.kernel.stepping.advance import advance
+    from mbd.kernel.stepping.many_runs import march_many
+    from mbd.kernel.translation.memory_check import check_memory
+    from mbd.kernel.translation.translate import Source, functions_of, translate
 
     text, names = contract.dispatch()
     hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance, "march_many": march_many})

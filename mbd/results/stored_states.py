@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mbd.tape.node import Node, Scalar
 
 ONSET, LEAST = 1e-7, 1e-200
-"""As in `mbd.kernel.cones`: how much the direction of λ_T counts beside that of γ, and what stands for none of it."""
+"""As in `contact.cones`: how much the direction of λ_T counts beside that of γ, and what stands for none of it."""
 
 ULPS = 8.0 * float(np.finfo(float).eps)
 """How far from the time of the next row a step ends that is taken again up to it, over the time [-]."""

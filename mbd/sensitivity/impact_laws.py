@@ -1,7 +1,7 @@
 """Poisson's law and the sequential one, differentiated phase by phase in the order in which the run made them.
 
 A run stores the velocities before and after; its impacts are made again between these, by the rules of
-`mbd.kernel.impact`, and hold only if they end in what the run stores.
+`mbd.kernel.contact.impact`, and hold only if they end in what the run stores.
 """
 
 from __future__ import annotations

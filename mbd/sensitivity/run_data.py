@@ -18,7 +18,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equations.switching_times import jumps_between
 from mbd.errors import CapabilityError, OneSidedError
 from mbd.integrators.base import Integrator
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.results.record import EventRecord, Record
 from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.motion import Mode, Motion, Rates

@@ -13,7 +13,7 @@ from mbd.bodies.promises import promise_faults
 from mbd.bodies.values import among, is_number, named_number_faults, shown
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
 __all__ = ["check_arguments", "end_of"]

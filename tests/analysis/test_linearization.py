@@ -12,7 +12,7 @@ import mbd
 from mbd.assembly.posture import Posture, close_nearby, close_velocities, position_rows
 from mbd.compile.mechanisms import mechanism_of
 from mbd.integrators.base import Point
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from tests.cases.linkages import parallel_cranks
 from tests.cases.small_motions import PLAIN, at_rest, four_bar, moving, pendulums
 

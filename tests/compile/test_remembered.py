@@ -18,7 +18,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.derivation import derive
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.testing.mechanisms import random_loop, random_scene, random_tree
 from tests.comparisons import at_least, compared
 from tests.joints.quaternion_ball import QuaternionBall

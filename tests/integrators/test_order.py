@@ -9,7 +9,7 @@ import pytest
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.run.stepper import Stepper
 
 T = 0.5

@@ -13,7 +13,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.integrators import Point, System, Terms
 from mbd.integrators.base import consistent_rates
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State

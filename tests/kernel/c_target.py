@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from mbd.kernel import tree
 from mbd.kernel.records import TABLE
+from mbd.kernel.translation import tree
 
 __all__ = ["c_text"]
 

@@ -11,7 +11,7 @@ import pytest
 
 import mbd
 from mbd.kernel import build
-from mbd.kernel.translate import Source, functions_of, translate
+from mbd.kernel.translation.translate import Source, functions_of, translate
 from tests.compile.graphs import COMPILER
 from tests.kernel.c_target import c_text
 from tests.kernel.test_translate import CASES, HALF, MOST, inner, whole

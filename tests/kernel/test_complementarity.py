@@ -8,7 +8,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.kernel import codes
-from mbd.kernel.complementarity import complementarity
+from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.records import TABLE, Kernel
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mbd.kernel.complex_linear import factor_complex, solve_complex
+from mbd.kernel.algebra.complex_linear import factor_complex, solve_complex
 
 
 def laid_out(matrix, right):

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from mbd.kernel import codes, complementarity as solver
-from mbd.kernel.complementarity import complementarity
-from mbd.kernel.cone_contacts import solve_cones
-from mbd.kernel.cone_problem import CONE_TOLERANCE, cone_places
+from mbd.kernel import codes
+from mbd.kernel.contact import complementarity as solver
+from mbd.kernel.contact.complementarity import complementarity
+from mbd.kernel.contact.cone_contacts import solve_cones
+from mbd.kernel.contact.cone_problem import CONE_TOLERANCE, cone_places
 from mbd.kernel.records import TABLE, Kernel
 
 seeds = st.integers(0, 2**32 - 1)

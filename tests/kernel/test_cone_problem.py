@@ -10,9 +10,9 @@ from hypothesis import given, settings, strategies as st
 
 from mbd.compile.llvm import load_object
 from mbd.kernel.build import object_of
-from mbd.kernel.cone_problem import CONE_TOLERANCE, EQUAL, PUSH, STEADY, cone_places, cone_solve
-from mbd.kernel.llvm import llvm_text
-from mbd.kernel.translate import source_of, translate
+from mbd.kernel.contact.cone_problem import CONE_TOLERANCE, EQUAL, PUSH, STEADY, cone_places, cone_solve
+from mbd.kernel.translation.llvm import llvm_text
+from mbd.kernel.translation.translate import source_of, translate
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -20,7 +20,7 @@ seeds = st.integers(0, 2**32 - 1)
 @lru_cache(maxsize=1)
 def compiled():
     kinds = ["reals", "int", "reals", "reals", "ints", "ints", "reals", "reals", "reals", "ints"]
-    text = llvm_text(translate(source_of("mbd.kernel.cone_problem"), "cone_solve", kinds), "cone_solve")
+    text = llvm_text(translate(source_of("mbd.kernel.contact.cone_problem"), "cone_solve", kinds), "cone_solve")
     address, number = ctypes.c_void_p, ctypes.c_int64
     function = ctypes.CFUNCTYPE(number, address, number, *[address] * 8)(load_object(object_of(text), "cone_solve"))
     return lambda *arguments: function(*(one if isinstance(one, int) else one.ctypes.data for one in arguments))

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import given, strategies as st
 
-from mbd.kernel.column_weights import counted_inertia, least_inertia
+from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
 from mbd.kernel.singular.newmark_step import pivoted_gram_norms
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from mbd.kernel.linear import eliminate, factor, solve, solve_definite, solve_from_tips
+from mbd.kernel.algebra.linear import eliminate, factor, solve, solve_definite, solve_from_tips
 
 sizes = st.integers(1, 9)
 seeds = st.integers(0, 2**32 - 1)

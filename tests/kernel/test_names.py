@@ -11,7 +11,7 @@ import pytest
 import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.kernel import build
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import TABLE, Kernel
 from mbd.simulation.run.stepper import Stepper
 from tests.simulation.mechanisms import ball

@@ -10,7 +10,7 @@ import mbd
 from mbd.compile import orders
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.orders import flat_order
-from mbd.kernel.ordered import (
+from mbd.kernel.algebra.ordered import (
     LOSS_AT_ONCE,
     LOSS_OF_STEP,
     OF_ACCELERATIONS,

@@ -12,7 +12,7 @@ from mbd.kernel import records
 from mbd.kernel.records import Kernel
 from mbd.kernel.records.declare import Record
 from mbd.kernel.schemes import contract
-from mbd.kernel.translate import source_of
+from mbd.kernel.translation.translate import source_of
 
 RECORDS = {
     name: found for name, found in vars(records).items() if isinstance(found, type) and issubclass(found, Record)
@@ -96,5 +96,5 @@ def test_each_function_takes_the_least_record_that_it_needs():
 
 
 def test_the_law_sees_fields_of_functions_that_are_called():
-    assert needed()["mbd.kernel.candidate", "accept_guards"] is records.Events
-    assert needed()["mbd.kernel.advance", "advance"] is Kernel
+    assert needed()["mbd.kernel.stepping.candidate", "accept_guards"] is records.Events
+    assert needed()["mbd.kernel.stepping.advance", "advance"] is Kernel

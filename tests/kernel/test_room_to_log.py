@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel import advance
+from mbd.kernel.stepping import advance
 from mbd.simulation.run import stepper
 
 

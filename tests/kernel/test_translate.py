@@ -14,10 +14,10 @@ from hypothesis import given, settings, strategies as st
 
 from mbd.compile.llvm import load_object
 from mbd.errors import CapabilityError
+from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.build import object_of
-from mbd.kernel.llvm import llvm_text
-from mbd.kernel.roots import sqrt
-from mbd.kernel.translate import Source, functions_of, source_of, translate
+from mbd.kernel.translation.llvm import llvm_text
+from mbd.kernel.translation.translate import Source, functions_of, source_of, translate
 
 reals = st.lists(st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, np.inf, -np.inf, np.nan]), min_size=4, max_size=4)
 integers = st.lists(st.integers(-9, 9), min_size=4, max_size=4)
@@ -171,7 +171,7 @@ def test_the_same_bits_as_python_at_every_level(function, x, k):
         ("    for i in x:\n        pass", "expected a loop over range.*, got one over 'x'"),
         ("    x = 1.0", "expected one kind of value, got an array of floats and a float"),
         ("    g(x)", "no function named 'g'; .*or import it"),
-        ("    math.sqrt(x[0])", "no function named 'sqrt'.*try from mbd.kernel.roots import sqrt"),
+        ("    math.sqrt(x[0])", "no function named 'sqrt'.*try from mbd.kernel.algebra.roots import sqrt"),
         ("    np.zeros(3)", "no function named 'zeros'.*whose length the entry gives by memory="),
         ("    f(x, K)", "'f' calls itself; try a loop"),
         ("    two(x)", r"expected two\(x, k\), got 1 argument"),

@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.forces.base import Action, Force
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import Mode
 from mbd.testing.mechanisms import random_body, random_frame

@@ -13,9 +13,9 @@ import pytest
 import mbd
 from mbd.errors import CapabilityError
 from mbd.kernel import build
-from mbd.kernel.interpreted import InterpretedScheme
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes import contract
+from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.testing import LawBroken, schemes as kit
 from mbd.testing.findings import Findings
 from tests.kernel import midpoint

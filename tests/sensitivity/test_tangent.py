@@ -9,7 +9,7 @@ import pytest
 
 import mbd
 from mbd.kernel.build import object_of
-from mbd.kernel.translate import Source, functions_of, translate
+from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.run_data import unknown
 from mbd.sensitivity.tangent.printer import LANES, tangent_text

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel import events as kernel_events
 from mbd.kernel.codes import NO_IMPACT
+from mbd.kernel.events import handling as kernel_events
 from tests.simulation.mechanisms import G
 
 DT = 2e-3

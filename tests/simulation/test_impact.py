@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from tests.simulation.mechanisms import G, ball, box, falling, kneed_walker, kneed_walker_start, point, run, two_balls
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel import events as kernel_events
 from mbd.kernel.codes import NO_IMPACT
+from mbd.kernel.events import handling as kernel_events
 from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, point, run, two_balls
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel.events import same_instant
+from mbd.kernel.events.handling import same_instant
 from mbd.kernel.records import Kernel
 from tests.simulation.judging import complaints
 from tests.simulation.wild import wild_scene

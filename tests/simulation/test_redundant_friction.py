@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.equations.programs import balance_with
-from mbd.kernel.redundancy import LEAST_SHARE
+from mbd.kernel.algebra.redundancy import LEAST_SHARE
 from tests.simulation.frictions import check_friction
 from tests.simulation.mechanisms import G
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel import contact_step
+from mbd.kernel.stepping import contact_step
 
 SCHEMES = [mbd.HHT(), mbd.HHT(0.3), mbd.Newmark(), mbd.GeneralizedAlpha(0.5), mbd.HHT(0.1, formulation="index3"),
            mbd.RadauIIA(), mbd.RungeKutta853()]  # fmt: skip

@@ -9,8 +9,8 @@ import pytest
 
 import mbd
 from mbd.errors import CapabilityError, ModelError, SimulationError
-from mbd.kernel.interpreted import InterpretedScheme
 from mbd.kernel.records import TABLE
+from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.results.matching import apart
 from mbd.simulation.run.begin import notify
 from mbd.simulation.simulate import prepared

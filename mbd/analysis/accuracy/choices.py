@@ -16,7 +16,7 @@ from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.run.strategy import chosen as strategy_of

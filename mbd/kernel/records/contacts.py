@@ -58,7 +58,7 @@ class Frictions(Contacts):
     was: Integers = integers(lambda s: s.n_frictions, kept=True)  # at the last restart: 0 off, 2 sticking, ±1 sliding
     let_go: Integers = integers(lambda s: s.n_frictions)  # 1: a friction that has let go for the step being tried
     slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding; of two directions its cosines
-    hold: Reals = reals(lambda s: s.n_frictions, kept=True)  # how much of these counts: see `mbd.kernel.cones`
+    hold: Reals = reals(lambda s: s.n_frictions, kept=True)  # how much of these counts: see `mbd.kernel.contact.cones`
     own_hold: Reals = reals(lambda s: s.n_frictions)  # the same of a step whose directions are found by continuation
     lean: Reals = reals(lambda s: s.n_frictions, kept=True)  # the direction in which each slid last
     across: Reals = reals(lambda s: s.n_frictions)  # γ left across directions that are held, over γ before the step

@@ -46,7 +46,7 @@ class Runs(SchemeAbilities):
     noted_integers: Integers = integers(lambda s: 0)
     noted_counts: Integers = integers(lambda s: 0)
     starts: Reals = reals(lambda s: 0)  # t, q, (v, z), anchors, closed, armed of each run
-    ends: Reals = reals(lambda s: 0)  # see `mbd.kernel.many_runs.note_end`
+    ends: Reals = reals(lambda s: 0)  # see `mbd.kernel.stepping.many_runs.note_end`
     given_parameters: Reals = reals(lambda s: 0)  # of each run
     lines: Reals = reals(lambda s: 0)  # of the log, the first ones of each run
     resets: Integers = integers(lambda s: s.n_guards)  # 1: what resets the state after this event comes after the run

@@ -37,7 +37,9 @@ class Sizes(Record):
 
     n_kkt: int = formula(lambda s: s.n + s.n_rows)  # unknowns of balance and rows together
     n_unknowns: int = formula(lambda s: s.n_rows * (s.n_contacts + s.n_frictions > 0))  # of a problem over cones
-    n_discs: int = formula(lambda s: min(s.n_cones, 1) * (s.n_contacts + s.n_frictions))  # see `mbd.kernel.discs`
+    n_discs: int = formula(
+        lambda s: min(s.n_cones, 1) * (s.n_contacts + s.n_frictions)
+    )  # see `mbd.kernel.contact.discs`
     n_disc_unknowns: int = formula(lambda s: min(s.n_cones, 1) * (s.n_rows + 1))
     n_tangent: int = formula(
         lambda s: s.n_kkt * s.n_kkt + 3 * (s.n + 2 * s.n_rows + s.n_rows * s.n) + 2 * s.n_kkt + 2

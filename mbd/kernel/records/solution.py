@@ -60,7 +60,9 @@ class Complementarity(SchemeAbilities):
     cone_dropped: Integers = integers(lambda s: s.n_unknowns)  # dependent rows before it
     turn: Integers = integers(lambda s: s.n_contacts)  # in which each is tested for Painlevé's paradox, −1 for none
     cone_slips: Reals = reals(lambda s: s.n_frictions)
-    brink: Reals = reals(lambda s: s.n_rows)  # multipliers at the largest load that sticks: see `mbd.kernel.cone_loads`
+    brink: Reals = reals(
+        lambda s: s.n_rows
+    )  # multipliers at the largest load that sticks: see `mbd.kernel.contact.cone_loads`
     rise: Reals = reals(lambda s: s.n_frictions)  # what a push of one more adds to each limit
     freedom: Reals = reals(lambda s: s.n_rows * s.n_disc_unknowns)  # multipliers without forces
     null_vectors: Reals = reals(lambda s: s.n_rows * s.n_rows)  # all of them, line by line
@@ -108,7 +110,9 @@ class LinearAlgebra(SchemeAbilities):
     spare: Reals = reals(lambda s: 2 * s.n_kkt * (s.n_kkt + 1) + s.n + 2 * s.n_rows + s.n_rows * s.n)
     pivots: Integers = integers(lambda s: s.n_kkt)
     columns: Integers = integers(lambda s: s.n_kkt)
-    island: Integers = integers(lambda s: s.n_kkt)  # number of the island of each unknown: see `mbd.kernel.islands`
+    island: Integers = integers(
+        lambda s: s.n_kkt
+    )  # number of the island of each unknown: see `mbd.kernel.contact.islands`
     members: Integers = integers(lambda s: s.n_kkt)  # unknowns of one
     own_columns: Integers = integers(lambda s: s.n_kkt)  # `columns` of one
 
@@ -132,7 +136,9 @@ class Report(SchemeAbilities):
     failure_size: float = place("detail")  # its residual, or whatever is too large
     failure_step: float = place("detail")
     failure_index: int = place("state")  # contact, column or row
-    unforeseen_change: float = place("detail")  # growth of rates that nothing predicted: see `mbd.kernel.resolution`
+    unforeseen_change: float = place(
+        "detail"
+    )  # growth of rates that nothing predicted: see `mbd.kernel.stepping.resolution`
     coarse_start: float = place("detail")  # where the last of the steps `n_coarse` began
     coarsest_end: float = place("detail")  # where the one with the largest change ended
     coarsest_change: float = place("detail")

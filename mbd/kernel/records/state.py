@@ -89,7 +89,9 @@ class State(SchemeAbilities):
     step_taken: float = place("clock")  # by the candidate
     restart_due: int = place("state")  # 1: and the restart is stored as a row, 2: it is not
     misfit: float = place("clock")  # largest value of rows that depend on others at the last candidate [m, rad]
-    extent: float = place("clock")  # length of the mechanism, as far as it is known: see `mbd.kernel.scales` [m]
+    extent: float = place(
+        "clock"
+    )  # length of the mechanism, as far as it is known: see `mbd.kernel.stepping.scales` [m]
     turned: float = place("clock")  # way of joints whose coordinates do not add since the last row [rad]
     part_turn: float = place("clock")  # largest way of these in a step, where more has failed, 0: a quarter turn [rad]
     halvings: int = place("state")  # how often the step is halved

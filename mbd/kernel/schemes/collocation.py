@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.kernel.roots import sqrt
+from mbd.kernel.algebra.roots import sqrt
 
 __all__ = ["RADAU", "Collocation", "radau_iia"]
 

@@ -5,7 +5,7 @@ it (`mbd.integrators.base.Integrator.scheme`) and gives its parameters (`numbers
 is: its abilities are numbers of the kernel's record, and its functions are called as ``scheme_start``, ``scheme_step``,
 ``scheme_accept``, ``scheme_resume`` and ``scheme_error`` (`mbd.kernel.hooks`), which `dispatch` makes.
 
-The functions are compiled with all that they call, from any module: they use what `mbd.kernel.translate` knows of
+The functions are compiled with all that they call, from any module: they use what `translation.translate` knows of
 Python.
 """
 
@@ -23,9 +23,9 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.errors import CapabilityError
-from mbd.kernel.hints import shown
 from mbd.kernel.records import Kernel, Sizes
-from mbd.kernel.restart import take_consistent
+from mbd.kernel.stepping.restart import take_consistent
+from mbd.kernel.translation.hints import shown
 
 __all__ = ["MEMORY", "NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "scheme_named", "schemes"]
 

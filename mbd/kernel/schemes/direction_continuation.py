@@ -10,7 +10,7 @@ Continuation Methods, ch. 2).
 from __future__ import annotations
 
 from mbd.kernel.codes import NOT_CONVERGED, STAGNATED
-from mbd.kernel.cones import HELD, ONSET, fill_slips
+from mbd.kernel.contact.cones import HELD, ONSET, fill_slips
 from mbd.kernel.records import ContactRows, Frictions
 
 __all__ = ["FOLLOWS", "OWN", "begin_continuation", "continue_directions", "wants_continuation"]

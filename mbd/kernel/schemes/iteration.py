@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import EPS
-from mbd.kernel.cones import fill_slips
+from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Model, Motion, Settings, SingularSteps, Steps
-from mbd.kernel.restart import compose, note_scales
-from mbd.kernel.scales import ROUGH, add_force_floors
 from mbd.kernel.singular.step_pairs import WHOLE
+from mbd.kernel.stepping.restart import compose, note_scales
+from mbd.kernel.stepping.scales import ROUGH, add_force_floors
 
 __all__ = [
     "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_below_floors", "is_small", "overturns", "predict",
@@ -116,7 +116,7 @@ def roughly(K: Model) -> float:
 
 
 def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
-    """Whether a residual that falls no more is round-off beside what `mbd.kernel.scales` tells of forces that vanish.
+    """Whether a residual that falls no more is round-off beside what `stepping.scales` tells of forces that vanish.
 
     Scales, which were raised to terms at the iterate, are those with their floors then.
     """
@@ -186,7 +186,7 @@ def runs_away(K: Equations, m: int) -> bool:
 def finish(K: Steps, h: float) -> bool:
     """The converged block becomes the candidate; whether it changes little, so that no other look at it is needed.
 
-    That is: it neither `overturns` nor fails the first look of `mbd.kernel.resolution`, as in most steps of a motion.
+    That is: it neither `overturns` nor fails the first look of `stepping.resolution`, as in most steps of a motion.
     """
     compose(K, K.q1)
     most = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.records import SingularSteps, State, Steps
-from mbd.kernel.restart import note_scales, raise_scales, retain_scales
+from mbd.kernel.stepping.restart import note_scales, raise_scales, retain_scales
 
 __all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step"]
 

@@ -7,13 +7,9 @@ the velocity formulas of the scheme with their own rate ż, of order 2 as well (
 
 from __future__ import annotations
 
-from mbd.kernel.charts import find_chart_end
 from mbd.kernel.codes import PASSING
-from mbd.kernel.conditioning import is_ill_conditioned, refine_accelerations
-from mbd.kernel.cones import HELD
-from mbd.kernel.mass_ratios import excuses_much, is_uneven
+from mbd.kernel.contact.cones import HELD
 from mbd.kernel.records import Balance, Kernel, Steps
-from mbd.kernel.restart import compose, consistent, fill_block, lower_to_step, measure_accepted, take_consistent
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.direction_continuation import (
     FOLLOWS,
@@ -25,6 +21,17 @@ from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead, start_step
 from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
 from mbd.kernel.singular.newmark_step import singular_newmark_step
+from mbd.kernel.stepping.charts import find_chart_end
+from mbd.kernel.stepping.conditioning import is_ill_conditioned, refine_accelerations
+from mbd.kernel.stepping.mass_ratios import excuses_much, is_uneven
+from mbd.kernel.stepping.restart import (
+    compose,
+    consistent,
+    fill_block,
+    lower_to_step,
+    measure_accepted,
+    take_consistent,
+)
 
 __all__ = ["SCHEME", "newmark_accept", "newmark_error", "newmark_resume", "newmark_start", "newmark_step"]
 

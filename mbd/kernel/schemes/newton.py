@@ -6,21 +6,12 @@ straight-line code. The stabilized form corrects positions by U first, then the 
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor
+from mbd.kernel.algebra.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, TOO_NEAR, TOO_TIGHT
 from mbd.kernel.hooks import call, call_on
-from mbd.kernel.linear import factor
-from mbd.kernel.mass_ratios import has_settled
-from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
 from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, Steps
-from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import (
-    add_shares,
-    note_scales,
-    raise_scales,
-    restore_scales,
-    retain_scales,
-    share_loads,
-)
 from mbd.kernel.schemes.iteration import (
     finish,
     is_below_floors,
@@ -33,6 +24,15 @@ from mbd.kernel.schemes.iteration import (
 )
 from mbd.kernel.singular.newmark_step import WITHIN, misses, singular_newmark_step, steps_by_pivot, steps_to_singularity
 from mbd.kernel.singular.step_pairs import is_whole
+from mbd.kernel.stepping.mass_ratios import has_settled
+from mbd.kernel.stepping.restart import (
+    add_shares,
+    note_scales,
+    raise_scales,
+    restore_scales,
+    retain_scales,
+    share_loads,
+)
 from mbd.kernel.tangent_rules import follow_matrix, further_corrections, note_matrix
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]

@@ -8,19 +8,10 @@ acceleration level, which makes them as accurate as positions and velocities.
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT
-from mbd.kernel.cones import HELD
+from mbd.kernel.contact.cones import HELD
 from mbd.kernel.records import Kernel, Settings, SingularSteps, Steps
-from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import (
-    lower_to_step,
-    measure_accepted,
-    note_scales,
-    raise_scales,
-    restore_scales,
-    retain_scales,
-)
-from mbd.kernel.scales import ROUGH, add_force_floors
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.direction_continuation import (
@@ -57,6 +48,15 @@ from mbd.kernel.singular.stages import (
     spans_singularity,
 )
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms
+from mbd.kernel.stepping.restart import (
+    lower_to_step,
+    measure_accepted,
+    note_scales,
+    raise_scales,
+    restore_scales,
+    retain_scales,
+)
+from mbd.kernel.stepping.scales import ROUGH, add_force_floors
 from mbd.kernel.tangent_rules import further_corrections
 
 __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import NOT_CONVERGED, SINGULAR
-from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Balance, Kernel, Steps
-from mbd.kernel.restart import (
-    compose,
-    consistent,
-    evaluate,
-    find_sliding_friction,
-    holds_rows,
-    load_accelerations,
-)
-from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.stage_layout import (
     A_,
     E_,
@@ -30,6 +22,14 @@ from mbd.kernel.schemes.stages import (
     load_stage,
 )
 from mbd.kernel.singular.step_size import note_row_norms
+from mbd.kernel.stepping.restart import (
+    compose,
+    consistent,
+    evaluate,
+    find_sliding_friction,
+    holds_rows,
+    load_accelerations,
+)
 
 __all__ = ["complete"]
 

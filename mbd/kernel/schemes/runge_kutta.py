@@ -11,23 +11,31 @@ that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import solve_definite, solve_from_tips
+from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.redundancy import sharing
+from mbd.kernel.algebra.roots import sqrt
+from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
-from mbd.kernel.free_rates import NOT_CLEAR, free_rates, rates_in_block
 from mbd.kernel.hooks import call
-from mbd.kernel.linear import solve_definite, solve_from_tips
-from mbd.kernel.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
-from mbd.kernel.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.records import Balance, DependentRows, Equations, Kernel, Memory, SingularSteps, Steps
-from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import compose, consistent, displace, evaluate, fill_block, measure_accepted, raise_scales
-from mbd.kernel.roots import sqrt
-from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.kernel.schemes.memory import accept_step, forget_steps
 from mbd.kernel.schemes.tableau import Tableau
 from mbd.kernel.singular.newmark_step import CONTINUOUS
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
+from mbd.kernel.stepping.free_rates import NOT_CLEAR, free_rates, rates_in_block
+from mbd.kernel.stepping.mass_ratios import LOSS, is_uneven, polish_rates, polish_with_rows
+from mbd.kernel.stepping.restart import (
+    compose,
+    consistent,
+    displace,
+    evaluate,
+    fill_block,
+    measure_accepted,
+    raise_scales,
+)
 
 __all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -240,7 +248,7 @@ def explicit_rates(K: Balance, t: float) -> int:
 
 
 def note_pull(K: Balance) -> None:
-    """``v̇·M v̇ = −v̇·f`` of the rates in K.jump, if it is the largest of the step, for `mbd.kernel.poles`."""
+    """``v̇·M v̇ = −v̇·f`` of the rates in K.jump, if it is the largest of the step, for `mbd.kernel.stepping.poles`."""
     pull = 0.0
     for i in range(K.n_v):
         pull -= K.jump[i] * K.acc[K.acc_f + i]

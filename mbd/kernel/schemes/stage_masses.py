@@ -12,9 +12,9 @@ so that the same matrices serve, for other residuals.
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import solve_definite
 from mbd.kernel.codes import ACCELERATIONS
 from mbd.kernel.hooks import call
-from mbd.kernel.linear import solve_definite
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.stage_layout import BALANCES, MASS_PART, stage_place
 from mbd.kernel.schemes.stages import correct_stages, load_stage

@@ -7,15 +7,14 @@ together from three of them.
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.complex_linear import factor_complex, solve_complex
+from mbd.kernel.algebra.linear import factor
+from mbd.kernel.algebra.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.algebra.ordered_complex import factor_pair_ordered, solve_pair_ordered
+from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import PASSING
-from mbd.kernel.complex_linear import factor_complex, solve_complex
 from mbd.kernel.hooks import call
-from mbd.kernel.linear import factor
-from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
-from mbd.kernel.ordered_complex import factor_pair_ordered, solve_pair_ordered
 from mbd.kernel.records import DependentRows, SingularSteps, Steps
-from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import add_shares
 from mbd.kernel.schemes.stage_layout import (
     BALANCES,
     HELD,
@@ -33,6 +32,7 @@ from mbd.kernel.schemes.stage_layout import (
     STIFF_PART,
     stage_place,
 )
+from mbd.kernel.stepping.restart import add_shares
 
 __all__ = ["factor_stages", "keep_held", "matrices", "solve_pair", "solve_real"]
 

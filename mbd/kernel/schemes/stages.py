@@ -14,13 +14,12 @@ held over the step. Newton's matrices are those of `stage_matrices`.
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.ordered import solve_kkt
+from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, INCREMENT_RATES
-from mbd.kernel.cones import fill_slips
+from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
-from mbd.kernel.ordered import solve_kkt
 from mbd.kernel.records import Kernel, SingularSteps, Steps
-from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import share_loads
 from mbd.kernel.schemes.iteration import residual_size
 from mbd.kernel.schemes.stage_layout import (
     A2_,
@@ -43,6 +42,7 @@ from mbd.kernel.schemes.stage_layout import (
     stage_place,
 )
 from mbd.kernel.schemes.stage_matrices import matrices, solve_pair, solve_real
+from mbd.kernel.stepping.restart import share_loads
 
 __all__ = [
     "correct_rates", "correct_stages", "evaluate_stages", "hold_block", "load_stage", "predict_stages",

@@ -3,22 +3,22 @@
 Within τ of such a configuration round-off δ of a row makes velocities wrong by the share c/τ² (`step_size`).
 No step may end there, and no scheme can restart from there. An event that changes nothing needs neither: the step over
 the configuration stays as it is, and time and state of the event come from the quintic Hermite interpolant of the step
-(`mbd.kernel.guard_substeps`). One that changes something ends the run with an error of its own (`refuses`).
+(`mbd.kernel.events.guard_substeps`). One that changes something ends the run with an error of its own (`refuses`).
 """
 
 from __future__ import annotations
 
-from mbd.kernel.candidate import accept_guards
+from mbd.kernel.algebra.orthogonal import square
+from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CROSS, LOG_EVENT
-from mbd.kernel.contact_modes import NO_IMPULSE, log_event
-from mbd.kernel.guard_substeps import copy_ends, interpolate_candidate, put_candidate_back
-from mbd.kernel.guards import judge_user
-from mbd.kernel.observe import store_state
-from mbd.kernel.orthogonal import square
+from mbd.kernel.contact.contact_modes import NO_IMPULSE, log_event
+from mbd.kernel.events.guard_substeps import copy_ends, interpolate_candidate, put_candidate_back
+from mbd.kernel.events.guards import judge_user
 from mbd.kernel.records import DependentRows, Kernel, SingularSteps, Switching
-from mbd.kernel.restart import evaluate
-from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.step_size import NEGLIGIBLE_NOISE, TOO_NOISY, motion, noise_coefficient, row_norms
+from mbd.kernel.stepping.candidate import accept_guards
+from mbd.kernel.stepping.observe import store_state
+from mbd.kernel.stepping.restart import evaluate
 
 __all__ = ["find_passed_events", "log_passed_events", "may_pass_events", "refuses"]
 

@@ -7,9 +7,9 @@ they were cleared of, G keeps its zeros: a row that is done makes neighbours of 
 
 from __future__ import annotations
 
-from mbd.kernel.column_weights import counted_inertia, least_inertia
+from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
+from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import DependentRows, Singular, SingularSteps
-from mbd.kernel.roots import sqrt
 
 __all__ = ["common_part", "pivoted_gram_norms_of_many"]
 

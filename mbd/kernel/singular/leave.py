@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mbd.kernel.accept_restart import project_velocity
-from mbd.kernel.guards import update_armed, update_sides, watch
+from mbd.kernel.events.guards import update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
 from mbd.kernel.records import Kernel
-from mbd.kernel.restart import consistent, stepping_rows
+from mbd.kernel.stepping.accept_restart import project_velocity
+from mbd.kernel.stepping.restart import consistent, stepping_rows
 
 __all__ = ["leave_singularity"]
 

@@ -6,24 +6,15 @@ onto the rows and the scheme starts again, but for the average that it carries. 
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
+from mbd.kernel.algebra.linear import factor
+from mbd.kernel.algebra.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
+from mbd.kernel.algebra.orthogonal import clear_row, square
+from mbd.kernel.algebra.redundancy import sharing
+from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
-from mbd.kernel.column_weights import counted_inertia, least_inertia
 from mbd.kernel.hooks import call
-from mbd.kernel.linear import factor
-from mbd.kernel.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
-from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.records import DependentRows, Kernel, Motion, SingularSteps
-from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import (
-    add_shares,
-    note_scales,
-    raise_scales,
-    restore_scales,
-    retain_scales,
-    share_loads,
-)
-from mbd.kernel.roots import sqrt
-from mbd.kernel.scales import still_speed
 from mbd.kernel.schemes.iteration import (
     finish,
     is_below_floors,
@@ -35,6 +26,15 @@ from mbd.kernel.schemes.iteration import (
 )
 from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
 from mbd.kernel.singular.step_pairs import is_of_pair, is_whole
+from mbd.kernel.stepping.restart import (
+    add_shares,
+    note_scales,
+    raise_scales,
+    restore_scales,
+    retain_scales,
+    share_loads,
+)
+from mbd.kernel.stepping.scales import still_speed
 
 __all__ = ["misses", "singular_newmark_step", "steps_by_pivot", "steps_to_singularity"]
 

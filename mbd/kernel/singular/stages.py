@@ -15,14 +15,14 @@ linearly, the faster the shorter the step.
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.ordered import LOSS_OF_STEP, solve_kkt
+from mbd.kernel.algebra.redundancy import sharing
+from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, NOT_FINITE, PASSING, SINGULAR
-from mbd.kernel.ordered import LOSS_OF_STEP, solve_kkt
 from mbd.kernel.records import DependentRows, Kernel, Memory, Steps
-from mbd.kernel.redundancy import sharing
-from mbd.kernel.restart import compose, evaluate
-from mbd.kernel.saddle import factor_saddle
 from mbd.kernel.schemes.stage_layout import A2_, CHANGES, PAIR, STAGE_LAM, STAGE_RATES, STAGE_SHIFT, stage_place
 from mbd.kernel.schemes.stages import hold_block, load_stage
+from mbd.kernel.stepping.restart import compose, evaluate
 
 __all__ = ["BESIDE_NOISY", "spans_singularity", "is_beside_singularity", "solve_singular_stages", "replace_row_rates"]
 

@@ -11,10 +11,11 @@ columns scaled by √M_ii, passes zero. |w| at the ends of steps tells where it 
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
+from mbd.kernel.algebra.ordered import order_at
+from mbd.kernel.algebra.orthogonal import clear_row, square
+from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, PASSING
-from mbd.kernel.column_weights import counted_inertia, least_inertia
-from mbd.kernel.ordered import order_at
-from mbd.kernel.orthogonal import clear_row, square
 from mbd.kernel.records import (
     DependentRows,
     Equations,
@@ -27,9 +28,8 @@ from mbd.kernel.records import (
     SingularSteps,
     Steps,
 )
-from mbd.kernel.restart import compose, evaluate, fill_block
-from mbd.kernel.roots import sqrt
 from mbd.kernel.singular.gram_norms import common_part
+from mbd.kernel.stepping.restart import compose, evaluate, fill_block
 
 __all__ = [
     "NEGLIGIBLE_NOISE", "TOO_NOISY", "forget_row_norms", "is_resolved", "accept_row_norms", "row_norms", "motion",

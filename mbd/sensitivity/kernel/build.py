@@ -65,8 +65,8 @@ def machine_code(function: Callable[..., int], kinds: Sequence[str]) -> Any:
 
     def compiled() -> bytes:
         from mbd.kernel.build import object_of
-        from mbd.kernel.llvm import llvm_text
-        from mbd.kernel.translate import source_of, translate
+        from mbd.kernel.translation.llvm import llvm_text
+        from mbd.kernel.translation.translate import source_of, translate
 
         trees = translate(source_of(function.__module__), function.__name__, ["kernel", *kinds])
         return object_of(llvm_text(trees, name))

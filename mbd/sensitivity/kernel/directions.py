@@ -29,7 +29,7 @@ def add(A: Reals, i: int, part: float, B: Reals, k: int, width: int) -> None:
 
 
 def solve_all(A: Reals, n: int, pivots: Integers, B: Reals, width: int) -> None:
-    """B ← A⁻¹ B (n, width) with the factors of `mbd.kernel.linear.factor`."""
+    """B ← A⁻¹ B (n, width) with the factors of `mbd.kernel.algebra.linear.factor`."""
     for k in range(n):
         p = pivots[k]
         if p != k:

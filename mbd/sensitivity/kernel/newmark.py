@@ -18,8 +18,8 @@ are theirs, `turns` and `room` for them, `own` (n_v, D).
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor
 from mbd.kernel.hooks import call_on
-from mbd.kernel.linear import factor
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.charts import enter, increment, leave, place_in_chart
 from mbd.sensitivity.kernel.directions import clear, solve_all

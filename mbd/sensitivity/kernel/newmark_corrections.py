@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call_on
-from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.directions import add, clear
 from mbd.sensitivity.kernel.entries import metric

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call_on
-from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.charts import place_in_chart
 from mbd.sensitivity.kernel.directions import clear

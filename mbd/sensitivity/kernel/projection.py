@@ -8,8 +8,8 @@ derivatives of the balance at rates W and multipliers ν have beside those at ze
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call_on
-from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.charts import compose, enter, leave
 from mbd.sensitivity.kernel.directions import add, clear, solve_all

@@ -10,8 +10,8 @@ do not add, stages are in the chart around the start of the step (`radau_charts`
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call_on
-from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.balance import consistent
 from mbd.sensitivity.kernel.charts import compose, enter, leave

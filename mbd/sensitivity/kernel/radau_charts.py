@@ -12,8 +12,8 @@ what charts give at the stages. Programs: from 2 on those of `charts`.
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call_on
-from mbd.kernel.linear import factor, solve
 from mbd.kernel.records import Integers, Model, Reals
 from mbd.sensitivity.kernel.directions import add
 from mbd.sensitivity.kernel.sizes import (

@@ -13,7 +13,7 @@ from typing import Any
 
 from mbd.kernel import build
 from mbd.kernel.schemes import contract
-from mbd.kernel.translate import Source, functions_of, translate
+from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.tangent import rules
 from mbd.sensitivity.tangent.printer import tangent_text
 
@@ -22,9 +22,10 @@ __all__ = ["entry"]
 ENTRY = "mbd_tangent_kernel"
 LEVEL = 2
 HELD = (
-    "locate.locate", "locate.find_jump", "hooks.scheme_error", "restart.refresh_scales", "restart.weigh",
-    "schemes.iteration.residual_size", "schemes.iteration.is_below_floors", "guards.judge", "guards.is_quiet",
-    "guard_substeps.parts_to_take", "resolution.judge_change",
+    "events.locate.locate", "events.locate.find_jump", "hooks.scheme_error", "stepping.restart.refresh_scales",
+    "stepping.restart.weigh", "schemes.iteration.residual_size", "schemes.iteration.is_below_floors",
+    "events.guards.judge", "events.guards.is_quiet", "events.guard_substeps.parts_to_take",
+    "stepping.resolution.judge_change",
 )  # fmt: skip
 """Functions without derivatives: instants are found by values, sizes of forces and of errors judge only."""
 
@@ -58,7 +59,7 @@ def _object() -> bytes:
 
 def text() -> str:
     """The kernel with derivatives in LLVM's words."""
-    from mbd.kernel.advance import advance
+    from mbd.kernel.stepping.advance import advance
 
     dispatched, names = contract.dispatch()
     own = Source("hooks", functions_of(dispatched), {**names, "advance": advance})

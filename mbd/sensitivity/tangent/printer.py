@@ -1,4 +1,4 @@
-"""Typed trees of the kernel (`mbd.kernel.tree`) → LLVM IR in which every real carries its derivatives.
+"""Typed trees of the kernel (`mbd.kernel.translation.tree`) → LLVM IR in which every real carries its derivatives.
 
 A real is a value and a vector of `LANES` derivatives, one for each direction; an array of reals is two addresses, the
 array and one with a vector for each of its numbers; the kernel is two tables, whose fields have the same places. Rules
@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Sequence
 
-from mbd.kernel import tree
-from mbd.kernel.llvm import HEAD, LLVM, TAGS, Body, Value, tags
 from mbd.kernel.records import TABLE
+from mbd.kernel.translation import tree
+from mbd.kernel.translation.llvm import HEAD, LLVM, TAGS, Body, Value, tags
 
 __all__ = ["LANES", "tangent_text"]
 

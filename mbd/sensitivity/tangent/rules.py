@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from mbd.kernel.accept_restart import event_at_start, event_candidate
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK
-from mbd.kernel.guards import guard_value, watch
+from mbd.kernel.events.guards import guard_value, watch
 from mbd.kernel.hooks import call_on
-from mbd.kernel.ordered import solve_kkt
 from mbd.kernel.records import Kernel
-from mbd.kernel.restart import compose, consistent, fill_block
+from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate
+from mbd.kernel.stepping.restart import compose, consistent, fill_block
 
 __all__ = [
     "at_root",

@@ -13,7 +13,7 @@ from mbd.assembly.given_state import LARGEST_ANGLE, fits
 from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.errors import ModelError, UnknownNameError, nearest
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.run.many import start_line
 from mbd.simulation.run.run import Run
 from mbd.state import State

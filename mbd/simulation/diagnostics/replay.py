@@ -14,7 +14,7 @@ from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
-from mbd.kernel.interpreted import InterpretedScheme
+from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
 from mbd.simulation.diagnostics.failures import residual_names

@@ -10,7 +10,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.given_state import beyond_angles
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import array_function
-from mbd.kernel.charts import QUARTER_TURN
+from mbd.kernel.stepping.charts import QUARTER_TURN
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
@@ -78,7 +78,7 @@ def _largest_ways(record: Record) -> Vector:
 
 
 def _divided_steps(run: RunData, record: Record) -> list[str]:
-    """A note on each joint whose coordinates do not add for which steps were divided (`mbd.kernel.charts`)."""
+    """A note on each joint whose coordinates do not add for which steps were divided (`mbd.kernel.stepping.charts`)."""
     found = list[str]()
     if run.dt * SIDEWAYS * float(np.max(np.abs(record.v), initial=0.0)) <= QUARTER_TURN:
         return found

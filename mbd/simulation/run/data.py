@@ -16,7 +16,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equations.switching_times import jumps_between
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord

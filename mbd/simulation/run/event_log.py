@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from mbd.arrays import Matrix, Vector, read_only
-from mbd.kernel.active_set import ActiveSetManager
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.results.record import EventRecord
 
 __all__ = ["EventLog", "Impulses"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.errors import MbdError
 from mbd.kernel import codes
-from mbd.kernel.many_runs import END_NUMBERS
+from mbd.kernel.stepping.many_runs import END_NUMBERS
 from mbd.simulation.run.late_resets import may_reset_late
 from mbd.simulation.run.plain import PlainScheme
 from mbd.simulation.run.run import Run

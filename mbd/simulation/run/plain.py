@@ -13,12 +13,12 @@ from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.equations.programs import mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
-from mbd.kernel.active_set import ActiveSetManager
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
-from mbd.kernel.mass_ratios import LOSS
+from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
-from mbd.kernel.restart import MOST_LOADS, fill_block, refresh_scales, take_consistent
 from mbd.kernel.schemes.memory import start_step
+from mbd.kernel.stepping.mass_ratios import LOSS
+from mbd.kernel.stepping.restart import MOST_LOADS, fill_block, refresh_scales, take_consistent
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.user_calls import call_user
 from mbd.state import Mode, State
@@ -57,7 +57,7 @@ class MechanismSystem(System):
 
     @property
     def slips(self) -> Any:
-        """What programs know of sliding: signs, of two directions how they are held (`mbd.kernel.cones`)."""
+        """What programs know of sliding: signs, of two directions how they are held (`mbd.kernel.contact.cones`)."""
         if not self.pairs.any():
             return self.slip
         hold = self.hold[: len(self.slip)]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbd.kernel import codes
-from mbd.kernel.cones import HELD, ONSET
+from mbd.kernel.contact.cones import HELD, ONSET
 from mbd.kernel.records import TABLE, Kernel
 from mbd.simulation.run.data import RunData
 from mbd.state import Memory, Mode, are_names

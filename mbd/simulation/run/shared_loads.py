@@ -9,7 +9,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import AccelerationTerms
 from mbd.equations.equations import Row
-from mbd.kernel.redundancy import LEAST_SHARE
+from mbd.kernel.algebra.redundancy import LEAST_SHARE
 
 __all__ = ["shares"]
 

@@ -13,11 +13,11 @@ from mbd.errors import MemoryLimitError, ModelError
 from mbd.integrators.base import Integrator
 from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
 from mbd.kernel import codes
-from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.contact_modes import room_to_log
-from mbd.kernel.interpreted import InterpretedScheme
+from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.kernel.contact.contact_modes import room_to_log
 from mbd.kernel.records import PROGRAMS, Kernel
 from mbd.kernel.schemes.contract import NO_SCHEME
+from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.simulation.run.call_table import CallTable
 from mbd.simulation.run.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.simulation.run.shelves import Shelves, plan_of
@@ -240,20 +240,20 @@ class Stepper:
 
     def store_row(self) -> None:
         """Store the accepted state as a row of the results."""
-        from mbd.kernel.observe import store_row
+        from mbd.kernel.stepping.observe import store_row
 
         store_row(self.kernel)
 
     def hold(self) -> None:
         """Give the inputs of the forces the closed contacts, as a start of the scheme would leave them."""
-        from mbd.kernel.restart import fill_block
+        from mbd.kernel.stepping.restart import fill_block
 
         fill_block(self.kernel, self.kernel.time, self.kernel.q, self.kernel.y)
 
     def guard_round_off(self, e: int) -> float:
         """Round-off of a user's guard at the accepted state."""
-        from mbd.kernel.guard_round_off import guard_round_off
-        from mbd.kernel.restart import fill_block, refresh_scales
+        from mbd.kernel.events.guard_round_off import guard_round_off
+        from mbd.kernel.stepping.restart import fill_block, refresh_scales
 
         K = self.kernel
         fill_block(K, K.time, K.q, K.y)
@@ -261,8 +261,8 @@ class Stepper:
         return guard_round_off(K, e, K.time, K.q, K.y)
 
     def _advance_plain(self) -> int:
-        from mbd.kernel.advance import advance
-        from mbd.kernel.many_runs import march_many
+        from mbd.kernel.stepping.advance import advance
+        from mbd.kernel.stepping.many_runs import march_many
 
         self.kernel.hooks = self.scheme
         with np.errstate(all="ignore"):

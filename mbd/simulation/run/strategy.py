@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbd.kernel import codes
-from mbd.kernel.active_set import ActiveSetManager
-from mbd.kernel.crowding import SEVERAL, crowd
+from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.kernel.events.crowding import SEVERAL, crowd
 from mbd.simulation.run.data import RunData
 
 __all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated"]

@@ -1,0 +1,1 @@
+"""Small dense and ordered linear equations, rank, and solutions of least norm."""

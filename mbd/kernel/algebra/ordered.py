@@ -1,0 +1,151 @@
+"""LU factors in an order of pivots chosen beforehand, over the entries that can be other than zero.
+
+For large mechanisms with few neighbours: a chain of loops takes operations in proportion to its length. Orders are
+made by `mbd.compile.orders`, which tells what stands where. Each row is eliminated by the earlier ones, of which it
+knows which concern it. Nothing is exchanged; instead every pivot is compared with what it was made of, as in
+`mbd.tape.elimination`, and where one is too small the caller searches for pivots.
+"""
+
+from __future__ import annotations
+
+from mbd.kernel.algebra.linear import solve
+from mbd.kernel.records import Equations, Motion, Reals
+
+__all__ = [
+    "HEAD", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt", "solve_ordered",
+    "weakest_pivot",
+]  # fmt: skip
+
+HEAD = 3
+"""Numbers before the lists of an order."""
+OF_TANGENT = 0
+"""Values come from the matrix of a step, row-major."""
+OF_ACCELERATIONS = 1
+"""Values come from the program `accelerations`."""
+SYMMETRIC = 2
+"""The same with Bᵀ in the place of R."""
+LOSS_OF_STEP = 1e-8
+"""Part of its terms that a pivot must keep where Newton's method goes on with what is left [-]."""
+LOSS_AT_ONCE = 1e-4
+"""The same where a solution is taken as it is: at most four digits of sixteen are lost [-]."""
+
+
+def order_at(K: Motion, m: int) -> int:
+    """Where the order for the m rows in K.rows begins in K.orders, 0 if there is none."""
+    mode = K.mode_id
+    if mode < 0 or mode >= K.n_modes:
+        return 0
+    o = K.mode_order[mode]
+    if o == 0 or K.orders[o + 1] != m:
+        return 0
+    for k in range(m):
+        if K.orders[o + HEAD + k] != K.rows[k]:
+            return 0
+    return int(o)
+
+
+def factor_ordered(K: Equations, A: Reals, o: int, source: int, loss: float) -> bool:
+    """Factors of the matrix in A by the order at o, into K.kkt, inverse pivots among them; false if one is not sound.
+
+    K.spare holds what is left of a row, by turns of its columns, and behind it the factors.
+    """
+    size = K.orders[o]
+    entries = K.orders[o + 2]
+    o_row = o + HEAD + K.orders[o + 1]
+    o_start = o_row + 2 * size
+    o_own = o_start + size + 1
+    o_turn = o_own + size
+    o_from = o_turn + entries * (1 + source)
+    V = K.spare
+    K.order_start = 0
+    for k in range(size):
+        first = K.orders[o_start + k]
+        own = K.orders[o_own + k]
+        last = K.orders[o_start + k + 1]
+        for e in range(first, last):
+            place = K.orders[o_from + e]
+            value = 0.0
+            if place >= 0:
+                value = A[place]
+            V[K.orders[o_turn + e]] = value
+        before = abs(V[k])
+        terms = before
+        for e in range(first, own):
+            turn = K.orders[o_turn + e]
+            if V[turn] != 0.0:
+                inner = K.orders[o_own + turn]
+                left = V[turn] * V[size + inner]
+                V[turn] = left
+                old = V[k]
+                for f in range(inner + 1, K.orders[o_start + turn + 1]):
+                    V[K.orders[o_turn + f]] -= left * V[size + f]
+                terms += abs(V[k] - old)
+        row = K.orders[o_row + k]
+        diagonal = row == K.orders[o_row + size + k]
+        if not is_sound(abs(V[k]), before, terms, diagonal, row >= K.n, loss):
+            return False
+        V[k] = 1.0 / V[k]
+        for e in range(first, last):
+            V[size + e] = V[K.orders[o_turn + e]]
+    K.kkt[:entries] = V[size : size + entries]
+    K.order_start = o
+    return True
+
+
+def is_sound(size: float, before: float, terms: float, diagonal: bool, multiplier: bool, loss: float) -> bool:
+    """Whether a pivot keeps enough of Σ|terms| of a multiplier, of what it was before of a coordinate.
+
+    One that has grown out of proportion tells that an earlier one was too small.
+    """
+    if not (size > 1e-300 and size < 1e300):
+        return False
+    if not diagonal or terms == before:
+        return True
+    if multiplier:
+        return loss * terms < size
+    return loss * before < size and loss * size < before
+
+
+def weakest_pivot(K: Equations) -> float:
+    """Largest inverse pivot of multipliers among the factors at hand."""
+    o = K.order_start
+    size = K.orders[o]
+    o_row = o + HEAD + K.orders[o + 1]
+    o_own = o_row + 3 * size + 1
+    largest = 0.0
+    for k in range(size):
+        row = K.orders[o_row + k]
+        if row >= K.n and row == K.orders[o_row + size + k]:
+            largest = max(largest, abs(K.kkt[K.orders[o_own + k]]))
+    return largest
+
+
+def solve_ordered(K: Equations, b: Reals) -> None:
+    """b ← A⁻¹ b with the factors of `factor_ordered`; K.spare is written to."""
+    o = K.order_start
+    size = K.orders[o]
+    o_row = o + HEAD + K.orders[o + 1]
+    o_start = o_row + 2 * size
+    o_own = o_start + size + 1
+    o_turn = o_own + size
+    for k in range(size):
+        left = b[K.orders[o_row + k]]
+        for e in range(K.orders[o_start + k], K.orders[o_own + k]):
+            left -= K.kkt[e] * K.spare[K.orders[o_turn + e]]
+        K.spare[k] = left
+    for c in range(size):
+        k = size - 1 - c
+        own = K.orders[o_own + k]
+        left = K.spare[k]
+        for e in range(own + 1, K.orders[o_start + k + 1]):
+            left -= K.kkt[e] * K.spare[K.orders[o_turn + e]]
+        K.spare[k] = left * K.kkt[own]
+        b[K.orders[o_row + size + k]] = K.spare[k]
+
+
+def solve_kkt(K: Equations, size: int, b: Reals) -> None:
+    """b ← A⁻¹ b with the factors in K.kkt, whichever they are."""
+    if K.order_start > 0:
+        solve_ordered(K, b)
+    else:
+        solve(K.kkt, size, K.pivots, b)

@@ -1,0 +1,236 @@
+"""Who pushes and who sticks: contacts and dry friction choose so that every one of them obeys its law.
+
+``M w + force + R λ = 0`` with ``B w + bias = 0`` on held rows, ``0 ≤ B w + bias ⟂ −λ ≥ 0`` on contacts that may choose,
+``|λ_T| ≤ limit`` where a friction sticks and ``λ_T = limit · sign`` where it slides along w.
+
+1. A semismooth Newton method: every contact and friction takes the branch of its law that the last solution asks for,
+   and the linear equations of these branches are solved again (Alart & Curnier 1991; Hintermüller, Ito & Kunisch 2002).
+2. Where that does not end, all laws are solved together as one problem over cones (`cone_contacts`), and 1 goes on from
+   its branches; then only the branch that breaks its law most changes. Multipliers of least norm of dependent rows, by
+   which steps judge, may leave limits that other multipliers keep: then a friction slides that need not.
+3. In impacts, whose impulses nothing judges again, those of the cones stand where 2 finds none and no rows conflict.
+
+Non-smooth steps with friction in space begin with the cones.
+"""
+
+from __future__ import annotations
+
+from mbd.kernel.algebra.roots import sqrt
+from mbd.kernel.codes import CONFLICT, NO_IMPACT
+from mbd.kernel.contact.branches import is_on, solve_directed
+from mbd.kernel.contact.cone_contacts import solve_cones
+from mbd.kernel.contact.cone_directions import misses, turn_directions
+from mbd.kernel.contact.cone_problem import CONE_TOLERANCE
+from mbd.kernel.contact.cones import aim, follows
+from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, DependentRows, Motion
+from mbd.kernel.stepping.restart import active_rows, refresh_scales
+
+__all__ = ["complementarity"]
+
+MAX_NEWTON = 12
+"""Changes of all branches at once before and after the solution over cones [-]."""
+MAX_SINGLE = 4
+"""Changes of the worst branch that follow, for each contact and friction [-]."""
+NEARLY_SOLVED = 0.1
+"""Part of the largest impulse that cones may miss laws by for their branches to be tried [-]."""
+ROUND_OFF = 1e-11
+"""What multipliers and velocities or accelerations may miss of their laws, relative to their terms [-]."""
+SURE = 1e-6
+"""The same for a friction that an event has found to slide: its acceleration is still round-off [-]."""
+
+
+def complementarity(K: Balance, level: int) -> int:
+    """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1 or 2, and solve.
+
+    Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay. With
+    K.loose = 2 a friction slides unless that is clearly wrong. Two that slide together choose as one.
+    level 0: accelerations, force and bias are those of K.acc; 1: velocities, bias and impulses K.given are in place.
+    """
+    measure_free(K, level)
+    if K.n_cones > 0 and K.strategy == 1 and level < 2 and solve_cones(K, level, CONE_TOLERANCE) == 1:
+        return 0
+    status = change_branches(K, level, 0)
+    if status == CONFLICT or status == NO_IMPACT:
+        solve_cones(K, level, NEARLY_SOLVED)  # else from the last branches
+        again = change_branches(K, level, MAX_SINGLE * (K.n_contacts + K.n_frictions))
+        if again != CONFLICT and again != NO_IMPACT:
+            return again
+        if level == 1 and status == NO_IMPACT and again == NO_IMPACT and solve_cones(K, level, CONE_TOLERANCE) == 1:
+            return 0
+        if again == CONFLICT:
+            return again
+    return status
+
+
+def change_branches(K: Balance, level: int, single: int) -> int:
+    """Solve, and change all branches that the solution contradicts, then up to `single` times the worst; a status.
+
+    Where that does not end: CONFLICT if held rows contradicted each other on the way, else NO_IMPACT.
+    """
+    failed = NO_IMPACT
+    for attempt in range(MAX_NEWTON + single):
+        status = solve_branches(K, level)
+        if status == CONFLICT:
+            failed = CONFLICT
+            if give_way(K) == 0:
+                break
+        elif status != 0 or (change_all(K) if attempt < MAX_NEWTON else change_worst(K)) == 0:
+            return status
+    return failed
+
+
+def solve_branches(K: Balance, level: int) -> int:
+    """Solve with the present branches; friction that slides is put into K.impulse of its row, opposite to its way."""
+    status = solve_directed(K, level)
+    if status == 0 and K.n_cones > 0:
+        status = turn_directions(K, level)
+    return status
+
+
+def measure_free(K: Motion, level: int) -> None:
+    """Sizes of w where no row acted, by which its round-off is judged: where all rests w itself is nothing else."""
+    if level == 0 and K.scale[0] == 0.0:
+        refresh_scales(K)
+    for i in range(K.n):
+        mass = abs(K.acc[i * K.n + i])
+        K.typical[i] = abs(K.y[i]) if level == 1 else (K.scale[i] / mass if mass > 0.0 else 0.0)
+
+
+def departure(K: ContactForces, row: int, sign: float, tolerance: float) -> float:
+    """How far sign (B w + bias) of a row is below zero, beyond a tolerance relative to its terms."""
+    n = K.n
+    value = K.bias[row]
+    size = abs(K.bias[row])
+    for j in range(n):
+        slope = K.acc[K.acc_B + row * n + j]
+        value += slope * K.jump[j]
+        size = max(size, abs(slope) * max(abs(K.jump[j]), K.typical[j]))
+    return float(-sign * value - tolerance * size)
+
+
+def contact_fault(K: ContactForces, c: int, largest: float) -> float:
+    """How badly contact c breaks its law; ≤ 0 if it does not."""
+    if K.active[c] == 1 and K.parting[c] == 0:
+        return float(K.impulse[K.normal[c]] - ROUND_OFF * largest)  # λ > 0 would pull
+    return departure(K, K.normal[c], 1.0, ROUND_OFF)
+
+
+def friction_fault(K: ContactForces, f: int, largest: float) -> float:
+    """How badly friction f breaks its law; ≤ 0 if it does not."""
+    row = K.friction_row[f]
+    if K.partner[f] >= 0:
+        return cone_fault(K, f, largest)
+    if K.sticks[f] == 1:
+        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - ROUND_OFF * largest)
+    return departure(K, row, K.slip[f], SURE if K.loose[f] == 2 else ROUND_OFF)  # it slides against its own friction
+
+
+def cone_fault(K: ContactForces, f: int, largest: float) -> float:
+    """How badly two frictions that slide together break their law; the second of them never does."""
+    if follows(K, f):
+        return -1.0
+    if K.sticks[f] == 1:
+        x = K.impulse[K.friction_row[f]] + K.past[K.friction_row[f]]
+        y = K.impulse[K.friction_row[K.partner[f]]] + K.past[K.friction_row[K.partner[f]]]
+        return float(sqrt(x * x + y * y) - K.limit[f] - ROUND_OFF * largest)
+    return misses(K, f, SURE if K.loose[f] == 2 else ROUND_OFF)
+
+
+def give_way(K: DependentRows) -> int:
+    """Where held rows contradict each other, a friction that may choose slides, or a contact opens; 0 if none can.
+
+    It is the one whose row is blamed if it can. Its direction is other than the one it had last.
+    """
+    m = active_rows(K, K.active)
+    chosen = -1
+    for k in range(m):
+        f = K.row_friction[K.rows[k]]
+        if f >= 0 and K.loose[f] > 0 and (chosen < 0 or K.n + k == K.failure_index):
+            chosen = f
+    if chosen >= 0 and K.partner[chosen] >= 0:
+        K.sticks[chosen] = K.sticks[K.partner[chosen]] = 0
+        aim(K, chosen, -K.lean[chosen], -K.lean[K.partner[chosen]])
+        return 1
+    if chosen >= 0:
+        K.sticks[chosen] = 0
+        K.lean[chosen] = 1.0 if K.lean[chosen] < 0.0 else -1.0
+        K.slip[chosen] = K.lean[chosen]
+        return 1
+    for c in range(K.n_contacts):
+        if K.free[c] == 1 and K.active[c] == 1:
+            K.active[c] = 0
+            return 1
+    return 0
+
+
+def largest_impulse(K: Complementarity) -> float:
+    """Size of the multipliers."""
+    largest = 0.0
+    for k in range(K.n_rows):
+        largest = max(largest, abs(K.impulse[k]))
+    return largest
+
+
+def toggle(K: Contacts, c: int) -> None:
+    """The other branch of a contact."""
+    if K.free[c] == 2:
+        K.parting[c] = 1 - K.parting[c]
+    else:
+        K.active[c] = 1 - K.active[c]
+
+
+def turn(K: ContactForces, f: int) -> None:
+    """The other branch of a friction: from sticking to sliding as its multiplier pulls, and back."""
+    p = K.partner[f]
+    if p >= 0:
+        K.sticks[f] = K.sticks[p] = 1 - K.sticks[f]
+        K.slip[f] = K.slip[p] = 0.0
+        if K.sticks[f] == 0:
+            own = K.friction_row[f]
+            other = K.friction_row[p]
+            aim(K, f, K.impulse[own] + K.past[own], K.impulse[other] + K.past[other])
+    elif K.sticks[f] == 1:
+        K.sticks[f] = 0
+        row = K.friction_row[f]
+        K.slip[f] = 1.0 if K.impulse[row] + K.past[row] > 0.0 else -1.0
+        K.lean[f] = K.slip[f]
+    else:
+        K.sticks[f] = 1
+        K.slip[f] = 0.0
+
+
+def change_all(K: ContactForces) -> int:
+    """Every contact and friction takes the branch that the solution asks for; how many changed."""
+    largest = largest_impulse(K)
+    count = 0
+    for f in range(K.n_frictions):
+        if K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f, largest) > 0.0:
+            turn(K, f)
+            count += 1
+    for c in range(K.n_contacts):
+        if K.free[c] > 0 and contact_fault(K, c, largest) > 0.0:
+            toggle(K, c)
+            count += 1
+    return count
+
+
+def change_worst(K: ContactForces) -> int:
+    """The contact or friction that breaks its law most takes its other branch; 0 if none breaks it."""
+    largest = largest_impulse(K)
+    found = -1
+    most = 0.0
+    for place in range(K.n_contacts + K.n_frictions):
+        f = place - K.n_contacts
+        fault = 0.0
+        if f < 0:
+            fault = contact_fault(K, place, largest) if K.free[place] > 0 else 0.0
+        elif K.loose[f] > 0 and is_on(K, f):
+            fault = friction_fault(K, f, largest)
+        if fault > most:
+            found = place
+            most = fault
+    if found >= K.n_contacts:
+        turn(K, found - K.n_contacts)
+    elif found >= 0:
+        toggle(K, found)
+    return found + 1

@@ -1,0 +1,328 @@
+"""Contacts and friction solved as one problem over cones: impulses over a step, or forces at an instant.
+
+Everything that may not choose is held, and with one solution of the held KKT matrix for each row that may,
+
+``w = B (v + K⁻¹ …) = G z + shift``,  z = −λ
+
+of normals, pairs of tangents, friction along one direction and of joints, and tangents that stick as long as their
+contact pushes (see `kernel.contact.cone_problem`). Of a non-smooth step z is the impulse of the whole step, that of its
+smooth part included, so that what was closed may push less than it did there, but never pull.
+"""
+
+from __future__ import annotations
+
+from mbd.kernel.algebra.linear import factor, solve
+from mbd.kernel.algebra.redundancy import find_dependence, shared, sharing
+from mbd.kernel.algebra.saddle import solve_at
+from mbd.kernel.contact.cone_problem import CONE_TOLERANCE, EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
+from mbd.kernel.contact.cones import aim
+from mbd.kernel.records import Balance, ContactForces, Frictions
+from mbd.kernel.stepping.restart import (
+    active_rows,
+    evaluate,
+    evaluate_loaded,
+    limit_of,
+    load_accelerations,
+    stepping_rows,
+)
+
+__all__ = ["all_hold", "keep_branches", "solve_cones"]
+
+STANDS = 1e-9
+"""Velocity, as the impulse that would stop it over the largest impulse, below which nothing slides or parts [-]."""
+
+
+def solve_cones(K: Balance, level: int, allowed: float) -> int:
+    """1 if all that may choose obeys its law, with K.jump, K.impulse and branches in place; 0 if nothing was found.
+
+    Then everything is as it was. The levels, and what may choose, are those of `complementarity`; laws may be missed by
+    the part `allowed` of the largest impulse: `CONE_TOLERANCE`, or more where branches alone are asked for.
+    """
+    if K.loaded == 1:
+        return 0
+    keep_branches(K, True)
+    count = gather_unknowns(K)
+    if count == 0:
+        return 0
+    hold_others(K)
+    find_limits_apart(K, level, count)
+    held = load_held(K, level, count)
+    if held >= 0:
+        fill_cones(K, held, count)
+        cone_solve(
+            K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
+            K.cone_work, K.cone_pivot,
+        )  # fmt: skip
+        residual = K.cone_work[0]
+        if residual <= allowed and take_impulses(K, level, count):
+            take_cone_branches(K, level, count)
+            if residual <= CONE_TOLERANCE:
+                K.cone_residual = max(K.cone_residual, residual)
+            return 1
+    keep_branches(K, False)
+    return 0
+
+
+def keep_branches(K: ContactForces, out: bool) -> None:
+    """Branches into K.cone_flags and K.cone_slips, or back."""
+    n = K.n_contacts
+    for c in range(n):
+        if out:
+            K.cone_flags[c] = K.active[c]
+            K.cone_flags[n + c] = K.parting[c]
+        else:
+            K.active[c] = K.cone_flags[c]
+            K.parting[c] = K.cone_flags[n + c]
+    for f in range(K.n_frictions):
+        if out:
+            K.cone_flags[2 * n + f] = K.sticks[f]
+            K.cone_slips[f] = K.slip[f]
+        else:
+            K.sticks[f] = K.cone_flags[2 * n + f]
+            K.slip[f] = K.cone_slips[f]
+
+
+def gather_unknowns(K: ContactForces) -> int:
+    """Rows that may choose, into K.cone_rows, and how they belong together; how many."""
+    count = 0
+    for c in range(K.n_contacts):
+        K.cone_normal[c] = -1
+        if K.kind[c] == 0 and (K.free[c] > 0 or (K.active[c] == 1 and slides_or_sticks(K, c))):
+            K.cone_normal[c] = count
+            K.cone_rows[count] = K.normal[c]
+            K.cone_owner[count] = PUSH if K.free[c] > 0 else EQUAL
+            K.cone_twin[count] = -1
+            count += 1
+    for row in range(K.n_rows):
+        c = K.row_contact[row]
+        f = K.row_friction[row]
+        if c >= 0 and (K.cone_normal[c] < 0 or K.row_normal[row] == 1):
+            continue
+        chooses = f >= 0 and K.loose[f] > 0
+        stuck = c >= 0 and K.free[c] != 2 and (f < 0 or (K.sticks[f] == 1 and K.loose[f] == 0))
+        if chooses or stuck:
+            K.cone_rows[count] = row
+            K.cone_owner[count] = K.cone_normal[c] if c >= 0 else STEADY
+            K.cone_twin[count] = -1
+            K.cone_mu[count] = 0.0 if chooses else -1.0
+            count += 1
+    for u in range(count):
+        f = K.row_friction[K.cone_rows[u]]
+        if f >= 0 and K.loose[f] > 0 and K.partner[f] >= 0:
+            for v in range(count):
+                if K.cone_rows[v] == K.friction_row[K.partner[f]]:
+                    K.cone_twin[u] = v
+    return count
+
+
+def slides_or_sticks(K: Frictions, c: int) -> bool:
+    """Whether a friction of contact c may choose."""
+    found = False
+    for f in range(K.n_frictions):
+        if K.friction_contact[f] == c and K.loose[f] > 0:
+            found = True
+    return found
+
+
+def hold_others(K: ContactForces) -> None:
+    """All that may choose is off."""
+    for c in range(K.n_contacts):
+        if K.cone_normal[c] >= 0:
+            if K.free[c] == 2:
+                K.parting[c] = 1
+            else:
+                K.active[c] = 0
+    for f in range(K.n_frictions):
+        if K.loose[f] > 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+
+
+def find_limits_apart(K: ContactForces, level: int, count: int) -> None:
+    """Limits of frictions without the unknown pushes, into K.cone_limit, and their slopes."""
+    for k in range(K.n_rows):
+        K.loads[k] = (K.given[k] + K.past[k]) if level == 1 else 0.0
+    for u in range(count):
+        if K.cone_owner[u] < 0:
+            K.loads[K.cone_rows[u]] = K.given[K.cone_rows[u]] if level == 1 else 0.0
+    evaluate_loaded(K, K.loads)
+    for u in range(count):
+        f = K.row_friction[K.cone_rows[u]]
+        K.cone_limit[u] = limit_of(K, f) if f >= 0 and K.cone_mu[u] >= 0.0 else 0.0
+    for c in range(K.n_contacts):
+        if K.cone_normal[c] >= 0:
+            K.loads[K.normal[c]] -= 1.0
+    evaluate_loaded(K, K.loads)
+    for u in range(count):
+        f = K.row_friction[K.cone_rows[u]]
+        if K.cone_owner[u] >= 0 and f >= 0 and K.cone_mu[u] >= 0.0:
+            K.cone_mu[u] = max(limit_of(K, f) - K.cone_limit[u], 0.0)
+        if level == 1 and f >= 0:  # a force that stays finite has an impulse only over the time of the step
+            K.cone_limit[u] += (K.past_time - 1.0) * K.base_limit[f]
+    for c in range(K.n_contacts):
+        if K.cone_normal[c] >= 0:
+            K.loads[K.normal[c]] += 1.0
+    evaluate_loaded(K, K.loads)
+
+
+def load_held(K: Balance, level: int, count: int) -> int:
+    """Force of what is given, without what the smooth step did through the unknown rows; see `factor_held`."""
+    o_R = K.acc_R
+    if level == 0:
+        load_accelerations(K)
+    else:
+        for i in range(K.n):
+            K.force[i] = 0.0
+            for k in range(K.n_rows):
+                K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if K.given[k] != 0.0 else 0.0
+    for u in range(count):
+        row = K.cone_rows[u]
+        K.cone_found[u] = -K.past[row] if level == 1 else -K.lam[row]
+        if level == 1:
+            for i in range(K.n):
+                K.force[i] -= K.acc[o_R + i * K.n_rows + row] * K.past[row]
+    return factor_held(K, level)
+
+
+def factor_held(K: Balance, level: int) -> int:
+    """The KKT matrix of all rows that act, in factors, and K.jump and K.impulse with it; how many rows, −1: none.
+
+    Rows that depend on others are not among them.
+    """
+    o_R = K.acc_R
+    m = active_rows(K, K.active)
+    K.n_dropped = 0
+    if solve_at(K, m, level) != 0:
+        return -1
+    held = 0
+    for k in range(m):
+        if K.n_dropped == 0 or K.dropped[K.rows[k]] == 0:
+            K.rows[held] = K.rows[k]
+            held += 1
+    n = K.n
+    size = n + held
+    together = sharing(K)
+    K.kkt[: size * size] = 0.0
+    for i in range(n):
+        K.kkt[i * size : i * size + n] = K.acc[i * n : i * n + n]
+        for k in range(held):
+            K.kkt[i * size + n + k] = K.acc[o_R + i * K.n_rows + K.rows[k]]
+            if together:
+                K.kkt[i * size + n + k] += shared(K, i, K.rows[k])
+            K.kkt[(n + k) * size + i] = K.acc[K.acc_B + K.rows[k] * n + i]
+    return held if factor(K.kkt, size, K.pivots) == 0 else -1
+
+
+def fill_cones(K: Balance, held: int, count: int) -> None:
+    """G and shift, column by column, of unit impulses."""
+    n = K.n
+    for i in range(count):
+        row = K.cone_rows[i]
+        value = K.bias[row]
+        for j in range(n):
+            value += K.acc[K.acc_B + row * n + j] * K.jump[j]
+        K.cone_shift[i] = value
+    for j in range(count):
+        for i in range(n):
+            K.rhs[i] = K.acc[K.acc_R + i * K.n_rows + K.cone_rows[j]]
+        K.rhs[n : n + held] = 0.0
+        solve(K.kkt, n + held, K.pivots, K.rhs)
+        for i in range(count):
+            value = 0.0
+            for k in range(n):
+                value += K.acc[K.acc_B + K.cone_rows[i] * n + k] * K.rhs[k]
+            K.cone_matrix[i * count + j] = value
+
+
+def take_impulses(K: Balance, level: int, count: int) -> bool:
+    """K.jump and the multipliers of held rows under the impulses found."""
+    for u in range(count):
+        for i in range(K.n):
+            K.force[i] -= K.acc[K.acc_R + i * K.n_rows + K.cone_rows[u]] * K.cone_found[u]
+    return bool(solve_at(K, active_rows(K, K.active), level) == 0)
+
+
+def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
+    """Who pushes, sticks and slides which way, by the velocities of the solution; and its multipliers."""
+    cone_faults(
+        K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
+        K.cone_work,
+    )  # fmt: skip
+    o_w = count * count + count
+    size = 1e-300
+    for u in range(count):
+        size = max(size, max(abs(K.cone_found[u]), abs(K.cone_work[o_w + count + u] * K.cone_shift[u])))
+    for c in range(K.n_contacts):
+        u = K.cone_normal[c]
+        if u >= 0:
+            parts = K.cone_owner[u] == PUSH and K.cone_work[o_w + count + u] * K.cone_work[o_w + u] > STANDS * size
+            if K.free[c] == 2:
+                K.parting[c] = 1 if parts else 0
+            else:
+                K.active[c] = 0 if parts else 1
+    for u in range(count):
+        f = K.row_friction[K.cone_rows[u]]
+        if f >= 0 and K.loose[f] > 0:
+            take_friction(K, u, f, STANDS * size, o_w, count)
+    for u in range(count):
+        row = K.cone_rows[u]
+        K.impulse[row] = -K.cone_found[u] - (K.past[row] if level == 1 else 0.0)
+
+
+def take_friction(K: ContactForces, u: int, f: int, small: float, o_w: int, count: int) -> None:
+    """Whether friction f, which is unknown u, sticks; else which way it slides, with its partner."""
+    v = K.cone_twin[u]
+    if 0 <= v < u:
+        return
+    rho = K.cone_work[o_w + count + u]
+    own = K.cone_work[o_w + u]
+    other = K.cone_work[o_w + v] if v >= 0 else 0.0
+    p = K.partner[f]
+    c = K.friction_contact[f]
+    on = c < 0 or K.active[c] == 1
+    slides = on and rho * (abs(own) + abs(other)) > small
+    K.sticks[f] = 0 if slides else 1  # that of a contact that parts begins stuck if it closes after all
+    K.slip[f] = 0.0
+    K.limit[f] = cone_limit(count, K.cone_found, K.cone_owner, K.cone_limit, K.cone_mu, K.cone_work, u)
+    if p >= 0:
+        K.sticks[p] = K.sticks[f]
+        K.slip[p] = 0.0
+        K.limit[p] = K.limit[f]
+        if slides:
+            aim(K, f, own, other)
+    elif slides:
+        K.slip[f] = 1.0 if own > 0.0 else -1.0
+        K.lean[f] = K.slip[f]
+
+
+def all_hold(K: Balance, t1: float) -> bool:
+    """Whether forces within all cones hold everything that sticks and is closed at the candidate.
+
+    Where rows depend on each other, multipliers of least norm may lie outside of a cone, or pull, while others do not:
+    those are put into K.lam1 then.
+    """
+    for c in range(K.n_contacts):
+        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
+        K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0) else 0
+    for f in range(K.n_frictions):
+        K.loose[f] = K.sticks[f]
+    count = K.n_dropped
+    K.cone_dropped[: K.n_rows] = K.dropped[: K.n_rows]
+    evaluate(K, t1, K.q1, K.y1)
+    holds = solve_cones(K, 0, CONE_TOLERANCE) == 1
+    K.n_dropped = count
+    K.dropped[: K.n_rows] = K.cone_dropped[: K.n_rows]
+    for c in range(K.n_contacts):
+        holds = holds and (K.kind[c] != 0 or K.active[c] == K.closed[c])
+        K.active[c] = 0
+    for f in range(K.n_frictions):
+        holds = holds and (K.loose[f] == 0 or K.sticks[f] == 1)
+    for f in range(K.n_frictions):
+        if K.loose[f] == 1:
+            K.sticks[f] = 1
+            K.slip[f] = 0.0
+        K.loose[f] = 0
+    find_dependence(K, stepping_rows(K))
+    if holds:
+        K.lam1[: K.n_rows] = K.impulse[: K.n_rows]
+    return holds

@@ -1,0 +1,241 @@
+"""Steps near the end of sliding in a plane, where the direction of γ turns fast and then is none.
+
+Far from rest λ_T follows γ within a step. No step can go through ‖γ‖ = 0 like that: beyond it nothing slides on. So
+
+- where γ turns, or falls, by much of itself, steps are shortened, ``h ≤ ½ ‖γ‖/‖γ̇‖``;
+- where it runs straight into zero, ``γ̇ ∥ −γ``, the step holds one direction e, and ``e · γ`` passes zero with a change
+  of sign, which is located as any other. The direction is corrected until γ itself is zero there: it is the mean
+  direction of what is left of the motion.
+
+A motion that only comes close to rest turns around it in shortened steps, and slides on.
+"""
+
+from __future__ import annotations
+
+from mbd.kernel.algebra.roots import sqrt
+from mbd.kernel.codes import STICK
+from mbd.kernel.contact.cone_turns import STABLE, estimated_turn_rate
+from mbd.kernel.contact.cones import HELD, ONSET, aim, along, speed_of_both
+from mbd.kernel.contact.contact_modes import STILL
+from mbd.kernel.events.guards import judge
+from mbd.kernel.events.locate import locate
+from mbd.kernel.records import Frictions, Guards, Kernel
+from mbd.kernel.stepping.trial_step import try_step, turns
+
+__all__ = [
+    "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "shorter_turn", "slides_at_first", "slides_on",
+    "slides_until_event",
+]  # fmt: skip
+
+PART = 0.5
+"""Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
+FAR = 2.0
+"""Times of a step in which γ must not reach zero if the step is to be as any other [-]."""
+SHORTER = 0.1
+"""Part of a step that is tried where Newton's method fails as sliding begins, four times at most [-]."""
+LONGER = 3.0
+"""Each of the steps that follow over the one before [-]."""
+BRIEFEST = 1e-7
+"""Part of dt below which no such step is tried [-]."""
+BRIEFEST_TURN = 1e-5
+"""Part of dt below which no step is shortened for it [-]."""
+SURELY = 0.8
+"""Part of a step within which γ reaches zero if a direction is held in it [-]."""
+STRAIGHT = 0.05
+"""Sine of the angle between γ̇ and −γ below which γ runs into zero [-]."""
+LINE = 1e-9
+"""The same where γ moves along a line: a direction that is held is that of γ then, however long it slides on [-]."""
+SHORTEST = 1e-5
+"""Part of dt below which no step is shortened for this; where γ asks for less it runs into zero at any angle [-]."""
+FARTHEST = 0.25
+"""Turn of the direction that is held, from γ at the start of the step, beyond which γ turns away before zero [rad]."""
+TURNS_AWAY = -2
+"""Of `come_to_zero`: what seemed to come to rest slides on."""
+MOST_CORRECTIONS = 8
+"""Corrections of a direction that is held [-]."""
+TOGETHER = 0.02
+"""Part of its speed before the step at which another pair rests at the same instant [-]."""
+NOTHING = 1e-200
+"""What is added to a speed that may be zero [m/s]."""
+AT_REST = 1e-10
+"""Speed across the direction that is held that counts as none, over ‖γ̇‖ dt [-]."""
+
+
+def approached_end(K: Guards, t1: float) -> float:
+    """Where the step that was to end at t1 ends; K.hold tells which directions are held in it."""
+    end = t1
+    rest = 0.0  # time until all that is held is at rest, if it is known
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0:
+            p = K.partner[f]
+            x = K.guards0[K.at_slip + f]
+            y = K.guards0[K.at_slip + p]
+            ax = K.guards0[K.at_slip_rate + f]
+            ay = K.guards0[K.at_slip_rate + p]
+            speed = sqrt(x * x + y * y)
+            change = sqrt(ax * ax + ay * ay)
+            h = t1 - K.time
+            if K.hold[f] == ONSET and (speed <= STILL or x * ax + y * ay > 0.0):
+                continue
+            K.hold[f] = K.hold[p] = 0.0
+            if not change * FAR * h > speed:
+                continue
+            fall = -(x * ax + y * ay)
+            across = abs(x * ay - y * ax)
+            straight = fall > 0.0 and (across <= STRAIGHT * speed * change or PART * speed <= SHORTEST * change * K.dt)
+            ends = fall > 0.0 and speed * speed < SURELY * h * fall
+            line = across <= LINE * speed * change
+            if straight and (ends or line or h < SHORTEST * K.dt):
+                K.hold[f] = K.hold[p] = HELD
+                rest = max(rest, speed * speed / fall)
+            elif fall > 0.0 or across * h > PART * speed * speed:
+                end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
+    if 0.0 < LONGER * K.begun_step < FAR * rest and not turns(K):  # what is held needs a step in which it comes to rest
+        K.begun_step = 0.0
+    if K.begun_step > 0.0:
+        K.begun_step *= LONGER
+        if K.begun_step < end - K.time:
+            end = K.time + K.begun_step
+        else:
+            K.begun_step = 0.0
+    if K.explicit == 1 and K.adaptive == 0:
+        rate = estimated_turn_rate(K)
+        K.turning_step = max(STABLE / rate, BRIEFEST_TURN * K.dt) if rate > 0.0 else 0.0
+        if 0.0 < K.turning_step < end - K.time:
+            end = K.time + K.turning_step
+    return end
+
+
+def slides_at_first(K: Frictions, h: float) -> bool:
+    """Whether something slides whose direction may turn too fast for a step of dt: one of h may follow it."""
+    return not (K.adaptive == 1 or h < BRIEFEST * K.dt) and turns(K)
+
+
+def slides_on(K: Guards) -> bool:
+    """Whether a candidate with a held direction has not come to rest: it is taken again, and the direction let go."""
+    found = False
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD:
+            p = K.partner[f]
+            x = K.guards1[K.at_slip + f]
+            y = K.guards1[K.at_slip + p]
+            forward = K.slip[f] * x + K.slip[p] * y
+            if forward > 0.0 and abs(K.slip[f] * y - K.slip[p] * x) > LINE * forward:
+                K.hold[f] = K.hold[p] = 0.0
+                found = True
+    return found
+
+
+def slides_until_event(K: Guards) -> bool:
+    """Whether what was held to come to rest slides on at an event before its rest: its direction is let go.
+
+    Not where steps can no longer follow how it turns.
+    """
+    found = False
+    for f in range(K.n_frictions):
+        if keeps_direction(K, f) and may_follow(K, f):
+            p = K.partner[f]
+            forward = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + p])
+            if forward > 0.0 and abs(across(K, f)) > LINE * forward:
+                K.hold[f] = K.hold[p] = 0.0
+                found = True
+    return found
+
+
+def shorter_turn(K: Guards, h: float) -> float:
+    """A step of at most h in which directions that are not held turn by no more than they may."""
+    least = h
+    for f in range(K.n_frictions):
+        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            change = speed_of_both(K, f, K.guards0, K.at_slip_rate)
+            if change > 0.0:
+                least = min(least, PART * speed_of_both(K, f, K.guards0, K.at_slip) / change)
+    return max(least, SHORTEST * K.dt)
+
+
+def come_to_zero(K: Kernel, h: float, t1: float) -> int:
+    """After sliding was found to end, at the candidate: correct directions that are held until γ is zero there.
+
+    Feet of one body come to rest together: all directions turn by ω times what is left across them over γ before the
+    step, with ω by Aitken's relaxation, which is the secant method for one (Irons & Tuck 1969). `TURNS_AWAY` where no
+    directions near those of γ lead to zero, and steps can still follow how they turn, and where another pair that is
+    held slides on: it is not held in a shorter step.
+    """
+    given_up = TURNS_AWAY if may_follow(K, K.event_index) else 0
+    relaxation = 1.0
+    whole = 0.0
+    for turn in range(MOST_CORRECTIONS):
+        f = K.event_index
+        product = 0.0
+        square = 0.0
+        largest = 0.0
+        for g in range(K.n_frictions):
+            if keeps_direction(K, g):
+                speed = speed_of_both(K, g, K.guards0, K.at_slip)
+                left = across(K, g)
+                largest = max(largest, abs(left) / (AT_REST * speed + 1e-13))
+                change = left / (speed + NOTHING) - K.across[g]
+                product += K.across[g] * change
+                square += change * change
+                K.across[g] = left / (speed + NOTHING)
+        if largest <= 1.0:
+            break
+        if turn > 0 and square > 0.0:
+            relaxation *= -product / square
+        angle = relaxation * K.across[f]
+        whole += angle
+        if not abs(angle) < 0.5 or (given_up != 0 and not abs(whole) < FARTHEST):
+            if given_up != 0:
+                K.hold[f] = K.hold[K.partner[f]] = 0.0
+            return given_up
+        turn_directions(K, relaxation)
+        status = try_step(K, h, t1)
+        if status != 0:
+            return status
+        K.active[: K.n_contacts + K.n_guards + K.n_frictions] = 0
+        if not judge(K, h):
+            return 0
+        status = locate(K, h)
+        if status != 0:
+            return status
+        if K.event_kind != STICK or not keeps_direction(K, K.event_index):
+            return 0
+    return TURNS_AWAY if given_up != 0 and another_slides_on(K, K.event_index) else 0
+
+
+def may_follow(K: Guards, f: int) -> bool:
+    """Whether steps can still be short enough to follow how γ of f and its partner turns."""
+    speed = speed_of_both(K, f, K.guards0, K.at_slip)
+    return bool(PART * speed > SHORTEST * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate))
+
+
+def keeps_direction(K: Frictions, f: int) -> bool:
+    """Whether f stands for a pair that slides in a direction that is held."""
+    return bool(K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD)
+
+
+def across(K: Guards, f: int) -> float:
+    """γ of the candidate across the direction in which f and its partner slide."""
+    p = K.partner[f]
+    return float(K.slip[f] * K.guards1[K.at_slip + p] - K.slip[p] * K.guards1[K.at_slip + f])
+
+
+def turn_directions(K: Frictions, relaxation: float) -> None:
+    """Turn all that are held towards what is left across them."""
+    for f in range(K.n_frictions):
+        if keeps_direction(K, f):
+            p = K.partner[f]
+            angle = min(max(relaxation * K.across[f], -FARTHEST), FARTHEST)
+            aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])
+
+
+def another_slides_on(K: Guards, event: int) -> bool:
+    """Whether a pair that is held slides on where another one has come to rest; it is held no longer then."""
+    found = False
+    for f in range(K.n_frictions):
+        if keeps_direction(K, f) and f != event and may_follow(K, f):
+            left = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
+            if left > TOGETHER * speed_of_both(K, f, K.guards0, K.at_slip):
+                K.hold[f] = K.hold[K.partner[f]] = 0.0
+                found = True
+    return found

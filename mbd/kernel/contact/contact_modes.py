@@ -1,0 +1,297 @@
+"""After an event: who pushes, sticks and slides, so that accelerations and forces are consistent."""
+
+from __future__ import annotations
+
+from mbd.kernel.algebra.roots import sqrt
+from mbd.kernel.algebra.saddle import solve_rows
+from mbd.kernel.codes import (
+    LOG_CLOSED,
+    LOG_EVENT,
+    LOG_OPENED,
+    LOG_SLIPPED,
+    LOG_STUCK,
+    NO_FORCE,
+    NO_IMPACT,
+    SLIP,
+    UNKNOWN,
+)
+from mbd.kernel.contact.complementarity import complementarity
+from mbd.kernel.contact.cones import aim, follows, hold_directions
+from mbd.kernel.contact.impact_solve import strikes
+from mbd.kernel.contact.islands import find_islands
+from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Sizes, Switching
+from mbd.kernel.stepping.restart import active_rows, capture, evaluate, row_speed, take_consistent
+
+__all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "STILL", "log_event", "room_to_log", "resolve_contact_modes"]
+
+STILL = 1e-9
+"""Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
+CLOSE_TO_STILL = 1e-7
+"""The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
+NO_IMPULSE, OWN_IMPULSE, ALL_IMPULSES = 0, 1, 2
+"""Which impulses a line of the event log holds [-]."""
+
+
+def room_to_log(K: Sizes) -> int:
+    """Lines of the event log that one step with its event and two restarts may fill.
+
+    A restart logs each contact and each friction at most once. An event logs each guard at most once, as a step over a
+    singular configuration does; an impact each contact at most three times: released by one that strikes, closed, and
+    opened again.
+    """
+    return int(5 * K.n_contacts + 2 * K.n_frictions + 2 * K.n_guards + 64 * K.n_machines + K.n_impulses + 8)
+
+
+def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -> None:
+    """One line of the event log: t, kind, index, energy loss, row of results, impulses.
+
+    impulses : NO_IMPULSE; OWN_IMPULSE, those of the rows of contact `index`; ALL_IMPULSES, with those of the rows that
+        belong to no contact that closes in this impact
+    """
+    if K.n_machines > 0:
+        if kind == LOG_CLOSED or kind == LOG_OPENED:
+            K.happened[kind * K.n_contacts + index] = 1
+        elif kind == LOG_EVENT:
+            K.happened[2 * K.n_contacts + index] = 1
+    if K.n_logged >= K.event_capacity:  # never beyond the array; the run ends with an error
+        K.n_lost += 1
+        return
+    o = K.n_logged * K.event_width
+    K.log[o] = K.time
+    K.log[o + 1] = float(kind)
+    K.log[o + 2] = float(index)
+    K.log[o + 3] = loss
+    K.log[o + 4] = float(K.n_stored)
+    for k in range(K.n_rows):
+        c = K.row_contact[k]
+        logged = impulses != NO_IMPULSE and (c == index or (impulses == ALL_IMPULSES and (c < 0 or not strikes(K, c))))
+        K.log[o + 5 + k] = 0.0 - K.impulse[k] if logged else 0.0
+    K.n_logged += 1
+    K.n_events += 1
+
+
+def resolve_contact_modes(K: Switching) -> int:
+    """Consistent accelerations and multipliers; contacts that would pull open, touching ones that press close.
+
+    Frictions that do not move stick or begin to slide.
+    """
+    if K.n_cones > 0:
+        hold_directions(K)
+    find_slips(K)
+    evaluate(K, K.time, K.q, K.y)
+    K.impulse[: K.n_rows] = K.lam[: K.n_rows]
+    for c in range(K.n_contacts):
+        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
+        K.free[c] = 0
+        if K.kind[c] == 0:
+            if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
+                K.free[c] = 1
+    status = complementarity(K, 0)
+    if status == NO_IMPACT or status == 0:
+        painleve_contacts = find_painleve_contacts(K)
+        if painleve_contacts >= 0:
+            K.failure_index = painleve_contacts
+            return NO_FORCE
+    if status != 0:
+        return status
+    take_consistent(K)
+    for c in range(K.n_contacts):
+        K.touched[c] = 0
+        if K.kind[c] == 0 and K.active[c] != K.closed[c]:
+            K.closed[c] = K.active[c]
+            if K.active[c] == 1:
+                capture(K, c)
+                log_event(K, LOG_CLOSED, c, 0.0, NO_IMPULSE)
+                K.closing_gap[c] = -1e300  # guards may be those of other parameters here
+            else:
+                K.armed[c] = 1
+                log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
+        K.active[c] = 0
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        K.loose[f] = 0
+        if c >= 0 and K.closed[c] == 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+        if follows(K, f):  # the first of two tells of both
+            continue
+        now = frictional_state(K, f)
+        if now != K.was[f] and K.was[f] != UNKNOWN:
+            if now == 2:
+                log_event(K, LOG_STUCK, f, 0.0, NO_IMPULSE)
+            elif now != 0 and K.was[f] != 0:
+                log_event(K, LOG_SLIPPED, f, 0.0, NO_IMPULSE)
+        K.was[f] = now
+    return 0
+
+
+def frictional_state(K: Frictions, f: int) -> int:
+    """0 off, 2 sticking, ±1 sliding; 1 in space."""
+    if K.sticks[f] == 1:
+        return 2
+    if K.partner[f] >= 0:
+        return 1 if K.slip[f] != 0.0 else 0
+    return int(K.slip[f])
+
+
+def find_slips(K: Guards) -> None:
+    """Which frictions slide, by their velocity, and which may choose; K.loose tells what an event has found out.
+
+    On entry K.loose[f] is 0, 2 where an event found the velocity to be zero, 3 where it found that it must slide.
+    """
+    if K.n_frictions == 0:
+        return
+    evaluate(K, K.time, K.q, K.y)
+    for f in range(K.n_frictions):  # its direction is that at the point of now, unless it is held already
+        c = K.friction_contact[f]
+        if c >= 0 and (K.closed[c] == 0 or K.sticks[f] == 0):
+            capture(K, c)
+    evaluate(K, K.time, K.q, K.y)
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        if K.partner[f] >= 0:
+            if K.partner[f] > f:
+                find_slip_of_both(K, f)
+            continue
+        found = K.loose[f]
+        K.loose[f] = 0
+        K.lean[f] = K.slip[f] if K.slip[f] != 0.0 else K.lean[f]
+        if c >= 0 and K.closed[c] == 0 and K.touched[c] == 0:
+            K.sticks[f] = 0
+            K.slip[f] = 0.0
+            continue
+        gamma = row_speed(K, K.friction_row[f])
+        if found == 3:  # an event may have been wrong about it; a step that has been tried was not
+            K.loose[f] = 2 if K.strategy == 0 else 0
+            continue
+        small = max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]])
+        still = abs(gamma) <= STILL * small
+        if (found == 2 and abs(gamma) <= CLOSE_TO_STILL * small) or (
+            still and (K.slip[f] == 0.0 or K.event_kind != SLIP)
+        ):
+            K.loose[f] = 1
+            K.sticks[f] = 1
+            K.slip[f] = 0.0
+        elif still:  # it is about to slide, and does unless its acceleration says otherwise
+            K.loose[f] = 1
+        else:
+            K.sticks[f] = 0
+            K.slip[f] = 1.0 if gamma > 0.0 else -1.0
+
+
+def find_slip_of_both(K: Guards, f: int) -> None:
+    """The same of a contact that slides in a plane, friction f and its partner: K.slip is the direction of γ."""
+    p = K.partner[f]
+    c = K.friction_contact[f]
+    found = K.loose[f]
+    K.loose[f] = K.loose[p] = 0
+    if K.closed[c] == 0 and K.touched[c] == 0:
+        K.sticks[f] = K.sticks[p] = 0
+        K.slip[f] = K.slip[p] = 0.0
+        return
+    x = row_speed(K, K.friction_row[f])
+    y = row_speed(K, K.friction_row[p])
+    speed = sqrt(x * x + y * y)
+    if found == 3:  # along its pull
+        K.loose[f] = K.loose[p] = 2 if K.strategy == 0 else 0
+        return
+    o_size = K.n + K.n_rows
+    small = max(1.0, 1e-2 * max(K.scale[o_size + K.friction_row[f]], K.scale[o_size + K.friction_row[p]]))
+    if speed <= (CLOSE_TO_STILL if found == 2 else STILL) * small:
+        K.loose[f] = K.loose[p] = 1
+        if K.slip[f] == 0.0 or K.event_kind != SLIP or found == 2:
+            K.sticks[f] = K.sticks[p] = 1
+            K.slip[f] = K.slip[p] = 0.0
+    else:
+        K.sticks[f] = K.sticks[p] = 0
+        aim(K, f, x, y)
+
+
+def find_painleve_contacts(K: Balance) -> int:
+    """A contact that slides so that pushing on it makes it approach: no force or several are consistent; −1 if none.
+
+    ``dg̈/dp = B_n K⁻¹ (B_n − μ s B_T)ᵀ ≤ 0`` with the other rows held (Painlevé 1895; Génot & Brogliato 1999,
+    Eur. J. Mech. A 18:653). Contacts of different islands are tested together, one of each in a turn. K.jump and
+    K.impulse are kept.
+    """
+    turns = take_turns(K)
+    if turns == 0:
+        return -1
+    K.trial_jump[: K.n] = K.jump[: K.n]
+    K.trial[: K.n_rows] = K.impulse[: K.n_rows]
+    K.bias[: K.n_rows] = 0.0
+    found = -1
+    for turn in range(turns):
+        if found < 0 and push_on(K, turn, -1) == 0:
+            found = approaching(K, turn)
+            continue
+        for c in range(K.n_contacts):  # one of them cannot be solved for: each alone
+            if found < 0 and K.turn[c] == turn and push_on(K, turn, c) == 0 and approaches(K, c):
+                found = c
+    K.jump[: K.n] = K.trial_jump[: K.n]
+    K.impulse[: K.n_rows] = K.trial[: K.n_rows]
+    return found
+
+
+def take_turns(K: Balance) -> int:
+    """K.turn of each contact that slides, −1 of others: its number among those of its island; how many turns."""
+    turns = 0
+    for c in range(K.n_contacts):
+        K.turn[c] = -1
+        K.cone_flags[c] = K.active[c]
+    for f in range(K.n_frictions):
+        c = K.friction_contact[f]
+        if c >= 0 and K.sticks[f] == 0 and K.slip[f] != 0.0 and K.loose[f] == 0 and K.closed[c] == 1:
+            K.turn[c] = 0
+            K.active[c] = 1
+            turns = 1
+    if turns == 0:
+        return 0
+    m = active_rows(K, K.active)
+    islands = find_islands(K, m)
+    K.own_columns[:islands] = 0
+    for k in range(m):
+        c = K.row_contact[K.rows[k]]
+        if c >= 0 and K.turn[c] == 0 and K.row_normal[K.rows[k]] == 1:
+            island = K.island[K.n + k]
+            K.turn[c] = K.own_columns[island]
+            K.own_columns[island] += 1
+            turns = max(turns, K.own_columns[island])
+    for c in range(K.n_contacts):
+        K.active[c] = K.cone_flags[c]
+    return turns
+
+
+def push_on(K: Balance, turn: int, only: int) -> int:
+    """K.jump under a push of one on each contact of a turn, or on `only` one of them; a status."""
+    K.force[: K.n] = 0.0
+    for c in range(K.n_contacts):
+        if K.turn[c] == turn and (only < 0 or only == c):
+            K.active[c] = K.parting[c] = 1
+            for i in range(K.n):
+                K.force[i] -= K.acc[K.acc_R + i * K.n_rows + K.normal[c]]
+    status = solve_rows(K, active_rows(K, K.active), True)
+    for c in range(K.n_contacts):
+        if K.turn[c] == turn:
+            K.parting[c] = 0
+            K.active[c] = K.cone_flags[c]
+    return int(status)
+
+
+def approaching(K: ContactForces, turn: int) -> int:
+    """The first contact of a turn that approaches under its push, −1 if none does."""
+    for c in range(K.n_contacts):
+        if K.turn[c] == turn and approaches(K, c):
+            return c
+    return -1
+
+
+def approaches(K: ContactForces, c: int) -> bool:
+    """Whether a contact approaches in K.jump, beyond round-off of the same push where no other row held."""
+    gained = 0.0
+    alone = 0.0
+    for j in range(K.n):
+        slope = K.acc[K.acc_B + K.normal[c] * K.n + j]
+        gained += slope * K.jump[j]
+        alone += slope * slope / K.acc[j * K.n + j] if K.acc[j * K.n + j] > 0.0 else 0.0
+    return gained < -1e-9 * alone

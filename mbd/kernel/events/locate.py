@@ -1,0 +1,347 @@
+"""The instant at which a guard fired, exactly: steps of varying size from the same accepted state."""
+
+from __future__ import annotations
+
+from mbd.kernel.codes import (
+    CLOSE,
+    CROSS,
+    CROSS_BACK,
+    CROSS_BRIEF,
+    GRAZE,
+    JUMPED,
+    NO_LOCATION,
+    OPEN_FORCE,
+    OPEN_GAP,
+    OPEN_PULL,
+    PRESS,
+    SLIP,
+    STICK,
+    STICK_BRIEF,
+    WATCH,
+)
+from mbd.kernel.events.guard_round_off import guard_round_off
+from mbd.kernel.events.guard_sides import striking_contact
+from mbd.kernel.events.guards import along_slip, gap_scale, gap_tolerance, guard_value, is_watched, judge
+from mbd.kernel.events.hermite import first_guess
+from mbd.kernel.events.refine import enough, refine
+from mbd.kernel.records import Events, Guards, Kernel, Switching
+from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate, put_on_rows
+from mbd.kernel.stepping.trial_step import try_step
+
+__all__ = ["find_jump", "jumps_over_stop", "locate"]
+
+MOST_LOOKS = 12
+"""How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
+JUMP = 1e-6
+"""Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
+UNEXPLAINED = 0.5
+"""What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
+SAME = 1e-9
+"""Events closer than this part of the way to the first are one event."""
+EARLIER, LATER = -2, -1
+"""Where `fall_back` has seen another guard fire: before the place looked at, or in the full step."""
+
+
+def dip(K: Kernel, h: float) -> int:
+    """Step to the lowest point of a grazing gap or of a user's guard; a real dip is an event, else it keeps quiet.
+
+    It becomes a closing, or the first of two crossings; the second where the guard fires in its direction alone.
+    """
+    t = K.time
+    c = K.event_index
+    users = K.event_kind == CROSS_BRIEF
+    side = K.side[c] if users else 1.0
+    at = (K.at_user if users else 0) + c
+    at_rate = (K.at_user_rate if users else K.at_gap_rate) + c
+    low = 0.0
+    high = h
+    rate_low = side * K.guards0[at_rate]
+    rate_high = side * K.guards1[at_rate]
+    place = K.event_place * h
+    for _ in range(30):
+        status = try_step(K, place, t + place)
+        if status != 0:
+            return status
+        depth = -side * K.guards1[at] - (0.0 if users else max(-K.guards0[at], 0.0))  # below where it was
+        if depth > 0.0 and depth > (guard_round_off(K, c, t + place, K.q1, K.y1) if users else gap_tolerance(K, c)):
+            K.event_kind = CLOSE
+            if users:
+                K.event_kind = CROSS_BACK if K.direction[c] * side > 0.0 else CROSS
+            K.event_place = place
+            K.event_low = 0.0
+            return 0
+        rate = side * K.guards1[at_rate]
+        if rate == 0.0 or high - low < 1e-7 * h:
+            break
+        if rate < 0.0:
+            low = place
+            rate_low = rate
+        else:
+            high = place
+            rate_high = rate
+        place = low + (high - low) * min(max(rate_low / (rate_low - rate_high), 0.02), 0.98)
+    K.active[(K.flag_user if users else 0) + c] = 1
+    K.event_kind = -1
+    return try_step(K, h, t + h)
+
+
+def locate(K: Kernel, h: float) -> int:
+    """Move the candidate to the instant of the first event of the step; K.event_after its distance from the start.
+
+    A bracketing root finder on steps of varying size from the same accepted state, until the guard is at round-off.
+    K.event_kind < 0 afterwards: there was no event, the candidate is the full step.
+    """
+    end = h
+    found_kind = -1  # the event at `end`, before which others are looked for
+    found_index = 0
+    for _ in range(4 * (K.n_contacts + K.n_guards + K.n_frictions) + 4):
+        kind = K.event_kind
+        index = K.event_index
+        low = K.event_low * end
+        status = 0
+        if kind == GRAZE or kind == STICK_BRIEF or kind == CROSS_BRIEF:
+            low = 0.0
+            status = come_to_rest(K, index, end) if kind == STICK_BRIEF else dip(K, end)
+            kind = K.event_kind
+            if status == 0 and kind == CROSS_BACK:
+                low = K.event_place
+                status = try_step(K, end, K.time + end)
+            elif kind == CLOSE or kind == CROSS or (kind == STICK and K.event_place < end):
+                end = K.event_place
+                found_kind = -1
+        if status == 0 and kind >= 0:
+            status = root_before(K, kind, index, low, end)
+        if status != 0:
+            return status
+        if K.event_kind < 0:
+            status = fall_back(K, h, end, found_kind, found_index)
+            if status >= 0:
+                return status
+            if status == LATER:
+                end = h
+            continue
+        found = K.event_after
+        if found <= 0.0:
+            return 0
+        together = found_kind >= 0 and found > (1.0 - SAME) * end  # as the one it was looked for before
+        if together or not another_before(K, kind, index, found):
+            take_event(K, kind, index, found)
+            if (kind == CROSS or kind == CROSS_BACK) and K.strategy == 0:  # of one instant, the contact comes first
+                c = striking_contact(K)
+                if c >= 0 and K.active[c] == 0:
+                    take_event(K, CLOSE, c, found)
+            return 0
+        end = found
+        found_kind = kind
+        found_index = index
+    return NO_LOCATION
+
+
+def come_to_rest(K: Kernel, index: int, end: float) -> int:
+    """A step to where a friction comes nearest to rest within `end`: at rest on the way, or not at all.
+
+    K.event_place is the distance of that place, or `end` where it slides on.
+    """
+    place = K.event_place * end
+    status = try_step(K, place, K.time + place)
+    if status == 0:
+        K.event_kind = STICK
+        K.event_place = place if guard_value(K, STICK, index, K.time + place) < 0.0 else end
+    return status
+
+
+def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int:
+    """`bracket`, and the candidate at `end` again where there was no event after all."""
+    status = bracket(K, kind, index, low, end)
+    if status != 0:
+        return status
+    if K.event_kind == CLOSE and K.event_after > 0.0 and K.kind[index] == 0 and K.linear == 0 and jumps(K, index):
+        return JUMPED
+    if (
+        K.event_kind >= 0 and K.event_after > 0.0 and kind == CLOSE and left_alone(K, index)
+    ):  # not watched any more there
+        K.active[index] = 1
+        K.event_kind = -1
+    return 0 if K.event_kind >= 0 else try_step(K, end, K.time + end)
+
+
+def jumps(K: Switching, c: int) -> bool:
+    """Whether the angle of contact c is nowhere zero as it closes, as a twist at half a turn: K.failure_index."""
+    if K.row_unit[K.normal[c]] != 1 or abs(K.guards1[c]) <= JUMP * gap_scale(K, c):
+        return False
+    K.failure_index = c
+    return True
+
+
+def find_jump(K: Kernel, h: float, t1: float) -> int:
+    """JUMPED where an angle whose contact closes in a step that is not located (K.closing) jumps past zero within it.
+
+    It is looked for where the rates at both ends of the step do not explain how far the angle went.
+    """
+    for c in range(K.n_contacts):
+        if K.closing[c] == 1 and K.row_unit[K.normal[c]] == 1 and K.guards0[c] > 0.0:
+            mean = 0.5 * (K.guards0[K.at_gap_rate + c] + K.guards1[K.at_gap_rate + c])
+            if abs(K.guards1[c] - K.guards0[c] - h * mean) > UNEXPLAINED:
+                status = bracket(K, CLOSE, c, 0.0, h)
+                if status == 0 and K.event_after > 0.0 and jumps(K, c):
+                    return JUMPED
+                status = try_step(K, h, t1)
+                if status != 0:
+                    return status
+    return 0
+
+
+def jumps_over_stop(K: Switching, h: float) -> bool:
+    """Whether an angle leads past its stop in a step and jumps back to the open side, as a twist does at half a turn.
+
+    The contact is open at both ends of the step; the rates there lead to its other side: K.failure_index.
+    """
+    found = False
+    for c in range(K.n_contacts):
+        if K.row_unit[K.normal[c]] == 1 and K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1:
+            there = K.guards0[c] + 0.5 * h * (K.guards0[K.at_gap_rate + c] + K.guards1[K.at_gap_rate + c])
+            if there < 0.0 < K.guards1[c] and K.guards1[c] - there > UNEXPLAINED and is_watched(K, c, K.guards0):
+                K.failure_index = c
+                found = True
+    return found
+
+
+def another_before(K: Switching, kind: int, index: int, found: float) -> bool:
+    """Whether another guard fired before this one, which is at round-off and may look fired itself."""
+    place = index
+    if kind == CROSS or kind == CROSS_BACK:
+        place += K.flag_user
+    elif kind == STICK or kind == SLIP:
+        place += K.flag_friction
+    quiet = K.active[place]
+    K.active[place] = 1
+    other = judge(K, found) and K.event_place < 1.0 - SAME
+    K.active[place] = quiet
+    return other
+
+
+def take_event(K: Events, kind: int, index: int, place: float) -> None:
+    """The event that the step ends with."""
+    K.event_kind = kind
+    K.event_index = index
+    K.event_after = place
+
+
+def fall_back(K: Kernel, h: float, end: float, kind: int, index: int) -> int:
+    """Where no guard has fired before `end` after all: the event found there stands (kind ≥ 0), else the full step h.
+
+    The candidate is at `end`. `EARLIER`: another guard has fired before that. `LATER`: one has fired in the full step,
+    which is the candidate then.
+    """
+    if judge(K, end):
+        return EARLIER
+    if kind >= 0:
+        take_event(K, kind, index, end)
+        return 0
+    if end < h:
+        status = try_step(K, h, K.time + h)
+        if status != 0:
+            return status
+        if judge(K, h):
+            return LATER
+    K.event_after = h
+    return 0
+
+
+def left_alone(K: Guards, c: int) -> bool:
+    """Whether contact c is not watched at the candidate; a condition that ends at the same instant has ended."""
+    if not is_watched(K, c, K.guards1):
+        return True
+    if K.while_kind[c] != 2:
+        return False
+    place = K.at_condition + c
+    change = abs(K.guards0[place] - K.guards1[place])
+    fall = abs(K.guards0[c] - K.guards1[c])
+    apart = SAME * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
+    return bool(K.guards1[place] <= apart * change)
+
+
+def guard_rate(K: Guards, kind: int, index: int) -> float:
+    """Rate of `guard_value` at the candidate; 0 where it is not known."""
+    if kind == CLOSE:
+        return float(K.guards1[K.at_gap_rate + index])
+    if kind == OPEN_GAP:
+        return float(-K.guards1[K.at_gap_rate + index])
+    if kind == CROSS:
+        return float(K.side[index] * K.guards1[K.at_user_rate + index])
+    if kind == CROSS_BACK:
+        return float(-K.side[index] * K.guards1[K.at_user_rate + index])
+    if kind == STICK:
+        return along_slip(K, index, K.guards1, K.at_slip_rate)
+    return 0.0
+
+
+def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> float:
+    """Distance at which what began just now (sliding, parting, a pull) is seen by steps shorter than one that does not.
+
+    It is seen where the guard is above `tiny`. 0 if none sees it; − status if a step fails.
+    """
+    low = high
+    for _ in range(MOST_LOOKS):
+        low *= 0.5
+        status = event_candidate(K, low, K.time + low)
+        if status != 0:
+            return -float(status)
+        if guard_value(K, kind, index, K.time + low) > tiny:
+            return low
+    return 0.0
+
+
+def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
+    """Root of the fired guard between two distances from the accepted state; K.event_after its distance."""
+    t = K.time
+    K.n_locations += 1
+    put_on_rows(K, t + high)
+    f_high = guard_value(K, kind, index, t + high)
+    if f_high >= 0.0:
+        if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
+            K.active[index] = 1
+            K.event_kind = -1
+        elif kind == STICK or kind == SLIP:
+            K.active[K.flag_friction + index] = 1
+            K.event_kind = -1
+        elif kind == CROSS or kind == CROSS_BACK:  # with velocities on the rows it has not crossed yet
+            K.active[K.flag_user + index] = 1
+            K.event_kind = -1
+        K.event_after = high
+        return 0
+    d_high = guard_rate(K, kind, index)
+    if low > 0.0:
+        status = event_candidate(K, low, t + low)
+        if status != 0:
+            return status
+    else:
+        event_at_start(K)
+    f_low = guard_value(K, kind, index, t + low)
+    near = gap_tolerance(K, index) if kind == CLOSE else 0.0
+    if kind == PRESS or kind == OPEN_FORCE:  # its last event left its force at round-off, which is no root
+        near = enough(K, kind, index, f_low, f_high)
+    begun = f_low <= 0.0 and (kind == STICK or kind == CLOSE or kind == PRESS)
+    if begun or (0.0 < f_low <= near and kind != CLOSE):
+        low = find_way(K, kind, index, high, near)
+        if low < 0.0:
+            return int(-low)
+        if low == 0.0:
+            event_at_start(K)
+        f_low = guard_value(K, kind, index, t + low)
+    if f_low <= 0.0:
+        if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.at_gap_rate + index] < 0.0:
+            K.event_after = high  # a touch too short to be seen within the step: it is over at its end
+            return event_candidate(K, high, t + high)
+        if low > 0.0 and kind != CROSS and kind != CROSS_BACK:
+            low = 0.0
+            event_at_start(K)
+        K.event_after = low
+        return 0
+    width = high - low
+    guess = first_guess(f_low, f_high, guard_rate(K, kind, index) * width, d_high * width)
+    if K.linear == 1 and kind != WATCH and kind != OPEN_PULL:  # no contact is stored that pulls
+        place = low + width * f_low / (f_low - f_high)
+        K.event_after = place
+        return event_candidate(K, place, t + place)
+    return refine(K, kind, index, low, f_low, high, f_high, low + width * guess)

@@ -1,0 +1,288 @@
+"""What an event does: contacts close by impact, open by their rules; frictions stick and slip."""
+
+from __future__ import annotations
+
+from mbd.kernel.codes import (
+    CLOSE,
+    CROSS,
+    LOG_CLOSED,
+    LOG_OPENED,
+    NO_FORCE,
+    OPEN_FORCE,
+    OPEN_PULL,
+    PRESS,
+    SLIP,
+    STICK,
+    WATCH,
+)
+from mbd.kernel.contact.cones import aim, pull_of_both, speed_of_both
+from mbd.kernel.contact.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
+from mbd.kernel.contact.impact import impact
+from mbd.kernel.contact.impact_solve import strikes
+from mbd.kernel.events.guards import gap_scale, is_watched
+from mbd.kernel.events.impulses import AFTER, BEFORE, BESIDE, push
+from mbd.kernel.records import Balance, ContactForces, Guards, Mechanism, Switching
+from mbd.kernel.stepping.accept_restart import project_velocity
+from mbd.kernel.stepping.restart import active_rows, capture, consistent, evaluate, evaluate_loaded, limit_of, row_speed
+
+__all__ = ["switch"]
+
+TOGETHER = 1e-3
+"""Part of dt within which contacts that come to rest do so together [-]."""
+AT_LIMIT = 1e-9
+"""Part of its limit by which a friction may be below it and begin to slide with others [-]."""
+
+
+def gather_closing(K: Guards) -> float:
+    """Mark the contacts that close at this instant in K.closing; the fastest closing speed of unilateral ones.
+
+    Contacts that touch and approach close together with the fired one, whatever their order; those that touch and
+    rest (2) take part in its impact, where impacts follow each other without end also those that leave.
+    """
+    fastest = 0.0
+    for c in range(K.n_contacts):
+        K.closing[c] = 0
+        if K.closed[c] == 1:
+            continue
+        fired = K.event_kind == CLOSE and K.event_index == c
+        near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
+        ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
+        approach = -K.guards0[K.at_gap_rate + c]
+        if fired or (near and ready and K.kind[c] == 0 and approach > STILL):
+            K.closing[c] = 1
+            if K.kind[c] == 0:
+                # located by interpolation it may part already, which is no rest; located exactly it parts only where
+                # its next contact is at this instant as well
+                fastest = max(fastest, abs(approach) if K.linear == 1 else approach)
+        elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.plastic_impact == 1):
+            K.closing[c] = 2
+    return fastest
+
+
+def release_for(K: Switching, after: int) -> None:
+    """Open the contacts whose rule names one that closes now."""
+    for c in range(K.n_contacts):
+        if K.closed[c] == 1:
+            for place in range(K.when_start[c], K.when_start[c + 1]):
+                target = K.when_target[place]
+                if K.when_after[place] == after and K.closing[target] == 1:
+                    K.closed[c] = 0
+                    K.armed[c] = 0
+                    log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
+                    break
+
+
+def close_by_impact(K: Switching, fastest: float) -> int:
+    """Impact of all closing unilateral contacts, the releases it causes, anchors and log."""
+    slow = fastest < K.rest_speed or (K.plastic_impact == 1 and fastest == 0.0)  # a rebound too small to rise at all
+    if not slow:
+        release_for(K, 0)
+    status = 0
+    if K.n_impulses > 0 and not slow:
+        status = push(K, BEFORE)
+        status = push(K, BESIDE) if status == 0 else status
+    if status == 0:
+        status = impact(K, slow)
+    if status != 0:
+        return status
+    count = 0
+    own = 0.0
+    for c in range(K.n_contacts):
+        if strikes(K, c):
+            count += 1
+            own += abs(loss_in(K, c))
+    others = loss_elsewhere(K) if count > 0 else 0.0
+    impulses = ALL_IMPULSES  # in the first line, so that each impulse of this impact is reported once
+    for c in range(K.n_contacts):
+        if K.kind[c] != 0 or (K.closed[c] == 0 and not strikes(K, c)):
+            continue
+        if K.closing[c] > 0:
+            loss = loss_in(K, c)
+            part = abs(loss) / own if own > 0.0 else 1.0 / count
+            log_event(K, LOG_CLOSED, c, loss + part * others, impulses)
+            K.closing_gap[c] = min(K.closing_gap[c], K.guards0[c])
+            impulses = OWN_IMPULSE
+            if K.active[c] == 1:
+                capture(K, c)
+                K.closed[c] = 1
+            else:
+                K.armed[c] = 1
+        elif K.active[c] == 0:
+            K.closed[c] = 0
+            K.armed[c] = 1
+            log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
+    if not slow:
+        release_for(K, 1)
+    return push(K, AFTER) if K.n_impulses > 0 and not slow else 0
+
+
+def loss_of(K: ContactForces, row: int) -> float:
+    """What the impulse of a row took, −½ Λ (γ⁻ + γ⁺): its part of the kinetic energy lost."""
+    rate = row_speed(K, row)
+    for j in range(K.n):
+        rate += 0.5 * K.acc[K.acc_B + row * K.n + j] * K.jump[j]
+    return float(K.impulse[row] * rate)
+
+
+def loss_in(K: ContactForces, c: int) -> float:
+    """What the impulses of a contact took."""
+    loss = 0.0
+    for k in range(K.n_rows):
+        if K.row_contact[k] == c:
+            loss += loss_of(K, k)
+    return loss
+
+
+def loss_elsewhere(K: ContactForces) -> float:
+    """What friction in joints, and contacts that were closed before, took in an impact."""
+    loss = 0.0
+    for k in range(K.n_rows):
+        c = K.row_contact[k]
+        if (c < 0 and K.row_friction[k] >= 0) or (c >= 0 and not strikes(K, c)):
+            loss += loss_of(K, k)
+    return loss
+
+
+def mark_touching(K: Guards) -> None:
+    """Contacts at g = 0 and ġ = 0 are left to their acceleration."""
+    evaluate(K, K.time, K.q, K.y)
+    for c in range(K.n_contacts):
+        K.touched[c] = 0
+        near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
+        if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and near and is_watched(K, c, K.guards0):
+            still = True
+            for k in range(K.n_rows):
+                if K.row_contact[k] == c and K.row_friction[k] < 0 and abs(K.acc[K.acc_rate + k]) > STILL:
+                    still = False
+            K.touched[c] = 1 if still else 0
+
+
+def capture_approach(K: Mechanism) -> None:
+    """Penalty contacts that close hold their approach speed, as an impact at the same instant leaves it."""
+    for c in range(K.n_contacts):
+        if K.closing[c] == 1 and K.kind[c] == 1 and K.anchor_start[c] < K.anchor_start[c + 1]:
+            evaluate(K, K.time, K.q, K.y)
+            capture(K, c)
+
+
+def bursts(K: Mechanism, c: int) -> bool:
+    """Whether the force of a sliding contact changed its sign through a pole, not through zero."""
+    for f in range(K.n_frictions):
+        if K.friction_contact[f] == c and K.slip[f] != 0.0:
+            largest = 0.0
+            for i in range(K.n):
+                largest = max(largest, K.scale[i])
+            return bool(abs(K.lam[K.normal[c]]) > 1e-3 * largest)
+    return False
+
+
+def stop_together(K: Switching, index: int) -> None:
+    """Contacts in space come to rest: the one found, and those whose sliding is over within a thousandth of dt.
+
+    A body that slides on several feet stops on all of them at once, but for round-off and errors of the step. The
+    velocities that are left become those at which nothing slides; whether it stays so is for the restart to say.
+    """
+    evaluate(K, K.time, K.q, K.y)
+    for f in range(K.n_frictions):
+        p = K.partner[f]
+        if p > f and K.slip[f] != 0.0 and K.closed[K.friction_contact[f]] == 1:
+            speed = speed_of_both(K, f, K.guards0, K.at_slip)
+            if f == index or speed <= TOGETHER * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate):
+                K.loose[f] = K.loose[p] = 2
+                K.sticks[f] = K.sticks[p] = 1
+                K.slip[f] = K.slip[p] = 0.0
+                capture(K, K.friction_contact[f])
+    project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
+
+
+def slip_together(K: Balance, index: int) -> None:
+    """Feet that share a load begin to slide together: the one found, and those at their limits at the largest load.
+
+    The others stick on: the body turns about one that does. Who slides goes the way of its pull, which at that load is
+    the only one.
+    """
+    other = K.partner[index]
+    own_way = K.slip[index]
+    other_way = K.slip[other]
+    K.sticks[index] = K.sticks[other] = 1
+    K.slip[index] = K.slip[other] = 0.0
+    status = consistent(K, K.time, K.q, K.y)
+    K.slip[index] = own_way
+    K.slip[other] = other_way
+    K.loads[: K.n_rows] = K.impulse[: K.n_rows]
+    evaluate_loaded(K, K.loads)
+    for f in range(K.n_frictions):
+        p = K.partner[f]
+        if status == 0 and p > f and K.sticks[f] == 1 and K.closed[K.friction_contact[f]] == 1:
+            limit = limit_of(K, f)
+            if f == index or (limit > 0.0 and pull_of_both(K, f, K.brink) > (1.0 - AT_LIMIT) * limit):
+                K.loose[f] = K.loose[p] = 3
+                K.sticks[f] = K.sticks[p] = 0
+                aim(K, f, K.brink[K.friction_row[f]], K.brink[K.friction_row[p]])
+    K.sticks[index] = K.sticks[other] = 0
+
+
+def stop_spin(K: Balance, index: int) -> None:
+    """The spin of a contact that came to rest is none, not round-off of what it was: nothing else may move then."""
+    K.sticks[index] = 1
+    project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
+    K.sticks[index] = 0
+
+
+def switch(K: Switching) -> int:
+    """What the fired guard does to the closed contacts and the velocities; the state is at its instant."""
+    kind = K.event_kind
+    index = K.event_index
+    for c in range(K.n_contacts):
+        K.closing[c] = 0
+        K.active[c] = 0
+    if kind == CLOSE:
+        fastest = gather_closing(K)
+        hard = False
+        for c in range(K.n_contacts):
+            if K.closing[c] == 1:
+                if K.kind[c] == 0:
+                    hard = True
+                else:
+                    K.closed[c] = 1
+                    log_event(K, LOG_CLOSED, c, 0.0, NO_IMPULSE)
+        if hard:
+            status = close_by_impact(K, fastest)
+            if status != 0:
+                return status
+        else:  # a penalty contact closes without impact
+            release_for(K, 0)
+            release_for(K, 1)
+        capture_approach(K)
+    elif kind == PRESS:
+        K.closed[index] = 1
+        log_event(K, LOG_CLOSED, index, 0.0, NO_IMPULSE)
+    elif kind == STICK:
+        K.loose[index] = 2
+        K.sticks[index] = 0
+        if K.partner[index] >= 0:
+            stop_together(K, index)
+        elif K.friction_contact[index] >= 0 and K.row_unit[K.friction_row[index]] == 1:
+            stop_spin(K, index)
+    elif kind == SLIP:
+        K.loose[index] = 3
+        K.sticks[index] = 0
+        K.slip[index] = 1.0 if K.lam[K.friction_row[index]] > 0.0 else -1.0
+        if K.partner[index] >= 0:
+            K.loose[K.partner[index]] = 3
+            K.sticks[K.partner[index]] = 0
+            aim(K, index, K.lam[K.friction_row[index]], K.lam[K.friction_row[K.partner[index]]])
+            if K.n_dropped > 0:
+                slip_together(K, index)
+    elif kind == OPEN_PULL and bursts(K, index):
+        K.failure_index = index
+        return NO_FORCE
+    elif kind != CROSS and kind != WATCH:
+        K.closed[index] = 0
+        K.armed[index] = 2 if kind == OPEN_FORCE else 1
+        log_event(K, LOG_OPENED, index, 0.0, NO_IMPULSE)
+    if kind != WATCH:
+        mark_touching(K)
+    if kind == OPEN_PULL:  # its force has passed zero: the acceleration there is round-off and decides nothing
+        K.touched[index] = 0
+    return 0
