@@ -7,6 +7,7 @@ from pathlib import Path
 from mbd.bodies.values import among, flag
 from mbd.errors import ModelError
 from mbd.laboratory.models.mjcf import read_mjcf
+from mbd.laboratory.models.osim import read_osim
 from mbd.laboratory.models.report import ImportedModel
 from mbd.laboratory.models.urdf import read_urdf
 from mbd.results.archive import file_to_read
@@ -15,12 +16,12 @@ __all__ = ["read_model"]
 
 
 def read_model(
-    path: str | Path, base: str = "fixed", stops: bool = True, losses: bool = True, repair: bool = False
+    path: str | Path, base: str = "fixed", stops: bool | None = None, losses: bool = True, repair: bool = False
 ) -> ImportedModel:
-    """A model of plain words from a ``.urdf`` or MuJoCo's ``.xml``, with a report of what was understood and left out.
+    """A model of plain words from a ``.urdf``, MuJoCo's ``.xml`` or OpenSim's ``.osim``, and a report of what is in it.
 
-    The file's z is turned to y: x forward, y up, z to the right; coordinates of a joint that floats stay along the axes
-    of the file. Names stay as they are, but for dots, which become underscores.
+    In the first two the file's z is turned to y: x forward, y up, z to the right; coordinates of a joint that floats
+    stay along the axes of the file. Names stay as they are, but for dots, which become underscores.
 
     Files of MuJoCo are compiled by it (``pip install 'mbd[mjcf]'``): bodies, joints, gravity, damping, friction and
     springs. Soft limits become rigid stops, soft equations between joints rigid couplings, and coordinates count from
@@ -30,33 +31,46 @@ def read_model(
     `Unilateral` stops 'elbow upper stop', damping and friction `Viscous` and `Coulomb` losses, mimics `Bilateral`
     couplings. Shapes, transmissions and the like are left out, and listed.
 
+    A model of OpenSim (formats 20303, 30000, 40000) keeps its axes and the values of its coordinates. A joint of
+    several coordinates is a chain of `Revolute` and `Prismatic` joints with the names of the coordinates,
+    'knee_angle_r.angle', with bodies without mass between them; a BallJoint or FreeJoint without locks, stops and
+    couplers is one joint. Motions of a CustomJoint that are functions of coordinates, couplers and locks are
+    `Bilateral` rows; `posture` of what is returned has the default values. OpenSim does not enforce ranges in forward
+    dynamics, so that they are read with stops=True only. Muscles, other forces and constraints, shapes are left out,
+    and listed.
+
     Parameters
     ----------
     path : of the file
-    base : 'fixed' or 'floating', how the root link is connected to the ground
-    stops, losses : whether limits, and damping, friction and springs, are read
+    base : 'fixed' or 'floating', how the root link of a ``.urdf`` is connected to the ground
+    stops : whether limits are read; by default those of a ``.urdf`` and of MuJoCo
+    losses : whether damping, friction and springs are read
     repair : whether moments of inertia that no body can have are replaced by the nearest that one can
 
     Raises
     ------
     ModelError
-        for a file that is damaged, with line and element; for entities, macros and links without a body's inertia.
+        for a file that is damaged, with line and element; for entities, macros and links without a body's inertia; for
+        joints of OpenSim that cannot be stated exactly, with the joint and the function.
 
     ``found = mbd.read_model("robot.urdf")``, then ``print(found.report)`` and ``mbd.assemble(found.model)``.
     """
     target = file_to_read(path)
     if not among(base, ("fixed", "floating")):
         raise ModelError(f"base must be 'fixed' or 'floating', got {base!r}")
-    stops, losses, repair = flag(stops, "stops"), flag(losses, "losses"), flag(repair, "repair")
-    if target.suffix.lower() not in (".urdf", ".xml"):
-        raise ModelError(f"a model ends in .urdf, or in .xml of MuJoCo; got {str(path)!r}")
+    suffix = target.suffix.lower()
+    stops = suffix != ".osim" if stops is None else flag(stops, "stops")
+    losses, repair = flag(losses, "losses"), flag(repair, "repair")
+    if suffix not in (".urdf", ".xml", ".osim"):
+        raise ModelError(f"a model ends in .urdf, .osim, or in .xml of MuJoCo; got {str(path)!r}")
     if not target.is_file():
         raise ModelError(f"there is no file '{target}'")
-    if target.suffix.lower() == ".xml":
-        if base != "fixed" or repair:
-            raise ModelError(
-                "a model of MuJoCo says itself how its bodies float, and has possible inertias; leave base= "
-                "and repair= out"
-            )
+    if suffix != ".urdf" and base != "fixed":
+        raise ModelError("a model of MuJoCo or OpenSim says itself how its bodies float; leave base= out")
+    if suffix == ".xml" and repair:
+        raise ModelError("a model of MuJoCo has possible inertias; leave repair= out")
+    if suffix == ".xml":
         return read_mjcf(target, stops, losses)
+    if suffix == ".osim":
+        return read_osim(target, stops, repair)
     return read_urdf(target, base, stops, losses, repair)

@@ -37,12 +37,14 @@ class ImportedModel:
     model : a `Model` of plain words, to be changed like any other
     bodies, joints : by their names in the file
     report : what of the file is in it
+    posture : coordinates of the file's own posture, where it says one: ``mbd.assemble(found.model, found.posture)``
     """
 
     model: Any
     bodies: dict[str, Body]
     joints: dict[str, Joint]
     report: ImportReport
+    posture: dict[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"ImportedModel '{self.model.name}': {len(self.bodies)} bodies, {len(self.joints)} joints\n{self.report}"

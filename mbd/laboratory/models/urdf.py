@@ -24,6 +24,7 @@ from mbd.joints.losses import Coulomb, Viscous
 from mbd.joints.prismatic import Prismatic
 from mbd.joints.revolute import Revolute
 from mbd.joints.weld import Weld
+from mbd.laboratory.models.inertia import possible_inertia
 from mbd.laboratory.models.report import ImportedModel, ImportReport
 from mbd.laboratory.models.xml import Element, read_xml
 from mbd.model import Model
@@ -32,8 +33,6 @@ __all__ = ["read_urdf"]
 
 SHAPES = ("visual", "collision")
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating")
-TRIANGLE = 1e-9
-"""By how much principal moments may break the triangle inequality, over the largest [-]."""
 
 
 def read_urdf(path: Path, base: str, stops: bool, losses: bool, repair: bool) -> ImportedModel:
@@ -98,7 +97,7 @@ def _bodies(root: Element, report: ImportReport, repair: bool) -> dict[str, Body
             tensor = np.zeros((3, 3))
         elif mass < 0.0:
             raise link.wrong(f"has the negative mass {mass:g} kg")
-        fixed = _possible(tensor)
+        fixed = possible_inertia(tensor)
         if fixed is not tensor:
             broken.append(name)
             tensor = fixed
@@ -133,16 +132,6 @@ def _inertial(inertial: Element) -> tuple[float, Any, Matrix]:
         for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
             tensor[i, j] = tensor[j, i] = values[f"i{'xyz'[i]}{'xyz'[j]}"]
     return m, place, R @ tensor @ R.T
-
-
-def _possible(tensor: Matrix) -> Matrix:
-    """The nearest inertia that a body can have: second moments ``½ tr I − I_k`` that are negative become 0."""
-    moments, axes = np.linalg.eigh(tensor)
-    second = 0.5 * moments.sum() - moments
-    if second.min() >= -TRIANGLE * max(np.abs(moments).max(), 1e-300):
-        return tensor
-    second = np.maximum(second, 0.0)
-    return np.asarray(axes @ np.diag(second.sum() - second) @ axes.T)
 
 
 def _origin(element: Element) -> tuple[Any, Matrix]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,8 +74,12 @@ class Element:
         return ModelError(f"{self.file}, line {self.line}: <{self.tag}>{called} {sentence}")
 
 
-def read_xml(path: Path) -> Element:
+def read_xml(path: Path, repaired: list[str] | None = None) -> Element:
     """The root of a file.
+
+    Parameters
+    ----------
+    repaired : where given, comments that XML forbids ("<!--" or "--" within a comment) are skipped and noted there
 
     Raises
     ------
@@ -87,6 +92,8 @@ def read_xml(path: Path) -> Element:
         data = path.read_bytes()
     except OSError as error:
         raise ModelError(f"'{path}' cannot be read: {error.strerror or error}") from None
+    if repaired is not None:
+        data = _without_wrong_comments(data, path.name, repaired)
     parser = expat.ParserCreate()
     parser.buffer_text = True
     stack: list[Element] = []
@@ -126,3 +133,17 @@ def read_xml(path: Path) -> Element:
             raise
         raise ModelError(f"{path.name}: its characters cannot be read ({error})") from None
     return roots[0]
+
+
+def _without_wrong_comments(data: bytes, file: str, repaired: list[str]) -> bytes:
+    """The text with blanks in the place of comments that hold "--", up to the first "-->"; lines stay."""
+
+    def blank(found: re.Match[bytes]) -> bytes:
+        inner = found.group(1)
+        if b"--" not in inner and not inner.endswith(b"-"):
+            return found.group()
+        line = data.count(b"\n", 0, found.start()) + 1
+        repaired.append(f"{file}, line {line}: a comment that XML forbids was skipped")
+        return re.sub(rb"[^\r\n]", b" ", found.group())
+
+    return re.sub(rb"<!--(.*?)-->", blank, data, flags=re.DOTALL)
