@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.joints.reflected import ACROSS, mirrored_signs
 from mbd.topology.plan import plan
@@ -21,9 +21,9 @@ from mbd.topology.plan import plan
 __all__ = ["Reflection", "in_space", "reflections"]
 
 ALONG = 1e-9
-"""Difference of places of touchdown and those of their mirror images, relative, up to which they are the same [-]."""
+"""Difference of what is stored and of its mirror image, relative, up to which they are the same [-]."""
 POSES = 3
-"""Postures at which places of touchdown are compared with their mirror images [-]."""
+"""States at which what is stored is compared with its mirror image [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,25 +64,51 @@ def reflections(model: Any, mechanism: Mechanism, partners: Any, parameters: Vec
         v = np.concatenate([own[1] for own in signs if own is not None])
         layout = mechanism.layout
         q, v = (np.concatenate([part, np.ones(n - len(part))]) for part, n in ((q, layout.n_q), (v, layout.n_v)))
-        anchors = _of_anchors(mechanism, partners, q, parameters)
+        anchors = _of_anchors(mechanism, partners, (q, v), parameters)
         if anchors is not None:
             found.append(Reflection(name, q[partners.q], v[partners.v], anchors))
     return found
 
 
-def _of_anchors(mechanism: Mechanism, partners: Any, signs: Vector, parameters: Vector) -> Vector | None:
-    """Signs of places of touchdown, from those of mirrored postures; None where one is not mirrored."""
-    layout, random = mechanism.layout, np.random.default_rng(11)
-    if not layout.n_anchors:
+def _of_anchors(mechanism: Mechanism, partners: Any, signs: tuple[Vector, Vector], parameters: Vector) -> Vector | None:
+    """Signs of what is stored, from mirrored states; None where one is not mirrored.
+
+    What is stored of motion tells its sign at once; what is stored of other held values, once theirs are known.
+    """
+    if not mechanism.layout.n_anchors:
         return np.ones(0)
+    found = np.zeros(mechanism.layout.n_anchors)  # 0: not known yet
+    while True:
+        mine, its = _stored(mechanism, partners, signs, found, parameters)
+        size = max(1.0, float(np.max(np.abs(mine))))
+        same, opposite = (np.all(np.abs(its - sign * mine) <= ALONG * size, axis=0) for sign in (1.0, -1.0))
+        if not np.all(same | opposite):
+            return None
+        now = np.where(same & opposite, 0.0, np.where(same, 1.0, -1.0))
+        if np.all((now == 0.0) | (found != 0.0)):
+            return np.where(found == 0.0, 1.0, found)
+        found = np.where(found == 0.0, now, found)
+
+
+def _stored(
+    mechanism: Mechanism, partners: Any, signs: tuple[Vector, Vector], of_anchors: Vector, parameters: Vector
+) -> tuple[Matrix, Matrix]:
+    """What would be stored (POSES, n_anchors) at some states, exchanged, and at their mirror images.
+
+    Values are held where their signs are known.
+    """
+    layout, random = mechanism.layout, np.random.default_rng(11)
     configuration = mechanism.equations.configuration
     here, there = list[Vector](), list[Vector]()
     for _ in range(POSES):
         q = configuration.compose(np.array(configuration.defaults), random.uniform(-0.4, 0.4, layout.n_v))
-        for place, found in ((q, here), ((signs * q)[partners.q], there)):
-            terms = mechanism.acceleration_terms(0.0, place, np.zeros(layout.n), parameters, np.zeros(layout.n_anchors))
-            found.append(terms.captured)
-    mine, its = np.array(here)[:, partners.anchors], np.array(there)
-    size = max(1.0, float(np.max(np.abs(mine))))
-    same, opposite = (np.all(np.abs(its - sign * mine) <= ALONG * size, axis=0) for sign in (1.0, -1.0))
-    return np.where(same, 1.0, -1.0) if np.all(same | opposite) else None
+        v, z = random.uniform(-1.0, 1.0, layout.n_v), random.uniform(-1.0, 1.0, layout.n - layout.n_v)
+        own = random.uniform(0.1, 0.5, layout.n_anchors) * (of_anchors != 0.0)
+        held = np.zeros(layout.n_anchors)
+        held[partners.anchors] = own
+        image = (signs[0] * q)[partners.q], np.concatenate([(signs[1] * v)[partners.v], z[partners.z]])
+        for (place, y), anchors, found in (
+            ((q, np.concatenate([v, z])), held, here), (image, of_anchors * own, there),
+        ):  # fmt: skip
+            found.append(mechanism.acceleration_terms(0.0, place, y, parameters, anchors).captured)
+    return np.array(here)[:, partners.anchors], np.array(there)

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import mbd
 from mbd.gait.exact_derivative import exact_derivative
+from mbd.gait.limit_cycle import map_of
 from mbd.gait.map_derivative import map_derivative
 
 g = 9.81
@@ -211,6 +212,29 @@ def test_a_gait_found_repeats_itself_in_a_run() -> None:
     assert np.max(np.abs(again.v - here.v)) < 1e-10
     moved = [k for k in range(len(here.q)) if k not in gait.chart.section.fixed]
     assert np.max(np.abs((again.q - here.q)[moved])) < 1e-10
+
+
+def test_what_is_stored_of_sideways_motion_changes_its_sign_in_the_mirror() -> None:
+    """A remembered roll and its rate, and samples of the roll that wait for two periods."""
+    model = rocking.__wrapped__()
+    pelvis = next(joint for joint in model.joints if joint.name == "roll")
+    steps = [mbd.Transition("left", "right", on="right foot"), mbd.Transition("right", "left", on="left foot")]
+    law = mbd.SampledLaw("sway", 0.05, {"u": lambda q, v, s: -0.01 * q - 0.01 * s},
+                         arguments=("roll.angle", "roll.angle.rate", "sway.sum"), delay=0.1, restart_on=("stance",),
+                         states={"sum": lambda q, v, s: s + v})  # fmt: skip
+    remembered = {"roll": "roll.angle", "rate": "roll.angle.rate", "speed": "trunk.x.rate"}
+    model.constrain(mbd.Mode("stance", SIDES, transitions=steps, remembers=remembered), law)
+    model.apply(mbd.Motor("balance", pelvis, torque=lambda u, v: u - 0.01 * v, arguments=["sway.u", "stance.rate"]))
+    start = mbd.assemble(model, closed="left foot")
+    cycle = ("right foot", SIDES, 1)
+    found = map_of(model, start, mbd.RungeKutta853(), 0.05, cycle, None, None, None, 10.0, "python")
+    signs = {
+        f"{machine.name}.{field}": found.mirror.reflection.anchors[anchor]
+        for machine in found.mechanism.equations.machines
+        for field, anchor in zip(machine.fields, machine.anchors, strict=True)
+    }
+    odd = {name for name, sign in signs.items() if sign < 0.0}
+    assert odd == {"stance.roll", "stance.rate", "sway.u", "sway.u 1", "sway.u 2", "sway.sum"}
 
 
 def test_the_axis_to_the_side_is_found() -> None:
