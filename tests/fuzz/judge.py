@@ -140,11 +140,10 @@ def _choice(run: mbd.Trajectory, n: int) -> Array:
 def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, float] | None = None) -> Judgement:
     """Whether what a run tells between its rows keeps the laws as its rows do.
 
-    Where the scheme's own interpolation is of low order, loops and constraints are left to its error, and in index 3 to
-    where velocities lead that do not fit; forces may miss a fiftieth of what they are made of. Where a tolerance was
-    asked for, it is what coordinates may be off, and so what loops may miss; velocities by as much in the time of a
-    step; forces by what such velocities change of them. In a step to rest, which takes the mean direction of a friction
-    in a plane, by what that turns.
+    Loops and constraints hold as at rows, velocities too but in index 3. Where the scheme's own interpolation is of low
+    order, forces may miss a fiftieth of what they are made of; where a tolerance was asked for, what such an error of
+    velocities changes of them; in a step to rest, which takes the mean direction of a friction in a plane, what that
+    turns.
     """
     time = run.time
     steps_of = np.flatnonzero(np.diff(time) > BRIEFEST)
@@ -163,15 +162,13 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             bodies = Bodies(model, told)
             laws.places(found, bodies)
             h = np.diff(time)[np.searchsorted(time, times, side="right") - 1]
-            more = _cubics_apart(run, model, given, times) if "index3" in run.settings["integrator"] else None
-            loose = (1e-6 if precise else 1e-3 + _cubic_error(run, bodies, h)) + 0.3 * tol
-            laws.closure(found, bodies, loose, rates=precise, more=more, faster=0.3 * tol / h)
+            uncertain = 4 * int(run.stats["singular_steps"])  # a row ends two steps, each looked at twice
+            laws.closure(found, bodies, rates="index3" not in run.settings["integrator"], told=uncertain)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
             again = run.settings["between"].startswith("stages")  # steps are taken again, and end in balance
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
             laws.balance(found, bodies, loads(bodies), share, stiff + _turned(run, model, times))
-            if precise:
-                laws.constraints(found, bodies, 1e-6 + 0.3 * tol)
+            laws.constraints(found, bodies)
         except NotImplementedError as error:
             return Judgement(tuple(found.found), found.tried, str(error))
     return Judgement(tuple(found.found), found.tried)
@@ -188,27 +185,3 @@ def _turned(run: mbd.Trajectory, model: mbd.Model, times: Array) -> Array:
                 there = np.array([(name, row) in ends for row in k])
                 found += there * np.abs(run[part][k + 1] - run[part][k])
     return found
-
-
-def _cubic_error(run: mbd.Trajectory, bodies: Bodies, h: Array) -> Array:
-    """How far cubics over steps of h are from the motion, over its size (n,).
-
-    Where bodies turn at ω they are ``(ω h)⁴ / 384`` off their circles; by accelerations that change by Δa, at most
-    ``h² Δa / 64``.
-    """
-    a, k = run.record.a, np.searchsorted(run.time, bodies.told.time, side="right") - 1
-    spin = np.max([np.linalg.norm(bodies.twist(name).angular, axis=1) for name in bodies.placed], axis=0)
-    return np.asarray((spin * h) ** 4 / 384.0 + h**2 * np.max(np.abs(a[k + 1] - a[k]), axis=1) / 64.0)
-
-
-def _cubics_apart(run: mbd.Trajectory, model: mbd.Model, given: dict[str, float], times: Array) -> dict[str, Array]:
-    """How far frames held together come apart between rows whose positions fit and velocities do not, by joint (n,).
-
-    Cubics through rows that come apart at rates ṡ₀ and ṡ₁ do so by ``h (ṡ₀ ξ (1−ξ)² − ṡ₁ ξ² (1−ξ))``, at most
-    ``h max(|ṡ₀|, |ṡ₁|) / 4``.
-    """
-    k = np.searchsorted(run.time, times, side="right") - 1
-    rows = readings(run, model, given)
-    before, after = (laws.partings(Bodies(model, rows.part(ends))) for ends in (k, k + 1))
-    h = run.time[k + 1] - run.time[k]
-    return {name: 0.25 * h * np.maximum(speed, after[name]) for name, speed in before.items()}

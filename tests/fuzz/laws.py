@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ __all__ = [
     "energies",
     "places",
     "kinks",
-    "partings",
     "size_of",
 ]
 
@@ -65,41 +63,23 @@ def places(found: Faults, bodies: Bodies) -> None:
             found.small("velocity of a frame", name, np.max(np.abs(reported - own), axis=1), EQUAL * fast)
 
 
-def closure(
-    found: Faults,
-    bodies: Bodies,
-    loose: Any = HELD,
-    rates: bool = True,
-    told: int = 0,
-    more: Mapping[str, Array] | None = None,
-    faster: Any = 0.0,
-) -> None:
+def closure(found: Faults, bodies: Bodies, rates: bool = True, told: int = 0) -> None:
     """Joints that close loops fit: their frames, seen over both branches, differ by the joint's own motion alone.
 
     Parameters
     ----------
-    loose : what places may miss, over the size of the mechanism, a number or (n,) [-]
     rates : whether velocities are held too
     told : how many instants are next to singular poses, where the run says that they are not
-    more : what places may miss besides by joint, (n,) each [m, rad]
-    faster : what velocities may miss besides, over the size of the mechanism, (n,) [1/s]
     """
     size = size_of(bodies)
     for joint in bodies.closing:
         across, gap = _apart(bodies, joint)
         off = np.max(np.abs(gap.H - np.eye(4)), axis=(1, 2))
-        limit = loose * size + (more[joint.name] if more else 0.0)
-        found.small("joint holds its frames together", joint.name, off, limit)
+        found.small("joint holds its frames together", joint.name, off, HELD * size)
         if not rates:
             continue
         motion = np.abs(across.first).max(axis=(1, 2))
-        limit = size * (loose * (1.0 + motion) + faster)
-        found.small("velocities fit at a joint", joint.name, _parting(gap), limit, told=told)
-
-
-def partings(bodies: Bodies) -> dict[str, Array]:
-    """How fast frames that a joint of a loop holds together come apart, by joint (n,) [m/s, rad/s]."""
-    return {joint.name: _parting(_apart(bodies, joint)[1]) for joint in bodies.closing}
+        found.small("velocities fit at a joint", joint.name, _parting(gap), HELD * size * (1.0 + motion), told=told)
 
 
 def _apart(bodies: Bodies, joint: Joint) -> tuple[Moving, Moving]:
@@ -163,32 +143,32 @@ def kinks(bodies: Bodies) -> Array:
     return found
 
 
-def constraints(found: Faults, bodies: Bodies, loose: float = HELD) -> None:
+def constraints(found: Faults, bodies: Bodies) -> None:
     """What always acts holds: measures at their values, rows on velocities."""
     size = size_of(bodies)
     for word in bodies.model.constraints:
         if isinstance(word, mbd.Bilateral):
             wanted = value_of(word.value, word.arguments, bodies, word.name, "value")
             off = gap_of(word.measure, bodies).value - wanted
-            found.small("constraint holds", word.name, off, loose * (size + np.max(np.abs(wanted), initial=0.0)))
+            found.small("constraint holds", word.name, off, HELD * (size + np.max(np.abs(wanted), initial=0.0)))
         elif isinstance(word, mbd.KnifeEdge):
             R = bodies.frame(word.frame).H[:, :3, :3]
             v = bodies.velocity(word.frame.body.name, bodies.place(word.frame))
             off = np.sum(v * (R @ np.asarray(word.normal)), axis=1)
-            found.small("row on velocities holds", word.name, off, loose * (size + np.linalg.norm(v, axis=1)))
+            found.small("row on velocities holds", word.name, off, HELD * (size + np.linalg.norm(v, axis=1)))
         elif isinstance(word, mbd.Nonholonomic):
             values = [named(given, bodies) for _, given in word.arguments]
             bias = value_of(word.bias, (("t", "t"),), bodies, word.name, "bias")
             scale = sum(np.abs(value) for value in values)
-            found.small("row on velocities holds", word.name, word.row(*values) + bias, loose * (size + scale))
+            found.small("row on velocities holds", word.name, word.row(*values) + bias, HELD * (size + scale))
         elif isinstance(word, mbd.Rolling) and word.axis is not None:
             radius = bodies.told.parameters[f"{word.name}.radius"]
             gap = edge_gap(word.center, radius, word.axis, word.ground, bodies)
             slip = gap.slip(bodies)
             off = np.linalg.norm([np.sum(slip * direction, axis=1) for _, direction in gap.tangents], axis=0)
-            found.small("row on velocities holds", word.name, off, loose * size * 100.0)
+            found.small("row on velocities holds", word.name, off, HELD * size * 100.0)
         elif isinstance(word, mbd.Rolling):
-            found.small("row on velocities holds", word.name, _slip(word, bodies), loose * size * 100.0)
+            found.small("row on velocities holds", word.name, _slip(word, bodies), HELD * size * 100.0)
 
 
 def drives(found: Faults, bodies: Bodies, run: Any) -> None:
