@@ -64,7 +64,8 @@ def inverse_dynamics(
     Parameters
     ----------
     model : a `Model` or a `Lagrangian`
-    motion : a run; the result of `mbd.inverse_kinematics`; or arrays by name, {'time': t (R,), 'left hip.angle': (R,),
+    motion : a run; the result of `mbd.inverse_kinematics`; a `Recording` whose channels have the names of coordinates;
+        or arrays by name, {'time': t (R,), 'left hip.angle': (R,),
         'trunk.orientation': (R, 4), …} [s, m, rad], or `Samples`; rates and accelerations may be given too
         ('left hip.angle.rate'), coordinates that closed loops determine may be left out
     joints : names of the joints that are driven; by default all but those with which a body floats over the ground

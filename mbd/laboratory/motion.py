@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,6 +20,7 @@ from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.forces.samples import Samples
 from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
+from mbd.notes import doubt
 from mbd.results.record import Record
 from mbd.trajectory import Trajectory
 
@@ -159,8 +161,26 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
                 second = derivatives(time, rate)[0]
             acceleration = second if acceleration is None else acceleration
         v[:, k], a[:, k] = rate, acceleration
+    doubt(*_in_degrees(equations, columns), of=model)
     motion = Motion(time, q, v, a)
     return motion if not missing else _closed(model, mechanism, motion, missing, changed)
+
+
+def _in_degrees(equations: Equations, columns: Mapping[str, _Column]) -> list[str]:
+    """Sentences on angles that swing to and fro by more than a turn, as those of a joint do in degrees."""
+    found = []
+    for coordinate in equations.coordinates:
+        column = columns.get(coordinate.name)
+        if coordinate.unit != "rad" or column is None or len(column.value) < 3:
+            continue
+        values = column.value
+        swing = float(np.ptp(values))
+        if swing > math.tau and float(np.sum(np.abs(np.diff(values)))) > 1.5 * swing:
+            found.append(
+                f"motion: {coordinate.name!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; "
+                "angles are in radians: numpy.radians(…) converts degrees, a file says 'knee.angle [deg]'"
+            )
+    return found
 
 
 def _times(given: Mapping[str, Any]) -> Vector:

@@ -317,7 +317,15 @@ def machine_faults(model: Description) -> list[str]:
     geometry |= {name for frame in model.points() for name in frame.parameters()}
     geometry |= {f"gravity.{axis}" for axis in "xyz"}
     parameters = model.parameters if model.machines else {}
+    words = {name.rpartition(".")[0] for name in parameters}
     for word in model.machines:
+        for name in getattr(word, "own_outputs", ()):
+            if name in words:
+                near = [parameter for parameter in parameters if parameter.startswith(f"{name}.")]
+                found.append(
+                    f"'{word.name}': the output {name!r} is a quantity of its own, '{word.name}.{name}', and sets "
+                    f"nothing of '{name}'; name a parameter, {', '.join(map(repr, near[:6]))}, or another one"
+                )
         for name in (*word.parameters_by_state(), *word.held_parameters()):
             if name not in parameters:
                 found.append(f"'{word.name}' sets {name!r}: " + nearest(name, parameters, "parameter", "There are"))

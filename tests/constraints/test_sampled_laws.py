@@ -155,3 +155,13 @@ def test_bad_names_of_sampled_laws_are_errors_at_build(more: Any, message: str) 
     model.apply(L(**{"name": "s", "period": 0.1, "arguments": ("hinge.angle", "hinge.rate", "PID.sum"), **more}))
     with pytest.raises(ModelError, match=message):
         mbd.assemble(model, {"hinge.angle": 0.2})
+
+
+def test_an_output_with_the_name_of_an_element_is_a_fault():
+    """It would be a quantity of its own, and the motor would do nothing."""
+    model = mbd.Model("arm")
+    hinge = mbd.Revolute("hinge", model.ground.origin, mbd.Link("rod", mass=2.0, length=0.4, center=0.2).start)
+    model.connect(hinge)
+    law = mbd.SampledLaw("PD", period=0.01, outputs={"motor": lambda q: -q}, arguments=["hinge.angle"])
+    model.apply(mbd.Motor("motor", hinge, torque=0.0), law)
+    assert "name a parameter, 'motor.torque'" in model.check()[0]

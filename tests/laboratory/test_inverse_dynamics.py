@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -359,3 +360,16 @@ def test_joints_that_are_none_or_cut_are_named():
     cut = next(name for name in ("crank pin", "coupler pin", "rocker pin") if f"{name}.angle" not in run.final.names)
     with pytest.raises(mbd.ModelError, match="closes a loop and is cut"):
         mbd.inverse_dynamics(four_bar(), run, joints=[cut])
+
+
+def test_angles_that_look_like_degrees_are_in_doubt():
+    """An angle that swings to and fro by more than a turn warns; one that goes round does not."""
+    model, time = mbd.Model("leg"), np.linspace(0.0, 1.0, 101)
+    rod = mbd.Link("shank", mass=3.0, length=0.4, center=0.2, inertia=0.05)
+    model.connect(mbd.Revolute("knee", model.ground.origin, rod.start))
+    with pytest.warns(mbd.MbdWarning, match="'knee.angle' swings to and fro by 60 rad"):
+        mbd.inverse_dynamics(model, {"time": time, "knee.angle": 30.0 * np.sin(6.0 * time)})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mbd.inverse_dynamics(model, {"time": time, "knee.angle": 30.0 * time})
+        mbd.inverse_dynamics(model, {"time": time, "knee.angle": np.radians(30.0 * np.sin(6.0 * time))})
