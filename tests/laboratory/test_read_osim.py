@@ -310,6 +310,16 @@ def test_couplers_locks_and_clamps(tmp_path, version):
     assert "'toe', which is switched off" in str(found.report) and "ranges of clamped coordinates" in str(found.report)
 
 
+def test_a_range_that_is_none_is_left_out_and_told(tmp_path):
+    for wrong in ("<range>0.9 -1.5</range>", ""):
+        text = document("40000", coordinate=lambda name: "<clamped>true</clamped>" if name == "knee" else "")
+        at = text.index("<range>", text.index("<Coordinate name='knee'>"))
+        text = text[:at] + text[at:].replace("<range>-1.5 0.9</range>", wrong, 1)
+        found = mbd.read_model(written(tmp_path, text), stops=True)
+        assert not [each for each in found.model.constraints if "stop" in each.name]
+        assert "whose lower end is not below the upper one: 'knee'" in str(found.report)
+
+
 @pytest.mark.parametrize("version", ["30000", "40000"])
 def test_balls_and_free_bodies_turn_by_quaternions_unless_locked(tmp_path, version):
     zero = (0, 0, 0)

@@ -78,6 +78,11 @@ class _Coordinate:
     """The joint of the model whose one coordinate it is."""
 
     @property
+    def is_limited(self) -> bool:
+        """Whether it is clamped to a range, and not locked."""
+        return self.clamped and not self.locked and math.isfinite(self.low) and self.low < self.high
+
+    @property
     def made(self) -> Joint:
         """Its joint, which is there."""
         assert self.joint is not None
@@ -529,7 +534,7 @@ class _Reader:
                 self.held.append(Bilateral(_unlike(f"{name} lock", taken), joint, coordinate.value))
             elif coordinate.free:
                 self.posture[joint.coordinate_names[0]] = coordinate.value
-            if self.stops and coordinate.clamped and not coordinate.locked:
+            if self.stops and coordinate.is_limited:
                 self.held += [
                     Unilateral(_unlike(f"{name} lower stop", taken), extension(joint, offset=coordinate.low)),
                     Unilateral(_unlike(f"{name} upper stop", taken), flexion(joint, offset=-coordinate.high)),
@@ -575,7 +580,8 @@ class _Reader:
             first.append(f"couplers as rows: {_listed(each.name for each in couplers)}")
         coordinates = self.coordinates.values()
         locked = [each.name for each in coordinates if each.locked]
-        clamped = [each.name for each in coordinates if each.clamped and not each.locked]
+        clamped = [each.name for each in coordinates if each.is_limited]
+        empty = [each.name for each in coordinates if each.clamped and not each.locked and not each.is_limited]
         if locked:
             first.append(f"locked coordinates as rows: {_listed(locked)}")
         if clamped and self.stops:
@@ -586,6 +592,8 @@ class _Reader:
         left = report.left_out
         if clamped and not self.stops:
             left.append(f"ranges of clamped coordinates, stops=True makes stops of them: {_listed(clamped)}")
+        if empty:
+            left.append(f"ranges of clamped coordinates, whose lower end is not below the upper one: {_listed(empty)}")
         prescribed = [each.name for each in coordinates if _flag(each.element, "prescribed")]
         if prescribed:
             left.append(f"prescribed functions of time: {_listed(prescribed)}")
