@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from mbd.kernel.records import Kernel, Steps
 
-__all__ = ["follow_event", "follow_matrix", "further_corrections", "note_matrix"]
+__all__ = ["follow_event", "follow_matrix", "further_corrections", "note_matrix", "takes_part"]
 
 
 def follow_event(K: Kernel) -> int:
@@ -21,6 +21,11 @@ def note_matrix(K: Steps) -> None:
 
 def follow_matrix(K: Steps, m: int, whole: bool) -> None:
     """The position correction in K.work follows its matrix; `whole`: it is all of it, not a change."""
+
+
+def takes_part(value: float) -> bool:
+    """Whether a factor changes what it multiplies: it is not 0, and in the tangent pass nor are its derivatives."""
+    return value != 0.0
 
 
 def further_corrections() -> int:

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.compile.llvm import Machine
+from mbd.kernel.algebra import linear
 from mbd.kernel.build import object_of
 from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.run_data import unknown
+from mbd.sensitivity.tangent.build import own_rules
 from mbd.sensitivity.tangent.printer import LANES, tangent_text
 from mbd.sensitivity.walk import Walk
+from mbd.testing.mechanisms import random_scene
 from tests.gait.test_gaits_with_modes import walker as walker_with_modes
 from tests.sensitivity.test_cones import box
 from tests.sensitivity.turns import judged
@@ -59,8 +63,6 @@ def test_every_operation_has_its_derivative():
     """Beside differences of order 4 of the values themselves."""
     source = Source("given", functions_of(TEXT), {})
     code = object_of(tangent_text(translate(source, "entry", ["kernel", "reals", "reals"]), "given_entry", ()), 0)
-    from mbd.compile.llvm import Machine
-
     machine = Machine()
     run = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 6)(machine.load(code, ["given_entry"])[0])
 
@@ -81,6 +83,60 @@ def test_every_operation_has_its_derivative():
             smooth = np.abs(one - two) < 1e-2  # no choice is turned between them
             assert smooth.sum() > 5
             assert found[smooth, lane] == pytest.approx(((4.0 * one - two) / 3.0)[smooth], rel=1e-6, abs=1e-8)
+
+
+SOLVERS = """
+def entry(K: Kernel, A: Reals, b: Reals, pivots: Integers, work: Reals, way: int) -> int:
+    if way == 0:
+        return 0 if solve_definite(A, 3, b, work) > 0.0 else 1
+    if way == 1:
+        return 0 if solve_from_tips(A, 3, b, work) > 0.0 else 1
+    if way == 2:
+        status = factor(A, 3, pivots)
+        solve(A, 3, pivots, b)
+        return status
+    return 0 if eliminate(A, 3, b, pivots, work, 1e-12) == 3 else 1
+"""
+
+
+@pytest.mark.parametrize("way", range(4))
+def test_entries_that_are_zero_have_derivatives_in_every_elimination(way):
+    """``A x = b → A x' = b' − A' x`` where A is diagonal and A' is full, as M is where links stand square."""
+    known = {
+        name: getattr(linear, name) for name in ("solve_definite", "solve_from_tips", "factor", "solve", "eliminate")
+    }
+    source = Source("given", functions_of(SOLVERS), known)
+    kinds = ["kernel", "reals", "reals", "integers", "reals", "int"]
+    found = translate(source, "entry", kinds, instead={"mbd.kernel.tangent_rules": own_rules()})
+    machine = Machine()
+    address = machine.load(object_of(tangent_text(found, "given_solver", ()), 0), ["given_solver"])[0]
+    run = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64, *[ctypes.c_void_p] * 4)(address)
+    A, b, work, pivots = (
+        np.diag([1.0, 2.0, 3.0]),
+        np.array([1.0, -2.0, 0.5]),
+        np.zeros(40),
+        np.zeros(40, dtype=np.int64),
+    )
+    of_A, of_b, of_work = np.zeros((9, LANES)), np.zeros((3, LANES)), np.zeros((40, LANES))
+    change = np.array([[0.3, 0.7, -0.4], [0.7, 0.2, 0.9], [-0.4, 0.9, -0.5]])
+    of_A[:, 2], of_b[:, 2] = change.ravel(), (0.1, 0.4, -0.6)
+    x = np.linalg.solve(A, b)
+    wanted = np.linalg.solve(A, of_b[:, 2] - change @ x)
+    values = A.ravel().copy()
+    given = [each.ctypes.data for each in (values, b, pivots, work)]
+    assert run(None, *given, way, None, *(each.ctypes.data for each in (of_A, of_b, of_work))) == 0
+    assert b == pytest.approx(x) and of_b[:, 2] == pytest.approx(wanted, rel=1e-14)
+
+
+def test_a_scene_that_starts_where_masses_do_not_couple(forced):
+    """Its M has zeros at the start, at which the first stages of an explicit step still are."""
+    model = random_scene(175, bodies=3)
+    start = mbd.assemble(model)
+    runs = [
+        mbd.simulate(model, start, scheme, dt=5e-3, until=1.5) for scheme in (mbd.RungeKutta4(), mbd.RungeKutta853())
+    ]
+    assert all(len(run.events) == 5 for run in runs)
+    assert max(both(forced, *((run, start.velocity_names) for run in runs))) < 1e-9
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ A complex N×N elimination takes half the operations of the real one of 2N × 2N
 from __future__ import annotations
 
 from mbd.kernel.records import Reals
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["factor_complex", "solve_complex"]
 
@@ -45,7 +46,7 @@ def factor_complex(A: Reals, o: int, n: int, o_pivots: int) -> int:
         for i in range(k + 1, n):
             left = A[o + i * n + k] * re - A[o_im + i * n + k] * im
             left_im = A[o + i * n + k] * im + A[o_im + i * n + k] * re
-            if left != 0.0 or left_im != 0.0:
+            if takes_part(left) or takes_part(left_im):
                 A[o + i * n + k] = left
                 A[o_im + i * n + k] = left_im
                 for j in range(k + 1, n):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = [
     "eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "solve_from_tips", "sum_of_sizes",
@@ -34,7 +35,7 @@ def factor(A: Reals, n: int, pivots: Integers) -> int:
         inverse = 1.0 / A[k * n + k]
         A[k * n + k] = inverse
         for i in range(k + 1, n):
-            if A[i * n + k] != 0.0:
+            if takes_part(A[i * n + k]):
                 left = A[i * n + k] * inverse
                 A[i * n + k] = left
                 subtract_row(A, n, i, k, left, k + 1)
@@ -111,7 +112,7 @@ def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:
         inverse = 1.0 / pivot
         M[k * n + k] = inverse
         for i in range(k + 1, n):
-            if M[k * n + i] != 0.0:
+            if takes_part(M[k * n + i]):
                 left = M[k * n + i] * inverse
                 b[i] -= left * b[k]
                 subtract_row(M, n, i, k, left, i)
@@ -148,7 +149,7 @@ def solve_from_tips(M: Reals, n: int, b: Reals, work: Reals) -> float:
         inverse = 1.0 / pivot
         M[k * n + k] = inverse
         for i in range(k):
-            if M[k * n + i] != 0.0:
+            if takes_part(M[k * n + i]):
                 left = M[k * n + i] * inverse
                 b[i] -= left * b[k]
                 subtract_head(M, n, i, k, left)
@@ -219,7 +220,7 @@ def eliminate(A: Reals, n: int, b: Reals, columns: Integers, work: Reals, rank_t
             break
         for i in range(k + 1, n):
             left = A[i * n + k] / A[k * n + k]
-            if left != 0.0:
+            if takes_part(left):
                 subtract_row(A, n, i, k, left, k + 1)
                 b[i] -= left * b[k]
     conflict = False

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.linear import solve
 from mbd.kernel.records import Equations, Motion, Reals
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = [
     "HEAD", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt", "solve_ordered",
@@ -72,7 +73,7 @@ def factor_ordered(K: Equations, A: Reals, o: int, source: int, loss: float) -> 
         terms = before
         for e in range(first, own):
             turn = K.orders[o_turn + e]
-            if V[turn] != 0.0:
+            if takes_part(V[turn]):
                 inner = K.orders[o_own + turn]
                 left = V[turn] * V[size + inner]
                 V[turn] = left

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.ordered import HEAD, is_sound
 from mbd.kernel.records import Steps
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["factor_pair_ordered", "solve_pair_ordered"]
 
@@ -39,7 +40,7 @@ def factor_pair_ordered(K: Steps, o_A: int, o: int, loss: float) -> bool:
             turn = K.orders[o_turn + e]
             re = V[turn]
             im = V[size + turn]
-            if re != 0.0 or im != 0.0:
+            if takes_part(re) or takes_part(im):
                 inner = K.orders[o_own + turn]
                 left = re * V[re_at + inner] - im * V[im_at + inner]
                 left_im = re * V[im_at + inner] + im * V[re_at + inner]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.records import Reals
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["clear_row", "square"]
 
@@ -20,7 +21,7 @@ def clear_row(V: Reals, row: int, unit: int, n: int) -> float:
     part = 0.0
     for j in range(n):
         part += V[unit + j] * V[row + j]
-    if part != 0.0:  # rows of large mechanisms have little in common
+    if takes_part(part):  # rows of large mechanisms have little in common
         for j in range(n):
             V[row + j] -= part * V[unit + j]
     return part

@@ -12,6 +12,7 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions, Model, Reals, Singular
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["find_dependent", "find_dependence", "find_shares", "shared", "sharing", "spread", "take_shares"]
 
@@ -174,7 +175,7 @@ def find_shares(K: DependentRows) -> None:
             part = 0.0
             if K.dropped[d] == 1 and K.dropped[k] == 0:
                 part = K.dependence[d * K.n_rows + k]
-                if part != 0.0:
+                if takes_part(part):
                     part *= share(K, d, largest) / share(K, k, largest)
             K.shares[d * K.n_rows + k] = part
 
@@ -236,7 +237,7 @@ def spread(K: DependentRows, lam: Reals) -> None:
             K.kkt[a * count + b] = 1.0 / share(K, K.columns[a], largest) if a == b else 0.0
         for i in range(K.n_rows):
             left = K.dependence[K.columns[a] * K.n_rows + i]
-            if K.dropped[i] == 1 or left == 0.0:
+            if K.dropped[i] == 1 or not takes_part(left):
                 continue
             left /= share(K, i, largest)
             K.rhs[a] += left * lam[i]

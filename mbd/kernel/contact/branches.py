@@ -7,6 +7,7 @@ from mbd.kernel.algebra.saddle import solve_at
 from mbd.kernel.contact.cone_loads import keep_in_cones
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Frictions, Reals
 from mbd.kernel.stepping.restart import MOST_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["find_limits", "is_on", "load", "slides", "solve_directed", "whole"]
 
@@ -70,7 +71,7 @@ def load(K: ContactForces, level: int) -> None:
     for i in range(K.n):
         K.force[i] = 0.0
         for k in range(K.n_rows):
-            K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if K.given[k] != 0.0 else 0.0
+            K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if takes_part(K.given[k]) else 0.0
     if K.strategy == 1 and level == 1:
         for f in range(K.n_frictions):
             if slides(K, f):  # what friction lacks of its limit under the forces of the smooth step

@@ -25,6 +25,7 @@ from mbd.kernel.stepping.restart import (
     load_accelerations,
     stepping_rows,
 )
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["all_hold", "keep_branches", "solve_cones"]
 
@@ -174,7 +175,7 @@ def load_held(K: Balance, level: int, count: int) -> int:
         for i in range(K.n):
             K.force[i] = 0.0
             for k in range(K.n_rows):
-                K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if K.given[k] != 0.0 else 0.0
+                K.force[i] += K.acc[o_R + i * K.n_rows + k] * K.given[k] if takes_part(K.given[k]) else 0.0
     for u in range(count):
         row = K.cone_rows[u]
         K.cone_found[u] = -K.past[row] if level == 1 else -K.lam[row]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.redundancy import shared
 from mbd.kernel.records import DependentRows, LinearAlgebra
+from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["find_islands", "gather_island", "saddle_entry"]
 
@@ -21,6 +22,11 @@ def saddle_entry(K: DependentRows, u: int, v: int, together: bool) -> float:
         return float(K.acc[u * n + v])
     row = K.rows[v - n]
     return float(K.acc[K.acc_R + u * K.n_rows + row] + (shared(K, u, row) if together else 0.0))
+
+
+def couples(K: DependentRows, u: int, v: int) -> bool:
+    """Whether [M R; B 0] has an entry other than 0 between two unknowns."""
+    return takes_part(saddle_entry(K, u, v, False)) or takes_part(saddle_entry(K, v, u, False))
 
 
 def find_islands(K: DependentRows, m: int) -> int:
@@ -39,7 +45,7 @@ def find_islands(K: DependentRows, m: int) -> int:
             waiting -= 1
             u = K.members[waiting]
             for v in range(size):
-                if K.island[v] < 0 and (saddle_entry(K, u, v, False) != 0.0 or saddle_entry(K, v, u, False) != 0.0):
+                if K.island[v] < 0 and couples(K, u, v):
                     K.island[v] = count
                     K.members[waiting] = v
                     waiting += 1

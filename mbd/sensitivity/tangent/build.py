@@ -17,7 +17,7 @@ from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.tangent import rules
 from mbd.sensitivity.tangent.printer import tangent_text
 
-__all__ = ["entry"]
+__all__ = ["entry", "own_rules"]
 
 ENTRY = "mbd_tangent_kernel"
 LEVEL = 2
@@ -57,13 +57,17 @@ def _object() -> bytes:
     return build.object_of(text(), level=LEVEL)
 
 
+def own_rules() -> Source:
+    """`rules`, which take the place of `mbd.kernel.tangent_rules`."""
+    return Source("rules", functions_of(inspect.getsource(rules)), vars(rules))
+
+
 def text() -> str:
     """The kernel with derivatives in LLVM's words."""
     from mbd.kernel.stepping.advance import advance
 
     dispatched, names = contract.dispatch()
     own = Source("hooks", functions_of(dispatched), {**names, "advance": advance})
-    here = Source("rules", functions_of(inspect.getsource(rules)), vars(rules))
-    instead = {"mbd.kernel.hooks": own, "mbd.kernel.tangent_rules": here}
+    instead = {"mbd.kernel.hooks": own, "mbd.kernel.tangent_rules": own_rules()}
     found = translate(own, "advance", ["kernel"], build.APART, instead)
     return tangent_text(found, ENTRY, HELD)

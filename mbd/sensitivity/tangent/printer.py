@@ -359,6 +359,8 @@ class TangentBody(Body):
             return self.at_root(*operands)
         if name.startswith("rules.without_tangent."):
             return str(operands[0])
+        if name.startswith("rules.takes_part."):
+            return self.takes_part(operands[0])
         given = [f"{LLVM[kind]} {operand}" for kind, operand in zip(kinds, operands, strict=True)]
         given += [f"{WITH_TANGENT[k]} {of(each)}" for k, each in zip(kinds, operands, strict=True) if k in WITH_TANGENT]
         self.called.append(f"{name}.d")
@@ -378,6 +380,15 @@ class TangentBody(Body):
         over = self.emit(f"fdiv double -1.0, {rate}")
         moved = self.scaled(over, of(value))
         return Dual(str(place), self.emit(f"insertelement {VECTOR} {moved}, double 0.0, i64 {LANES - 1}"))
+
+    def takes_part(self, value: str) -> str:
+        """Whether a value or one of its derivatives is not 0."""
+        own = self.compared("!=", (str(value), "real"), ("0.0", "real"))
+        if of(value) == ZERO:
+            return own
+        bits = self.emit(f"fcmp une {VECTOR} {of(value)}, {ZERO}")
+        word = self.emit(f"bitcast <{LANES} x i1> {bits} to i{LANES}")
+        return self.emit(f"or i1 {own}, {self.emit(f'icmp ne i{LANES} {word}, 0')}")
 
     def _Evaluate(self, node: tree.Evaluate) -> str:
         table, number = self.value(node.kernel)[0], self.as_kind(node.number, "int")

@@ -17,6 +17,7 @@ __all__ = [
     "further_corrections",
     "note_matrix",
     "seeded",
+    "takes_part",
     "without_tangent",
 ]
 
@@ -34,6 +35,11 @@ def at_root(h: float, value: float) -> float:
 def without_tangent(value: float) -> float:
     """The value alone (see `printer`)."""
     return value
+
+
+def takes_part(value: float) -> bool:
+    """Whether a value or one of its derivatives is not 0: a matrix passes through entries of 0 (see `printer`)."""
+    return value != 0.0
 
 
 def follow_event(K: Kernel) -> int:
