@@ -15,6 +15,8 @@ from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.constraints.base import Constraint
+from mbd.constraints.rolling_touchdown import RollingSole
 from mbd.errors import MbdError, ModelError
 from mbd.gait.alike import moves_sides_alike, sides_faults
 from mbd.gait.heading import Heading
@@ -130,6 +132,8 @@ class ReturnMap:
         self.penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
         places = {name: place or self._center(name) for name, place in places.items()}
         self.feet = {name: place for name, place in places.items() if place}
+        words = [word for word in getattr(self.model, "constraints", ()) if isinstance(word, Constraint)]
+        self.rolling = {word.name for word in words if isinstance(getattr(word, "measure", None), RollingSole)}
         self.inert = {
             g.name for g in self.mechanism.equations.guards
             if g.reset is None and not g.terminal and g.transition is None
@@ -248,7 +252,7 @@ class ReturnMap:
         places = self._feet_at(start, walk.values), self._feet_at(after, walk.values)
         walk.outcome = self._judged(start, end, *places)
         moved = self.mechanism.equations.configuration.difference(start.q, after.q)[list(self.fixed)]
-        found = self._steps(end, moved, places[1])
+        found = self._steps(end, moved, *places)
         walk.steps += [(self._named(name, odd), walk.period + t, length) for name, t, length in found]
         walk.events += [(self._named(e.name, odd), e.kind) for e in end.events if e.name not in self.penalties]
         walk.period, walk.travel = walk.period + after.time, walk.travel + (self.turned * moved if odd else moved)
@@ -287,18 +291,22 @@ class ReturnMap:
             run.adjust(self.dt, self.longest)
         return run
 
-    def _steps(self, end: End, moved: Vector, places: Mapping[str, Vector]) -> list[tuple[str, float, float]]:
+    def _steps(
+        self, end: End, moved: Vector, was: Mapping[str, Vector], now: Mapping[str, Vector]
+    ) -> list[tuple[str, float, float]]:  # fmt: skip
         """The feet that touched down, when, and the length of the step that each ended.
 
-        At the end both places are known; of two steps the first is what is left of the way.
+        A step is as long as the way between the places of both feet as each strikes. One that began with the map begins
+        where its foot was then; of two the second begins where its foot is at the end, unless it rolls: NaN, not known.
         """
         strikes = [event for event in end.events if event.kind == "closed" and event.name in self.feet]
         lengths = [float("nan")] * len(strikes)
         stance = [name for name in self.feet if name in end.before and name != self.section]
         last = end.state is not None and self.section in self.feet and end.stopped_by == self.section
         if last and end.state is not None and strikes and len(stance) == 1 and len(strikes) <= 2:
-            apart = places[self.section] - places[stance[0]]
-            lengths[-1] = float(np.linalg.norm(self.ahead(apart)))
+            begun = was if len(strikes) == 1 else now
+            if len(strikes) == 1 or stance[0] not in self.rolling:
+                lengths[-1] = float(np.linalg.norm(self.ahead(now[self.section] - begun[stance[0]])))
             if len(strikes) == 2:
                 lengths[0] = float(np.linalg.norm(self.forward * moved)) - lengths[-1]
         return [(event.name, event.time, length) for event, length in zip(strikes, lengths, strict=True)]
