@@ -31,8 +31,8 @@ def state_balance(scope: DerivationScope, rates: Iterable[tuple[Node, Scalar]]) 
     if missing:
         raise ModelError(
             [
-                f"state '{name}' has no rate; its force must list it in Action.rates, a law in Law.rates, a loss in "
-                "what rates() returns"
+                f"state '{name}' has no rate; '{name.rpartition('.')[0]}' must list it, a force in Action.rates, a law "
+                "in Law.rates, a loss in what rates() returns"
                 for name in missing
             ]
         )

@@ -20,10 +20,11 @@ from mbd.assembly.trivial_rows import DOUBTFUL, NEGLIGIBLE, parts_of_row
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations import programs
 from mbd.equations.equations import Equations
+from mbd.equations.magnitudes import magnitudes
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
-from mbd.tape.node import Tape
+from mbd.tape.node import Node, Tape
 
 __all__ = ["Balance", "Held", "Solved", "put", "saddle"]
 
@@ -215,13 +216,21 @@ class Balance:
         if not doubtful:
             return every
         with self.equations.tape.lock:
-            parts = [node for k in doubtful for node in parts_of_row(self.equations, k)]
+            parts = [node for k in doubtful for node in self._parts_of_row(k)]
         sizes = np.array(self.states.evaluate(parts, rows)).reshape(len(doubtful), -1, len(rows))
         n_v = self.equations.n_v
         trivial = {
             k for k, size in zip(doubtful, sizes, strict=True) if np.all(np.abs(B[:, k, :n_v]) <= NEGLIGIBLE * size.T)
         }
         return [k for k in every if k not in trivial]
+
+    def _parts_of_row(self, k: int) -> list[Node]:
+        """Σ|parts| of the entries of a row of B; of a file, which has no bodies, those of their expressions."""
+        terms = getattr(self.equations, "terms", ())
+        if not terms:
+            return parts_of_row(self.equations, k)
+        first = _last_of_R(self.equations) + k * (self.equations.n_v + self.equations.n_z)
+        return magnitudes(self.equations.tape, terms[first : first + self.equations.n_v])
 
 
 def _weights(M: Any) -> Any:
