@@ -26,7 +26,7 @@ from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Tape
 
-__all__ = ["Balance", "Held", "Solved", "put", "saddle"]
+__all__ = ["Balance", "Held", "Solved", "put", "saddle", "weights"]
 
 DEPENDENCE = 1e-6
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-].
@@ -205,7 +205,7 @@ class Balance:
         M, _, _, B, *_ = self.terms_at(there)
         every = self._acting(every, there, B)
         # in the metric of M one light coordinate makes all rows that move it parallel; dependent rows are so in any
-        independent = max(_independent(B[:, every] / _weights(M)), _independent(B[:, every]), key=len)
+        independent = max(_independent(B[:, every] / weights(M)), _independent(B[:, every]), key=len)
         return Held(every, [every[k] for k in independent])
 
     def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:
@@ -233,7 +233,7 @@ class Balance:
         return magnitudes(self.equations.tape, terms[first : first + self.equations.n_v])
 
 
-def _weights(M: Any) -> Any:
+def weights(M: Any) -> Any:
     """√M_ii (k, 1, n), by which columns of B are divided before rows are compared; 1 of what has no inertia."""
     found = np.sqrt(np.maximum(np.einsum("kii->ki", M), 0.0))
     return np.where(found > 0.0, found, 1.0)[:, None, :]
@@ -241,7 +241,7 @@ def _weights(M: Any) -> Any:
 
 def _dependence(M: Any, B: Any, held: Held) -> Any:
     """T (k, every, kept) of ``B = T B_kept``, by least squares on columns divided by √M_ii."""
-    scaled = np.nan_to_num(B / _weights(M), posinf=0.0, neginf=0.0)
+    scaled = np.nan_to_num(B / weights(M), posinf=0.0, neginf=0.0)
     basis, _ = np.linalg.qr(np.swapaxes(scaled[:, held.kept], 1, 2))
     along = scaled[:, held.every] @ basis
     kept = np.swapaxes(along[:, [held.every.index(k) for k in held.kept]], 1, 2).copy()

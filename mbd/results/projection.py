@@ -6,19 +6,20 @@ smoothly from row to row comes off them by its own error. Positions follow Newto
 ``M x + Bᵀ μ = 0,  B x = −(h − h*)``,  ``q ← q ⊕ x``,
 
 and velocities take one such step with ḣ; ``h* = (1 − ϑ) h₀ + ϑ h₁`` of the rows before and after, which in index 3
-miss ḣ = 0. Where the second correction is not less than half the first, as next to a pose in which B loses rank,
-Newton's method does not lead to the motion (Deuflhard 2004, Newton Methods for Nonlinear Problems, 2.1), and the state
-stays as it was.
+miss ḣ = 0. Next to a pose in which B loses rank a correction is an error over the distance from it: there, and where
+the second correction is not less than half the first (Deuflhard 2004, Newton Methods for Nonlinear Problems, 2.1), the
+state stays as it was.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix
-from mbd.results.balance import Balance, Flags, saddle
+from mbd.arrays import Matrix, Vector
+from mbd.results.balance import Balance, Flags, saddle, weights
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
 from mbd.results.record import Rows
@@ -27,6 +28,10 @@ __all__ = ["Projection"]
 
 CORRECTIONS = 3
 """Corrections of positions: an error of 0.01 is round-off after the third [-]."""
+LEAST_RANK = 0.05
+"""Least singular value of rows, each over its largest length in the metric of inertia, from which they are followed."""
+SPREAD = 64
+"""Stored rows by which that length is found."""
 SMALL = 1e-12
 """Correction, of coordinates of size 1, that is no matter whatever the next one is [-]."""
 
@@ -37,6 +42,7 @@ class Projection:
     def __init__(self, balance: Balance) -> None:
         self.balance, self.equations = balance, balance.equations
         self.charts = Charts.of(balance.equations)
+        self._longest: dict[tuple[int, ...], Vector] = {}
 
     @classmethod
     def of(cls, balance: Balance) -> Projection | None:
@@ -64,7 +70,7 @@ class Projection:
         theta = places.theta[:, None]
         first, last = (self._missed(kept, rows, places.lower, ends) for ends in (places.lower, places.upper))
         aim, aim_rate = ((1.0 - theta) * a + theta * b for a, b in zip(first, last, strict=True))
-        led, good, before = found, np.ones(len(found), dtype=bool), np.full(len(found), np.inf)
+        led, good, before = found, self._has_rank(kept, found), np.full(len(found), np.inf)
         for _ in range(CORRECTIONS):
             x, sound = self._correction(kept, led, aim)
             size = np.max(np.abs(x), axis=1, initial=0.0)
@@ -75,6 +81,26 @@ class Projection:
         change, sound = self._correction(kept, led, aim_rate, rates=True)
         good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)
         return np.where(good[:, None], led.q, found.q), np.where(good[:, None], found.v + change, found.v)
+
+    def _has_rank(self, kept: list[int], rows: Rows) -> Flags:
+        """Whether the rows are far from vanishing, and from depending on each other, at each state."""
+        scaled = self._scaled(kept, rows) / self._lengths(kept)[:, None]
+        return np.asarray(np.linalg.svd(np.nan_to_num(scaled), compute_uv=False)[:, -1] > LEAST_RANK)
+
+    def _scaled(self, kept: list[int], rows: Rows) -> Any:
+        """B (k, kept, n) in the metric of inertia."""
+        M, _, _, B, *_ = self.balance.terms_at(rows)
+        return B[:, kept] / weights(M)
+
+    def _lengths(self, kept: list[int]) -> Vector:
+        """The largest length of each row in the run, from rows spread over it."""
+        key = tuple(kept)
+        if key not in self._longest:
+            every = self.balance.states.rows
+            spread = every.part(np.unique(np.linspace(0, len(every) - 1, SPREAD).astype(np.intp)))
+            lengths = np.max(np.linalg.norm(np.nan_to_num(self._scaled(kept, spread)), axis=2), axis=0)
+            self._longest[key] = np.where(lengths > 0.0, lengths, 1.0)
+        return self._longest[key]
 
     def _missed(self, kept: list[int], rows: Rows, lower: Index, ends: Index) -> tuple[Matrix, Matrix]:
         """h and ḣ at the ends of intervals, in the mode of the interval."""
