@@ -2,7 +2,7 @@
 
 The motor acts as a spring and a damper whose stiffness, damping and rest angle depend on the phase: as the knee is bent
 by 50° and hardly moves, late swing follows. The hip is moved as in walking. The numbers are of the order of those of
-the Open Source Leg.
+the Open Source Leg, not taken from its publication.
 
 A. F. Azocar et al., Design and clinical implementation of an open-source bionic leg, Nature Biomedical Engineering 4
 (2020) 941.

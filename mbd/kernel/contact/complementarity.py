@@ -5,9 +5,9 @@
 
 1. A semismooth Newton method: every contact and friction takes the branch of its law that the last solution asks for,
    and the linear equations of these branches are solved again (Alart & Curnier 1991; Hintermüller, Ito & Kunisch 2002).
-2. Where that does not end, all laws are solved together as one problem over cones (`cone_contacts`), and 1 goes on from
-   its branches; then only the branch that breaks its law most changes. Multipliers of least norm of dependent rows, by
-   which steps judge, may leave limits that other multipliers keep: then a friction slides that need not.
+2. Where that does not end, all laws are solved together as one problem over cones (`cone_contacts`), and 1 continues
+   from its branches; then only the branch that breaks its law most changes. Multipliers of least norm of dependent
+   rows, by which steps judge, may leave limits that other multipliers keep: then a friction slides that need not.
 3. In impacts, whose impulses nothing judges again, those of the cones stand where 2 finds none and no rows conflict.
 
 Non-smooth steps with friction in space begin with the cones.
