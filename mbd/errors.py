@@ -116,7 +116,7 @@ MEANT = {
     "angle angles euler": ("flexion", "dorsiflexion", "first", "orientation", "orientation.w"),
     "abduction": ("adduction",),
     "com cog cm mass_center": ("center",),
-    "moment torque damping": ("torque", " loss.torque", " spring.torque", "reaction_torque"),
+    "moment torque damping": ("torque", "net_moment", " loss.torque", " spring.torque", "reaction_torque"),
     "force load": (" loss.force", " spring.force", "reaction_force", "tension", "torque", "multiplier"),
     "gap": ("residual",),
     "reaction": ("reaction_force",),

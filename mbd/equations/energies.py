@@ -17,6 +17,7 @@ from mbd.equations.gathered import Gathered
 from mbd.equations.impulses import impulses_of
 from mbd.equations.laws import Laws
 from mbd.equations.machines import declare_machines, machine_guards
+from mbd.equations.net_moments import offer_net_moments
 from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
 from mbd.equations.results import offer_contacts, offer_effects, offer_rows
@@ -138,7 +139,7 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     kinetic = energy_of_motion(lowering) + carried
     outputs = _outputs(system, lowering, known, effects, kinetic, potential)
     offer_observations(outputs, scope, system.observations)
-    return Equations(
+    equations = Equations(
         name=system.name, tape=tape,
         coordinates=tuple(records.Coordinate(c.name, c.unit, c.default) for c in system.coordinates),
         states=tuple(coordinate for coordinate, _ in scope.states), parameters=scope.parameters.found,
@@ -149,6 +150,8 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
         impulses=tuple(known.impulses),
         observations=tuple((each.name, each.unit) for each in system.observations),
     )  # fmt: skip
+    offer_net_moments(outputs, equations)
+    return equations
 
 
 def energy_of_motion(lowering: Lowering) -> Node:

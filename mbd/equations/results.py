@@ -10,6 +10,7 @@ from mbd.bodies.base import Frame
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Contact, Effect, Equations, Row
+from mbd.equations.net_moments import offer_net_moments
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.reactions import Wrench, reaction
 from mbd.forces.base import Force
@@ -46,6 +47,7 @@ def offer_results(
     for name, energy in ("kinetic_energy", equations.kinetic), ("potential_energy", equations.potential):
         outputs.value(name, energy)
     _offer_joints(outputs, scope, dynamics, work, rows, hidden)
+    offer_net_moments(outputs, equations, [force.name for force in model.forces if force.is_external])
     for frame in model.markers:
         accelerations = [f"a{axis}" for axis in AXES]
         outputs.triple(frame.full_name, partial(_frame_acceleration, scope, frame), accelerations)

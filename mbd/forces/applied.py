@@ -83,6 +83,11 @@ class Applied(Force):
         """'applied'."""
         return "applied"
 
+    @property
+    def is_external(self) -> bool:
+        """True."""
+        return True
+
     def mentions(self) -> list[Mention]:
         """Its frames, and what its functions are called with."""
         own = [self.frame] if self.axes is None else [self.frame, self.axes]

@@ -69,6 +69,11 @@ class Force(Parameterized, ABC):
         """Kind of cause in the energy ledger: 'damper' for a loss, 'force' for what is applied, 'potential'."""
         return {"loss": "damper", "applied": "force"}.get(self.kind, self.kind)
 
+    @property
+    def is_external(self) -> bool:
+        """Whether it acts from outside, so that no joint transmits its reaction; net moments of joints leave it out."""
+        return False
+
     @abstractmethod
     def mentions(self) -> list[Mention]:
         """The frames, joints and named quantities it refers to."""

@@ -43,7 +43,8 @@ class Samples:
     kind : the curve through the samples
 
         - 'spline': cubics with a continuous second derivative, so that a motion they drive has an acceleration;
-        - 'smooth': a spline that passes near noisy samples (`mbd.forces.smoothing`);
+        - 'smooth': a spline that passes near noisy samples (`mbd.forces.smoothing`), whose second derivative is
+          unreliable near the ends, for 0.5/cutoff or three samples;
         - 'monotone': cubics with a continuous slope that rise where the samples rise and overshoot nowhere;
         - 'linear': straight lines; 'hold': each sample until the next one comes.
 

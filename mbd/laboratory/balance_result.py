@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.equations.net_moments import net_moments
+from mbd.equations.net_moments import effort_name, net_moments
 from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
@@ -75,7 +75,7 @@ class InverseDynamics:
                 for k in places:
                     kind = "moment" if units[k].startswith("rad") else "force"
                     for word, values in (kind, self._effort[:, k]), (f"net_{kind}", self._effort[:, k] + net[:, k]):
-                        found[_label(equations.velocity_names[k], word)] = values
+                        found[effort_name(equations.velocity_names[k], word)] = values
                         if len(places) == 1:
                             found[f"{name}.{word}"] = values
                 power = sum((self._effort[:, k] * v[:, k] for k in places), np.zeros(len(v)))
@@ -91,7 +91,7 @@ class InverseDynamics:
         """(R, n_v) what the model's own springs, losses, motors, stops and loops do along each coordinate."""
         equations: Any = self.run.record.equations
         ground = {contact.name for contact in equations.contacts} | set(self._outside)
-        nodes = list(net_moments(equations, ground).values())[: equations.n_v]
+        nodes = net_moments(equations, ground)
         columns: Any = self.run.columns
         return np.column_stack(columns.evaluate(nodes, columns.rows)) if nodes else np.zeros((len(self.time), 0))
 
@@ -173,18 +173,6 @@ class InverseDynamics:
                 f"{force.max():.3g} N and {moment.max():.3g} N m"
             )
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
-
-
-def _label(velocity: str, kind: str) -> str:
-    """The name of the effort along a velocity.
-
-    >>> _label("ankle.plantar.rate", "moment"), _label("left hip.angular_velocity.x", "moment")
-    ('ankle.plantar.moment', 'left hip.moment.x')
-    """
-    if velocity.endswith(".rate"):
-        return f"{velocity.removesuffix('.rate')}.{kind}"
-    owner, _, axis = velocity.rpartition(".")
-    return f"{owner.rpartition('.')[0]}.{kind}.{axis}"
 
 
 def _turned(q: Matrix, vectors: Matrix) -> Matrix:

@@ -116,6 +116,11 @@ class ForcePlate(Force):
         """'applied'."""
         return "applied"
 
+    @property
+    def is_external(self) -> bool:
+        """True."""
+        return True
+
     def mentions(self) -> list[Mention]:
         """Its foot."""
         return [self.foot]

@@ -27,6 +27,8 @@ from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate, all_plates, loaded_model, wrenches
 from mbd.laboratory.least_norm import balanced
 from mbd.laboratory.motion import Motion, motion_of, parameters_of, record_of
+from mbd.laboratory.scatter import noise_remarks
+from mbd.notes import doubt
 from mbd.results.columns import ModelColumns
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
@@ -67,7 +69,9 @@ def inverse_dynamics(
     motion : a run; the result of `mbd.inverse_kinematics`; a `Recording` whose channels have the names of coordinates;
         or arrays by name, {'time': t (R,), 'left hip.angle': (R,),
         'trunk.orientation': (R, 4), …} [s, m, rad], or `Samples`; rates and accelerations may be given too
-        ('left hip.angle.rate'), coordinates that closed loops determine may be left out
+        ('left hip.angle.rate'), coordinates that closed loops determine may be left out. Noise in the values scatters
+        accelerations by 6 σ/h², h the distance of frames, of which an `MbdWarning` tells; smooth them before:
+        ``Samples(time, values, kind="smooth")``, ``recording.smoothed(cutoff=6.0)``, `inverse_kinematics` with cutoff
     joints : names of the joints that are driven; by default all but those with which a body floats over the ground
         (`Free`, in the plane `Planar`, of a point mass `Translation`)
     plates : force plates with the feet that stand on them, in the place of all contacts (`mbd.ForcePlate`,
@@ -132,7 +136,10 @@ def dynamics_of(
     lam = record.lam.copy()
     lam[:, list(equations.bilateral)] = found.lam
     run = Trajectory(replace(record, lam=lam, message="motion that was given", settings={"method": "inverse dynamics"}))
-    remarks = [*motion.notes, *notes, *_notes(equations, found.free, found.shared, driven, motion, bool(outside))]
+    noisy = [] if motion.run is not None else noise_remarks(equations, motion, found.effort, driven)
+    doubt(*noisy, of=model)
+    remarks = [*motion.notes, *noisy, *notes]
+    remarks += _notes(equations, found.free, found.shared, driven, motion, bool(outside))
     return InverseDynamics(
         run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), outside
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.forces.samples import Samples
 from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
+from mbd.laboratory.recording import Recording
 from mbd.notes import doubt
 from mbd.results.record import Record
 from mbd.trajectory import Trajectory
@@ -55,7 +56,8 @@ class Motion:
 def motion_of(model: Any, mechanism: Mechanism, motion: Any, changed: Mapping[str, float]) -> Motion:
     """A motion from a run, or from arrays by name.
 
-    Arrays need the key 'time'. The others are coordinates ('left hip.angle', 'trunk.orientation' of shape (R, 4)) at
+    Arrays need the key 'time'. Of a `Recording` the channels that are coordinates are taken, and a note names the
+    others. The others are coordinates ('left hip.angle', 'trunk.orientation' of shape (R, 4)) at
     these times, or `Samples` of them; velocities and accelerations are those of the cubic spline through the values
     (not-a-knot), unless they are given too ('left hip.angle.rate', 'left hip.angle.acceleration'). Coordinates that
     the rows of closed loops determine may be left out.
@@ -116,6 +118,9 @@ class _Column:
 
 def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], changed: Mapping[str, float]) -> Motion:
     equations = mechanism.equations
+    unused: list[str] = []
+    if isinstance(given, Recording):
+        given, unused = _of_recording(equations, given)
     time = _times(given)
     columns = _columns(equations, given, time)
     count, n_q, n_v = len(time), equations.n_q, equations.n_v
@@ -127,6 +132,7 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
         raise ModelError(
             f"motion: the coordinate {missing[0]!r} of '{equations.name}' is missing"
             f"{f', and {len(missing) - 1} more' if missing[1:] else ''}; give values of all of them at the times"
+            f"{'; the recording has ' + _few(unused) if unused else ''}"
         )
     turned: set[int] = set()
     for joint, first_q, first_v in whole.charts:
@@ -162,7 +168,8 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
             acceleration = second if acceleration is None else acceleration
         v[:, k], a[:, k] = rate, acceleration
     doubt(*_in_degrees(equations, columns), of=model)
-    motion = Motion(time, q, v, a)
+    remarks = (f"channels that are no coordinates are not used: {_few(unused)}",) if unused else ()
+    motion = Motion(time, q, v, a, None, remarks)
     return motion if not missing else _closed(model, mechanism, motion, missing, changed)
 
 
@@ -220,6 +227,25 @@ def _columns(equations: Equations, given: Mapping[str, Any], time: Vector) -> di
             raise ModelError(f"motion: the {level} of {name!r} is given without its value; give both")
         found[name] = replace(found[name], **{level: values})
     return found
+
+
+def _of_recording(equations: Equations, recording: Recording) -> tuple[dict[str, Any], list[str]]:
+    """Time and the channels of a recording that are coordinates or their rates, and the names of the others."""
+    names = [*(c.name for c in equations.coordinates), *equations.velocity_names]
+    known = {"_".join(name.split()) for name in names} | set(_spellings(names))
+    known |= {stem for stem, _, axis in (name.rpartition(".") for name in known) if axis in ("w", "x", "y", "z")}
+    ends = ("", ".rate", ".acceleration")
+
+    def fits(channel: str) -> bool:
+        plain = "_".join(channel.split())
+        return any(plain.removesuffix(end) in known for end in ends)
+
+    used = {name: values for name, values in recording.channels.items() if fits(name)}
+    return {"time": recording.time, **used}, [name for name in recording.channels if name not in used]
+
+
+def _few(names: Sequence[str]) -> str:
+    return ", ".join(map(repr, names[:6])) + (f" and {len(names) - 6} more" if names[6:] else "")
 
 
 def _spellings(names: list[str]) -> dict[str, str]:
@@ -314,7 +340,7 @@ def _closed(
         a[k, free] = np.linalg.lstsq(B[:, free], -(B @ a[k] + there.bias[rows]), rcond=None)[0] + a[k, free]
         q[k] = last = at
     shown_names = ", ".join(map(repr, missing[:4])) + (f" and {len(missing) - 4} more" if missing[4:] else "")
-    return Motion(motion.time, q, v, a, None, (f"{shown_names} follow from the closed loops",))
+    return Motion(motion.time, q, v, a, None, (*motion.notes, f"{shown_names} follow from the closed loops"))
 
 
 # the record ---------------------------------------------------------------------------------------------------------

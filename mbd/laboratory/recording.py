@@ -193,7 +193,11 @@ class Recording(Mapping[str, Any]):
 
     def smoothed(self, cutoff: float | None = None) -> Recording:
         """With markers and channels smoothed: by a Butterworth filter without lag at `cutoff` [Hz], or the spline that
-        generalized cross-validation finds. What has gaps is smoothed piece by piece."""
+        generalized cross-validation finds. What has gaps is smoothed piece by piece.
+
+        Second derivatives are unreliable near the ends, for 0.5/cutoff, 0.08 s at 6 Hz, or three frames of a spline;
+        record that much more than you need, and cut it with `between` afterwards.
+        """
 
         def smooth(values: Any) -> Any:
             out = np.array(values)

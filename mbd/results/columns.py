@@ -112,7 +112,9 @@ class Columns(ABC):
             return (
                 f"no result named {name!r}: {wrong}; there are '{joint}.euler.zxy' and others: {', '.join(SEQUENCES)}"
             )
-        return nearest(name, (*self.names, *self.vectors), "result", "The run has")
+        owner = name.rpartition(".")[0]
+        moments = [full for kind in ("net_moment", "net_force") if self.knows(full := f"{owner}.{kind}")]
+        return nearest(name, (*self.names, *self.vectors), "result", "The run has", moments)
 
 
 class ModelColumns(StoredStates, Columns):
@@ -265,7 +267,11 @@ class StoredColumns(Columns):
         return self._order
 
     def knows(self, name: str) -> bool:
-        return self._holds(name) or self._read_off(name) is not None
+        return self._holds(name) or self._read_off(name) is not None or self._derives(name)
+
+    def _derives(self, name: str) -> bool:
+        """Whether the expressions in the file have it, as they have net moments, but no column."""
+        return self._model is not None and self._model.knows(name)
 
     def _holds(self, name: str) -> bool:
         return name in self._aliases or name in self._values
@@ -296,6 +302,8 @@ class StoredColumns(Columns):
         if name in self._aliases:
             part, index = self._aliases[name]
             return np.asarray(getattr(state, part)[:, index])
+        if not self._holds(name) and self._model is not None:
+            return self._model.at_rows([name])[0]
         return np.broadcast_to(self._values[name], (len(self.record.time),))
 
     @property

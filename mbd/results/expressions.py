@@ -221,10 +221,17 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
         tape, sizes["q"], sizes["v"], sizes["z"], tuple(_Row(*row) for row in rows),
         tuple(_Contact(tuple(held)) for held in contacts),
         tuple(_Friction(one[0], one[1], partner) for one, partner in zip(frictions, partners, strict=True)),
-        {name: nodes[k] for name, k in zip(words["names"], outputs, strict=True)}, tuple(nodes[k] for k in terms),
+        {_present(name): nodes[k] for name, k in zip(words["names"], outputs, strict=True)},
+        tuple(nodes[k] for k in terms),
         words["adds"], (),
         tuple(_Wrapped(anchor, nodes[angle], nodes[rate]) for anchor, angle, rate in words.get("wrapped", ())), known,
     )  # fmt: skip
+
+
+def _present(name: str) -> str:
+    """The present name of a result in older files."""
+    older = "net moment of "
+    return f"{name.removeprefix(older)}.net_moment" if name.startswith(older) else name
 
 
 def _table(tape: Tape, numbers: Any) -> Table:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.equations.held import WAYS
+from mbd.equations.net_moments import contact_places
 from mbd.equations.shapes import HEIGHT, Shape, drawn
 from mbd.joints.anatomy import Angle, angles_of
 from mbd.results.names import AXES
@@ -123,7 +124,7 @@ class Facts:
             equations.n_q,
             tuple(
                 ContactFacts(contact.name, contact.kind, contact.unit, place)
-                for contact, place in zip(equations.contacts, _places(equations), strict=True)
+                for contact, place in zip(equations.contacts, contact_places(equations), strict=True)
             ),
             tuple((body, tuple(frames)) for body, frames in figure if body != "ground"),
             tuple(
@@ -173,21 +174,3 @@ def _own_velocities(equations: Equations) -> tuple[tuple[str, str], ...]:
     whole = equations.configuration
     pairs = zip(whole.places, whole.velocity_names, whole.velocity_units, strict=True)
     return tuple((name, unit) for place, name, unit in pairs if place < 0)
-
-
-def _places(equations: Equations) -> list[str]:
-    """The frame that each contact touches with: the one whose position it captures, or whose height is its gap."""
-    names = set(equations.output_names())
-    frames = [name[:-3] for name in equations.output_names() if name.endswith(".vx") and f"{name[:-3]}.x" in names]
-    positions = {frame: [equations.output(frame + axis) for axis in AXES] for frame in frames if equations.contacts}
-    found = []
-    known = {c: p for shape in equations.shapes for c, p in zip(shape.contacts, shape.points, strict=True)}
-    for contact in equations.contacts:
-        captured = {node.index for node in contact.captured}
-        found.append(known.get(contact.name, ""))
-        for frame, position in ({} if found[-1] else positions).items():
-            moving = {node.index for node in position if not node.is_constant}
-            if captured == moving if captured else contact.gap is position[1]:
-                found[-1] = frame
-                break
-    return found

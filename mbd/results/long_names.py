@@ -14,7 +14,7 @@ WORDS = {
     "displacement": "displacement of {}", "gap": "gap of {}", "gap_rate": "rate of the gap of {}",
     "force": "force of {}", "torque": "torque of {}", "tension": "tension of {}", "length": "length of {}",
     "friction": "friction of {}", "multiplier": "multiplier of {}", "residual": "residual of {}",
-    "power": "power of {}", "energy": "energy of {}",
+    "net_moment": "net moment of {}", "net_force": "net force of {}", "power": "power of {}", "energy": "energy of {}",
     "reaction_force": "reaction force of {}", "reaction_torque": "reaction torque of {}",
 }  # fmt: skip
 """Words for the last part of a name."""
@@ -22,7 +22,7 @@ WORDS = {
 ANGLES = {angle.name for part in ANATOMY for angles, _ in angles_of(part) for angle in angles}
 """Angles of joints of the body."""
 
-VECTORS = ("force", "torque", "reaction_force", "reaction_torque")
+VECTORS = ("force", "torque", "net_moment", "net_force", "reaction_force", "reaction_torque")
 """Vectors that are no places."""
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from mbd.equations.net_moments import stored_moments
 from mbd.results.archive import Arrays, Members, named_file, read, write
 from mbd.results.columns import Alias, Columns, SavedColumns, StoredColumns
 from mbd.results.content import arrays_of_run, expect
@@ -125,9 +124,10 @@ def _expressions(columns: Columns, names: Sequence[str], facts: Facts, arrays: A
     if model is None:
         return None
     found = [*names, *(name for name in facts.heights if model.knows(name))]
-    ground = {contact.name for contact in facts.contacts if contact.place}
-    moments = stored_moments(model.equations, ground) if ground else {}  # of what may walk
-    return write_expressions(model.equations, {name: model.node(name) for name in found} | moments, arrays)
+    if any(contact.place for contact in facts.contacts):  # of what may walk
+        joints = (f"{name}.net_moment" for name, unit in facts.coordinates[: facts.coordinate_count] if unit == "rad")
+        found += [name for name in joints if model.knows(name)]
+    return write_expressions(model.equations, {name: model.node(name) for name in found}, arrays)
 
 
 def _ledger(ledger: Ledger, arrays: Arrays) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:

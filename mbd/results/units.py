@@ -9,11 +9,14 @@ __all__ = ["unit", "unit_of"]
 ENDINGS = {
     "angle": "rad", "displacement": "m", "length": "m", "speed": "m/s", "reaction_force": "N", "reaction_torque": "N m",
     "force": "N", "friction": "N", "tension": "N", "torque": "N m", "power": "W", "energy": "J",
-    "kinetic_energy": "J", "potential_energy": "J", "t": "s",
+    "net_moment": "N m", "net_force": "N", "kinetic_energy": "J", "potential_energy": "J", "t": "s",
     "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s²", "ay": "m/s²", "az": "m/s²",
 }  # fmt: skip
 """Unit by the last word of a name."""
 
+
+EFFORTS = ("reaction_force", "reaction_torque", "force", "torque", "net_moment", "net_force")
+"""Vectors that are no places."""
 
 PARTS = {"orientation": "", "angular_velocity": "rad/s", "rotation_vector": "rad", "euler": "rad"}
 """Unit of what a joint that turns freely tells in parts: 'hip.angular_velocity.ground.x', 'hip.euler.zxy.1'."""
@@ -65,7 +68,7 @@ def unit(name: str, facts: Facts) -> str:
         )
         return base + power if base else ""
     effort = stem.removesuffix(".a").rpartition(".")[2]  # 'mount.force.a.x': in the axes of a frame a
-    if last in ("x", "y", "z") and effort in ("reaction_force", "reaction_torque", "force", "torque"):
+    if last in ("x", "y", "z") and effort in EFFORTS:
         return ENDINGS[effort]
     return ENDINGS.get(last, "")
 

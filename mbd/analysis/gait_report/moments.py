@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from mbd.arrays import Vector
-from mbd.equations.net_moments import net_moments
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
@@ -33,9 +32,8 @@ class Moments:
         self._nodes: dict[str, Node] = {}
         if self._columns is None:
             return
-        ground = {contact.name for contact in run.facts.contacts if contact.place}
-        found = net_moments(self._columns.equations, ground)
-        self._nodes = {name: found[name] for name in coordinates if name in found}
+        known = [name for name in coordinates if self._columns.knows(f"{name}.net_moment")]
+        self._nodes = {name: self._columns.node(f"{name}.net_moment") for name in known}
 
     @property
     def known(self) -> tuple[str, ...]:
