@@ -51,7 +51,7 @@ from mbd.kernel.stepping.restart import (
 
 __all__ = [
     "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
-    "update_armed", "update_side", "update_sides", "watch",
+    "pull_round_off", "update_armed", "update_side", "update_sides", "watch",
 ]  # fmt: skip
 
 
@@ -59,6 +59,8 @@ DOUBTFUL = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
 REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
+PULL_ROUND_OFF = 1e-12
+"""Part of the pull of a sticking friction below which it is not beyond its limit [-]."""
 CLOSE_BY = 1e-3
 """Part of what a guard changes by in a step, at its first rate, above zero where the turn is looked at itself [-]."""
 LOST = 1e-10
@@ -330,7 +332,7 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
         m1 = K.guards1[K.at_limit + f] - pull_of_both(K, f, K.lam1)
         if is_doubtful(K, m1):
             m1 = margin(K, f, K.time + h)
-        if m1 < -1e-12 * pull_of_both(K, f, K.lam1):
+        if m1 < -pull_round_off(K, f, K.lam1):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
         return
     s = K.slip[f]
@@ -353,6 +355,11 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
         bottom = hermite_turn(v0, v1, d0, d1, False)
         if bottom > 0.0 and hermite(v0, v1, d0, d1, bottom) < 0.0:  # it turns around and back within the step
             consider(K, STICK_BRIEF, f, bottom, 0.0)
+
+
+def pull_round_off(K: Frictions, f: int, lam: Reals) -> float:
+    """Round-off of what is left of a sticking friction, from the pull of given multipliers."""
+    return PULL_ROUND_OFF * pull_of_both(K, f, lam)
 
 
 def along_slip(K: Frictions, f: int, values: Reals, first: int) -> float:

@@ -21,7 +21,15 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.events.guard_round_off import guard_round_off
 from mbd.kernel.events.guard_sides import striking_contact
-from mbd.kernel.events.guards import along_slip, gap_scale, gap_tolerance, guard_value, is_watched, judge
+from mbd.kernel.events.guards import (
+    along_slip,
+    gap_scale,
+    gap_tolerance,
+    guard_value,
+    is_watched,
+    judge,
+    pull_round_off,
+)
 from mbd.kernel.events.hermite import first_guess
 from mbd.kernel.events.refine import enough, refine
 from mbd.kernel.records import Events, Guards, Kernel, Switching
@@ -321,7 +329,9 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
     near = gap_tolerance(K, index) if kind == CLOSE else 0.0
     if kind == PRESS or kind == OPEN_FORCE:  # its last event left its force at round-off, which is no root
         near = enough(K, kind, index, f_low, f_high)
-    begun = f_low <= 0.0 and (kind == STICK or kind == CLOSE or kind == PRESS)
+    if kind == SLIP:  # what has just come to rest may be at its limit, as behind a stop that opens
+        near = pull_round_off(K, index, K.impulse)
+    begun = f_low <= 0.0 and (kind == STICK or kind == CLOSE or kind == PRESS or (kind == SLIP and f_low >= -near))
     if begun or (0.0 < f_low <= near and kind != CLOSE):
         low = find_way(K, kind, index, high, near)
         if low < 0.0:
