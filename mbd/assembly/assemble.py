@@ -12,6 +12,7 @@ from mbd.arrays import Vector
 from mbd.assembly.conditions import Condition, conditions
 from mbd.assembly.contradictions import Attempt, contradictions, infeasible
 from mbd.assembly.doubtful import doubtful
+from mbd.assembly.foot_places import foot_places
 from mbd.assembly.foreseen import require_inertia
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.infeasibility import Held
@@ -55,6 +56,7 @@ def assemble(
     open: Iterable[str] = (),
     parameters: Mapping[str, float] | None = None,
     project: bool = False,
+    anchors: Mapping[str, Any] | None = None,
     backend: str = "auto",
 ) -> State:
     """A consistent start of a model: named values held exactly, the rest completed.
@@ -78,6 +80,8 @@ def assemble(
     parameters : values that differ from the model's, by name
     project : move named values too, to the nearest consistent ones, results such as angles of cut joints by the sum of
         squares; `State.moved` tells how far coordinates were
+    anchors : {'left foot': (x, y)} places at which feet of closed contacts stand [m], (x, y, z) in space: of a
+        `SpringLeg`, which may be compressed, and of a point of a body
     backend : see `mbd.simulate`
 
     Returns
@@ -96,14 +100,18 @@ def assemble(
     ModelError
         if the model itself has faults.
     """
+    (opened, more), (closed, others) = names_given(open, "open"), names_given(closed, "closed")
+    feet = foot_places(model, anchors, closed)
     position, held = without_held(model, position)
+    if twice := [name for name in feet.positions if isinstance(position, Mapping) and name in position]:
+        raise ModelError([f"{name!r} is given by position and by anchors; give one of them" for name in twice])
+    position = {**(position or {}), **feet.positions} if feet.positions else position
     position, wrong, doubts = spelled_out(model, position, "position")
     velocity, more_wrong, _ = spelled_out(model, velocity, "velocity")
     wanted = {"position": position, "velocity": velocity, "parameters": parameters}
     faults = [*wrong, *more_wrong] + [
         fault for what, values in wanted.items() for fault in named_number_faults(values, what)
     ]
-    (opened, more), (closed, others) = names_given(open, "open"), names_given(closed, "closed")
     if faults + more + others:
         raise ModelError(faults + more + others)
     changed, project = dict(parameters or {}), flag(project, "project")
@@ -122,10 +130,10 @@ def assemble(
         raise ModelError(faults)
     guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
     guess = equations.configuration.normalise(guess)
-    anchors = first_anchors(mechanism)
-    hold(mechanism, held, anchors)
+    first = first_anchors(mechanism)
+    hold(mechanism, held, first)
     work = Posture(
-        mechanism, manager, values, guess, y.copy(), manager.flags(closed), anchors, named.places, named.speeds
+        mechanism, manager, values, guess, y.copy(), manager.flags(closed), first, named.places, named.speeds
     )
     bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened))
     if bad:
@@ -133,13 +141,16 @@ def assemble(
     name_wrapped(work)
     store_first(mechanism, 0.0, work.q, work.y, values, work.anchors)
     hold(mechanism, held, work.anchors)
+    feet.hold(work)
     doubt(*doubts, *doubtful(model, equations, position or {}), of=model)
     assembled = State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),
         equations.velocity_names, _moved(work, q, y, named), changed,
     )  # fmt: skip
-    return of_model(assembled, model)
+    assembled = of_model(assembled, model)
+    feet.require_heights(assembled)
+    return assembled
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,13 @@ class Constraint(Parameterized, ABC):
         self.act(scope, hold)
         return len(held)
 
+    def held_at(self, place: Sequence[float]) -> Sequence[float] | None:
+        """What it holds where its foot was set down at a place (x, y) or (x, y, z) [m], which no body tells.
+
+        None, the default: the place is that of a body, or it has none.
+        """
+        return None
+
     @property
     def others(self) -> tuple[str, ...]:
         """Names of the other constraints it refers to."""

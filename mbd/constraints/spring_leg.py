@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mbd.bodies.base import Frame
@@ -44,7 +45,7 @@ class SpringLeg(Constraint):
     touchdown_angle : α of the leg in flight, 0 < α < π [rad]; beyond π/2 the foot is behind the hip
 
     Results: 'name.force' its part along y, 'name.thrust' that along x [N]. In the ledger both have a line of the kind
-    'penalty', whose sum is what its spring holds.
+    'penalty', whose sum is what its spring gives; what it holds is part of the energy of a gait.
     """
 
     name: str
@@ -90,6 +91,10 @@ class SpringLeg(Constraint):
             f"{self.name}.touchdown_angle": angle,
         }
 
+    def held_at(self, place: Sequence[float]) -> Sequence[float]:
+        """The foot's x [m]."""
+        return [float(place[0])]
+
     def act(self, scope: Scope, hold: Hold) -> Law:
         """k (l − r) along the leg, from where its foot touched down."""
         k, length, angle = (scope.parameter(self.name, field, getattr(self, field)) for field in FIELDS)
@@ -100,5 +105,6 @@ class SpringLeg(Constraint):
         tension = k * (length - r) / r
         return Law(
             contact=Closing(y - length * sin(angle), opens_on="pull"), push=tension * y,
+            elastic=0.5 * k * (length - r) * (length - r),
             drags=[Drag(motion.velocity[0], tension * (x - foot), "thrust")],
         )  # fmt: skip

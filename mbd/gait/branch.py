@@ -13,7 +13,7 @@ from mbd.bodies.values import is_finite_number, shown
 from mbd.errors import MbdError, ModelError, UnknownNameError, nearest
 from mbd.gait.continuation import QUICK, BranchPoint, Continuation, Corrected, Forbidden
 from mbd.gait.cycle import LimitCycle
-from mbd.gait.derivatives import parameter_value
+from mbd.gait.derivatives import parameter_value, require_member
 from mbd.gait.follow import PointCurve, follow
 from mbd.gait.limits import changed_events, limit_between, limit_beyond
 from mbd.gait.map_derivative import Measured, map_derivative, measured
@@ -265,10 +265,15 @@ def _begun(
     if to == value:
         raise ModelError(f"to={to!r} is the value of {parameter!r} at which the gait was found; give another")
     width = abs(float(to) - value)
-    given = Continuation(gait.map, gait.chart.section, parameter, gait.parameters, width, gait.given.tol, friction)
+    require_member(gait)
+    given = Continuation(
+        gait.map, gait.chart.section, parameter, gait.parameters, width, gait.given.tol, friction, gait.given.member
+    )
     found = measured(gait.map, gait.chart, np.zeros(gait.chart.size), given.with_value(value))
     assert isinstance(found, Measured)
     first = given.point(Corrected(gait.state, value, found, 0), None)
+    if given.follows_member:
+        return given, first
     zero = np.zeros(gait.chart.size)
     by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], levels=1, state=False)
     if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= WITHOUT_EFFECT:

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.errors import GaitError, SimulationError
 from mbd.gait.exact_derivative import exact_derivative
-from mbd.gait.floquet import Multipliers, multipliers_of
+from mbd.gait.family import Member, across, floquet
+from mbd.gait.floquet import Multipliers
 from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured, numbers_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap
@@ -88,7 +89,11 @@ class Forbidden(Outcome):
 
 @dataclass(eq=False)
 class Continuation:
-    """What all points of a branch share. width : σ; tol : of the coordinates; friction : of the ground, or None"""
+    """What all points of a branch share.
+
+    width : σ; tol : of the coordinates; friction : of the ground, or None
+    member : of a family of gaits (`mbd.gait.family`), which a branch keeps, or follows where its name is `name`
+    """
 
     map: ReturnMap
     section: Section
@@ -97,10 +102,52 @@ class Continuation:
     width: float
     tol: float
     friction: float | None = None
+    member: Member | None = None
+
+    @property
+    def follows_member(self) -> bool:
+        """Whether the branch follows the energy or the speed of its family."""
+        return self.member is not None and self.name == self.member.kind
 
     def with_value(self, value: float) -> dict[str, float]:
         """The parameters with another value of the one that varies."""
-        return {**self.values, self.name: float(value)}
+        return dict(self.values) if self.follows_member else {**self.values, self.name: float(value)}
+
+    def member_at(self, value: float) -> Member | None:
+        """The member that is asked for at a value of the one that varies."""
+        return replace(self.member, value=float(value)) if self.member and self.follows_member else self.member
+
+    def derived(
+        self, chart: Chart, c: Vector, values: Mapping[str, float], levels: int, base: Measured | None = None
+    ) -> MapDerivative:  # fmt: skip
+        """The derivatives of the map by all coordinates, then by the parameter: 0 by what picks a member."""
+        if not self.follows_member:
+            return map_derivative(self.map, chart, c, values, [self.name], levels, base=base)
+        found = map_derivative(self.map, chart, c, values, levels=levels, base=base)
+        matrix, error = (np.column_stack([part, np.zeros(len(part))]) for part in (found.matrix, found.error))
+        return MapDerivative(matrix, error, found.how, found.missing)
+
+    def member_part(self, chart: Chart, found: Measured, derivative: MapDerivative, value: float) -> Matrix:
+        """w [∇g, σ g_p], which picks the member, to be added to [P − 1, σ F_p]; zeros without a member."""
+        size = chart.size
+        if self.member is None:
+            return np.zeros((size, size + 1))
+        values = self.with_value(value)
+        along = self.member.slope(self.map, chart, found, derivative.matrix[:, :size], values)
+        if self.follows_member:
+            by = -1.0 / self.member.size
+        else:
+            by = self.member.by(self.map, chart, found, derivative.matrix[:, size], self.name, values)
+        return np.outer(across(self.map, chart, values), np.append(along, self.width * by))
+
+    def member_gap(self, chart: Chart, c: Vector, found: Measured, value: float) -> Vector:
+        """w (g − g₀), to be added to F(c) − c; zeros without a member."""
+        member = self.member_at(value)
+        if member is None or self.member is None:
+            return np.zeros(chart.size)
+        values = self.with_value(value)
+        left = -member.misfit(self.map, chart, c, found, values) * member.size / self.member.size
+        return left * across(self.map, chart, values)
 
     def point(self, corrected: Corrected, before: Vector | None, levels: int = 2) -> BranchPoint:
         """The point of a solution; its tangent goes on in the direction of the one `before`.
@@ -116,22 +163,21 @@ class Continuation:
         chart = Chart(self.section, corrected.state, self.map.vector(values))
         zero = np.zeros(chart.size)
         base = numbers_of(chart, corrected.found.arrival)
-        derivative = map_derivative(self.map, chart, zero, values, [self.name], levels, base=base)
+        derivative = self.derived(chart, zero, values, levels, base)
         if derivative.missing:
             why = next(iter(derivative.missing.values()))
             raise GaitError(f"no derivative at {self.name} = {corrected.value:.9g}: {why}")
         if levels > 2:
             derivative = self._exact(derivative, chart, values)
-        matrix = self._matrix(derivative, chart.size)
+        matrix = self._matrix(derivative, chart.size) + self.member_part(chart, base, derivative, corrected.value)
         tangent = _null_vector(matrix)
         if before is not None:
             lifted = self.lifted(before, chart)
             tangent = tangent if float(tangent @ lifted) >= 0.0 else -tangent
-        size, arrival = chart.size, corrected.found.arrival
+        arrival = corrected.found.arrival
         return BranchPoint(
             corrected.value, corrected.state, arrival.period, way_of(self.map, arrival), arrival.steps,
-            multipliers_of(derivative.matrix[:size, :size], derivative.error[:size, :size]), tangent, matrix, chart,
-            arrival.events,
+            floquet(self.map, chart, derivative, values), tangent, matrix, chart, arrival.events,
         )  # fmt: skip
 
     def _exact(self, found: MapDerivative, chart: Chart, values: Mapping[str, float]) -> MapDerivative:
@@ -177,14 +223,15 @@ class Continuation:
             if isinstance(found, Arrival):
                 outcome = self.map.against(self.section, found)
                 return self.map.explained(chart.at(u[:size], self.map.vector(values)), outcome, values)
-            gap = np.append(found.c - u[:size], float(plane @ u) - ds)
+            left = found.c - u[:size] + self.member_gap(chart, u[:size], found, value)
+            gap = np.append(left, float(plane @ u) - ds)
             residual = float(np.max(np.abs(gap)))
             if residual <= self.tol:
                 step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
-                left = self.width * abs(float(step[-1]))
-                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, left)
+                uncertain = self.width * abs(float(step[-1]))
+                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, uncertain)
             if residual > SLOW * before:
-                renewed = self.matrix_at(chart, u, values)
+                renewed = self.matrix_at(chart, u, value, found)
                 if renewed is None or residual > 4.0 * before:
                     break
                 matrix = renewed
@@ -208,13 +255,15 @@ class Continuation:
                 allowed = middle
         return allowed + 0.0  # no −0
 
-    def matrix_at(self, chart: Chart, u: Vector, values: Mapping[str, float]) -> Matrix | None:
-        """[P − 1, σ F_p] beside a point; None where derivatives are missing."""
+    def matrix_at(self, chart: Chart, u: Vector, value: float, found: Measured) -> Matrix | None:
+        """[P − 1, σ F_p] beside a point, from where the map gives `found`; None where derivatives are missing."""
         try:
-            derivative = map_derivative(self.map, chart, u[:-1], values, [self.name], levels=1)
+            derivative = self.derived(chart, u[:-1], self.with_value(value), 1, found)
         except SimulationError:
             return None
-        return None if derivative.missing else self._matrix(derivative, chart.size)
+        if derivative.missing:
+            return None
+        return self._matrix(derivative, chart.size) + self.member_part(chart, found, derivative, value)
 
 
 def way_of(map_: ReturnMap, arrival: Arrival) -> float:

@@ -18,7 +18,7 @@ from scipy.linalg import eig
 from mbd.arrays import Matrix, Vector
 from mbd.errors import GaitError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.gait.exact_derivative import exact_derivative
-from mbd.gait.map_derivative import extrapolated, map_derivative, measured
+from mbd.gait.map_derivative import MapDerivative, Measured, extrapolated, map_derivative, measured
 from mbd.gait.return_map import Arrival
 from mbd.sensitivity.starts import unknown_name
 
@@ -56,6 +56,7 @@ class Derivatives(Mapping[tuple[str, str], float]):
             if scalar not in self._gait.scalars:
                 raise UnknownNameError(nearest(scalar, self._gait.scalars, "number of the gait", "It has"))
             parameter_value(self._gait, parameter)
+            require_member(self._gait)
             if scalar == "largest multiplier":
                 self._known[key] = _of_largest_multiplier(self._gait, parameter)
             else:
@@ -70,7 +71,7 @@ class Derivatives(Mapping[tuple[str, str], float]):
 
 
 def parameter_value(gait: Any, name: str) -> float:
-    """The value of a parameter or of a function of parameters that a gait may follow.
+    """The value of a parameter, of a function of parameters or of the member's number that a gait may follow.
 
     Raises
     ------
@@ -80,7 +81,9 @@ def parameter_value(gait: Any, name: str) -> float:
         for an exact 0 or ±1 of the model that is part of its equations, and for a parameter of one side of a gait
         that was found with a mirror.
     """
-    map_ = gait.map
+    map_, member = gait.map, gait.given.member
+    if member is not None and name == member.kind:
+        return float(member.value)
     known = {parameter.name: parameter.value for parameter in map_.mechanism.equations.parameters} | gait.parameters
     if name in known:
         value = float(known[name])
@@ -95,6 +98,21 @@ def parameter_value(gait: Any, name: str) -> float:
     raise UnknownNameError(unknown_name(map_.mechanism.equations, name, [*known, *map_.functions], "parameter"))
 
 
+def require_member(gait: Any) -> None:
+    """Raise a `ModelError` for a gait with neighbours of other energy, none of which was asked for."""
+    if gait.given.member is None and "energy" in gait.stability_of.trivial:
+        raise ModelError(
+            f"the gait of {gait.name!r} is one of a family, since nothing takes energy: what another gait keeps is not "
+            "told; find it with energy= or speed= of mbd.limit_cycle"
+        )
+
+
+def _beside(gait: Any, name: str, value: float) -> dict[str, float]:
+    """The parameters of a gait with another value of one; of the member's number there is none in the model."""
+    member = gait.given.member
+    return dict(gait.parameters) if member is not None and name == member.kind else {**gait.parameters, name: value}
+
+
 def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:
     """(dc/dp, d(numbers)/dp) of the map's numbers along the branch of gaits.
 
@@ -104,12 +122,15 @@ def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:
         where the gait has none: at a fold, and where the map has no derivative.
     """
     assert gait.map_derivative is not None
-    values = {**gait.parameters, name: parameter_value(gait, name)}
-    size = gait.chart.size
-    by = map_derivative(gait.map, gait.chart, np.zeros(size), values, [name], state=False)
+    value, member = parameter_value(gait, name), gait.given.member
+    values, size, P = _beside(gait, name, value), gait.chart.size, gait.map_derivative.matrix
+    if member is not None and name == member.kind:
+        by = MapDerivative(np.zeros((len(P), 1)), np.zeros((len(P), 1)), "exact", {})
+    else:
+        by = map_derivative(gait.map, gait.chart, np.zeros(size), values, [name], state=False)
     if by.missing:
         raise GaitError(f"no derivative by {name!r}: {by.missing[0]}", gait)
-    along, P = by.matrix[:, 0], gait.map_derivative.matrix
+    along = by.matrix[:, 0]
     most = float(np.nanmax(np.abs(along), initial=0.0))
     if not float(np.nanmax(by.error, initial=0.0)) <= DOUBTFUL * most and most > 0.0:
         raise GaitError(
@@ -117,10 +138,19 @@ def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:
             f"{np.nanmax(by.error):.2g} of {most:.2g} are left; two events may be at one instant there",
             gait,
         )
-    fixed = np.eye(size) - P[:size]
-    c = np.asarray(np.linalg.lstsq(fixed, along[:size], rcond=FLAT)[0], dtype=float)
-    left = float(np.max(np.abs(fixed @ c - along[:size]), initial=0.0))
-    if left > DOUBTFUL * float(np.max(np.abs(along[:size]), initial=0.0)):
+    fixed, change = np.eye(size) - P[:size], along[:size]
+    if member is not None:
+        here = measured(gait.map, gait.chart, np.zeros(size), values)
+        assert isinstance(here, Measured)
+        row = member.slope(gait.map, gait.chart, here, P, values)
+        if name == member.kind:
+            by_name = -1.0 / member.size
+        else:
+            by_name = member.by(gait.map, gait.chart, here, along, name, values)
+        fixed, change = np.vstack([fixed, row]), np.append(change, -by_name)
+    c = np.asarray(np.linalg.lstsq(fixed, change, rcond=FLAT)[0], dtype=float)
+    left = float(np.max(np.abs(fixed @ c - change), initial=0.0))
+    if left > DOUBTFUL * float(np.max(np.abs(change), initial=0.0)):
         raise GaitError(f"no derivative by {name!r}: the branch of gaits has a fold here, where it turns back", gait)
     return c, np.asarray(along + P @ c)
 
@@ -165,7 +195,7 @@ def _of_largest_multiplier(gait: Any, name: str) -> float:
         slopes: list[float] = []
         for level in range(LEVELS):
             step = 2.0**level * h
-            ends = [_slope_beside(gait, sign * step * move, {**gait.parameters, name: value + sign * step})
+            ends = [_slope_beside(gait, sign * step * move, _beside(gait, name, value + sign * step))
                     for sign in (1, -1)]  # fmt: skip
             why = next((end for end in ends if isinstance(end, str)), "")
             if why:

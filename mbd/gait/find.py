@@ -15,6 +15,7 @@ from mbd.bodies.values import among, flag, is_finite_number, shown
 from mbd.errors import AssemblyError, GaitError, MbdError, ModelError, UnknownNameError
 from mbd.gait.arguments import Functions, check_arguments
 from mbd.gait.cycle import LimitCycle
+from mbd.gait.family import Member, member_of
 from mbd.gait.limit_cycle import FIRST, map_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import ReturnMap
@@ -129,6 +130,7 @@ class _Hunt:
     dt: float | None
     found: list[LimitCycle] = field(default_factory=list)
     given: Search | None = None
+    member: Member | None = None
 
     def one(self, start: State, values: Mapping[str, float]) -> tuple[Outcome, int]:
         """What becomes of a start; the number of its gait."""
@@ -142,7 +144,7 @@ class _Hunt:
             begun = first_return(self.map, start, all_values)
             if isinstance(begun, Failed):
                 return begun.outcome, -1
-            given, states = given or Search(self.map, begun[0], self.tol), begun[1]
+            given, states = given or Search(self.map, begun[0], self.tol, self.member), begun[1]
         assert given is not None
         gait = fallen_first(first_found(given, states, all_values, dt), start, all_values)
         if not gait.success:
@@ -179,6 +181,9 @@ def find_gait(
     tol: float = 1e-10,
     parameters: Mapping[str, Any] | None = None,
     functions: Functions | None = None,
+    energy: float | None = None,
+    speed: float | None = None,
+    anchors: Mapping[str, Any] | None = None,
     modulo: Iterable[str] | None = None,
     longest: float = 30.0,
     all_gaits: bool = False,
@@ -192,8 +197,9 @@ def find_gait(
     model : a `Model` or `Lagrangian`
     position, velocity : of the starts, as for `mbd.assemble`; a pair (low, high) in the place of a number is varied;
         orientations and vectors stay as they are, components of angular velocities may vary
-    integrator, section, mirror, strides, dt, tol, functions, modulo, longest, backend : as for `mbd.limit_cycle`
-    closed, open : contacts that start closed, and open, as for `mbd.assemble`
+    integrator, section, mirror, strides, dt, tol, functions, energy, speed, modulo, longest, backend : as for
+        `mbd.limit_cycle`
+    closed, open, anchors : contacts that start closed, and open, and places of feet, as for `mbd.assemble`
     tries : how many starts at most
     all_gaits : True for every try to be made; otherwise the search ends with the first stable gait
     progress : whether a bar counts the tries, on a terminal or in a notebook
@@ -210,7 +216,7 @@ def find_gait(
     ModelError, UnknownNameError
         for arguments that cannot be meant, before the first run.
     """
-    scheme = RungeKutta853() if integrator is None else integrator
+    scheme, member = RungeKutta853() if integrator is None else integrator, member_of(energy, speed)
     groups = {"position": position, "velocity": velocity, "parameters": {} if parameters is None else parameters}
     fixed, ranges = _varied(groups, tries, design, seed)
     points = _points(len(ranges), tries, design, seed)
@@ -221,14 +227,13 @@ def find_gait(
     with share_bar(shown_bar) as bar:
         for point in points:
             draw = _drawn(fixed, ranges, point)
-            start = _assembled(model, draw, closed, open, backend)
+            start = _assembled(model, draw, closed, open, anchors, backend)
             if hunt is None and isinstance(start, State):
                 given, settings = {**draw["parameters"]}, {"dt": dt, "tol": tol, "longest": longest}
                 check_arguments(start, scheme, strides, settings, given, functions, (), "return")
                 kind = (section, mirror, strides)
-                hunt = _Hunt(
-                    map_of(model, start, scheme, dt or FIRST, kind, given, functions, modulo, longest, backend), tol, dt
-                )
+                map_ = map_of(model, start, scheme, dt or FIRST, kind, given, functions, modulo, longest, backend)
+                hunt = _Hunt(map_, tol, dt, member=member)
                 for other in points if ranges else ():
                     hunt.map.require({**hunt.map.values, **_drawn(fixed, ranges, other)["parameters"]})
             tried.append(_tried(hunt, draw, start, names))
@@ -341,10 +346,12 @@ def _title(group: str, name: str) -> str:
     return f"{name}.rate" if group == "velocity" and not name.endswith("rate") else name
 
 
-def _assembled(model: Any, draw: Mapping[str, Any], closed: Any, opened: Any, backend: str) -> State | Outcome:
+def _assembled(
+    model: Any, draw: Mapping[str, Any], closed: Any, opened: Any, anchors: Any, backend: str
+) -> State | Outcome:  # fmt: skip
     """The start of a try; a posture that no motion has is an outcome."""
     try:
-        return assemble(model, draw["position"], draw["velocity"], closed, opened, backend=backend)
+        return assemble(model, draw["position"], draw["velocity"], closed, opened, anchors=anchors, backend=backend)
     except UnknownNameError:
         raise
     except AssemblyError as error:

@@ -15,6 +15,7 @@ from mbd.errors import GaitError, ModelError
 from mbd.gait.alike import require_alike
 from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
 from mbd.gait.cycle import LimitCycle
+from mbd.gait.family import Member, member_of
 from mbd.gait.floquet import Multipliers
 from mbd.gait.heading import heading_of
 from mbd.gait.machines import counted_from
@@ -46,6 +47,8 @@ def limit_cycle(
     parameters: Mapping[str, float] | None = None,
     functions: Functions | None = None,
     wrt: Iterable[str] = (),
+    energy: float | None = None,
+    speed: float | None = None,
     modulo: Iterable[str] | None = None,
     longest: float = 30.0,
     on_failure: Literal["raise", "return"] = "raise",
@@ -75,6 +78,9 @@ def limit_cycle(
     functions : ``{"slope": lambda s: {"gravity.x": 9.81 * sin(s), "gravity.y": -9.81 * cos(s)}}``: functions of one
         value that give parameters, under names of their own
     wrt : parameters, or functions of them, by which derivatives are found at once; others when they are asked for
+    energy, speed : T + V just after the event [J], or the mean speed [m/s], that the gait is to have. For walkers that
+        nothing takes energy from or gives it to, whose gaits form a family; one of the two. Without them the gait is
+        the one near the start
     modulo : coordinates that need not come back; None: those that nothing but places of touchdown depends on, and on
         level ground the heading of a walker in space
     longest : duration of one return at most [s]
@@ -95,7 +101,7 @@ def limit_cycle(
         where no gait is found, with the outcome as its sentence ('falls backward at 0.41 s', 'scuffs at 0.30 s') and
         all that was computed in its ``gait``.
     """
-    scheme = RungeKutta853() if integrator is None else integrator
+    scheme, member = RungeKutta853() if integrator is None else integrator, member_of(energy, speed)
     numbers = {"dt": dt, "tol": tol, "longest": longest}
     check_arguments(start, scheme, strides, numbers, parameters, functions, wrt, on_failure)
     begun, start = start.time, replace(start, time=0.0, memory=None)
@@ -103,7 +109,7 @@ def limit_cycle(
                   backend)  # fmt: skip
     if len(start.anchors):
         start = replace(start, anchors=counted_from(map_.mechanism.equations, start.anchors, begun))
-    gait = _found(map_, start, dt, tol)
+    gait = _found(map_, start, dt, tol, member)
     if not gait.success and on_failure == "raise":
         raise GaitError(f"{gait.name}: {gait.outcome}", gait)
     if gait.success:
@@ -163,13 +169,13 @@ def _require_the_same_later(mechanism: Mechanism, model: Any) -> None:
         raise ModelError(faults)
 
 
-def _found(map_: ReturnMap, start: State, dt: float | None, tol: float) -> LimitCycle:
+def _found(map_: ReturnMap, start: State, dt: float | None, tol: float, member: Member | None) -> LimitCycle:
     """The gait, or what became of the search."""
     begun = first_return(map_, start, map_.values)
     if isinstance(begun, Failed):
         return _none(map_, begun)
     section, states = begun
-    return fallen_first(first_found(Search(map_, section, tol), states, map_.values, dt), start, map_.values)
+    return fallen_first(first_found(Search(map_, section, tol, member), states, map_.values, dt), start, map_.values)
 
 
 def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:

@@ -1,4 +1,7 @@
-"""Fixed points of a return map: Newton's method with step control, and walks where it does not lead on."""
+"""Fixed points of a return map: Newton's method with step control, and walks where it does not lead on.
+
+Of a family of gaits, where one number more picks the member (`mbd.gait.family`), the residual has one entry more.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.errors import SimulationError
+from mbd.gait.family import Member
 from mbd.gait.map_derivative import Measured, map_derivative, measured, numbers_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap, Values
@@ -30,6 +34,8 @@ FINE = 0.01
 """Residual over `tol` above which one more step is made at the end [-]."""
 FLAT = 1e-9
 """Singular value of 1 − P relative to its largest below which a direction is left where it is [-]."""
+FAMILY = 1e-3
+"""Singular value of 1 − P relative to its largest below which gaits near may form a family [-]."""
 REST = 1e3
 """Speed over `tol` below which what repeats itself is rest [-]."""
 
@@ -41,7 +47,10 @@ class FixedPoint:
     chart : around the last state; c = 0 is that state; found : what the map gives there
     outcome : 'walks', or why there is no fixed point
     residual : largest |c' − c| there; residuals : of all iterations; attempts : outcomes of what did not arrive
-    slope : ∂(c − c')/∂c in the chart, as derivatives at some state of it and the steps since tell; None: not known
+    slope : ∂(c − c')/∂c in the chart, as derivatives at some state of it and the steps since tell; None: not known. The
+        row below it is that of the member
+    member : of a family, that is asked for; None: the one near the start
+    gap : what is left at the last state: c' − c, then of the member
     """
 
     chart: Chart
@@ -52,6 +61,8 @@ class FixedPoint:
     found: Measured | None = None
     slope: Matrix | None = None
     exact: bool = False
+    member: Member | None = None
+    gap: Vector = field(default_factory=lambda: np.zeros(0))
 
     @property
     def state(self) -> State:
@@ -61,9 +72,11 @@ class FixedPoint:
 
 def fixed_point(
     map_: ReturnMap, section: Section, start: State, values: Values, tol: float,
-    near: tuple[Chart, Matrix] | None = None,
+    near: tuple[Chart, Matrix] | None = None, member: Member | None = None,
 ) -> FixedPoint:  # fmt: skip
     """The fixed point near a start on the section, ``c'(c) = c`` to `tol` in every coordinate.
+
+    Of a family of them it is the `member` that is asked for, to `tol` of its energy or speed, relative to 1 or that.
 
     Steps d of ``(1 − P) d = c' − c`` are halved until the residual falls as promised; where none does, the walker walks
     on for some steps, which leads towards an attractive gait, and Newton's method begins again. While the residual
@@ -71,7 +84,8 @@ def fixed_point(
     has the chart and P of a gait near the start.
     """
     point = FixedPoint(Chart(section, start, map_.vector(values)), Outcome("does not converge", ""), np.inf)
-    if near is not None and near[0].size == point.chart.size:
+    point.member = member
+    if near is not None and near[0].size == point.chart.size and member is None:
         turn = point.chart.basis.T @ near[0].basis
         point.slope = turn @ (np.eye(point.chart.size) - near[1]) @ turn.T
     found: Measured | Outcome | None = _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
@@ -81,8 +95,8 @@ def fixed_point(
             assert found is not None
             point.outcome = map_.explained(point.state, found, values)
             return point
-        point.found = found
-        point.residual = float(np.max(np.abs(found.c), initial=0.0))
+        point.found, point.gap = found, _gap(map_, point, np.zeros(point.chart.size), found, values)
+        point.residual = float(np.max(np.abs(point.gap), initial=0.0))
         point.residuals.append(point.residual)
         if point.residual <= tol:
             _polish(map_, point, values, tol)
@@ -104,9 +118,10 @@ def _polish(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> N
     """One more step where the derivative is known and the residual not much below `tol`."""
     if point.slope is None or point.found is None or point.residual <= FINE * tol:
         return
-    found = _damped(map_, point, point.found.c, values, FAST, 1.0)
+    found = _damped(map_, point, point.gap, values, FAST, 1.0)
     if isinstance(found, Measured):
-        point.found, point.residual = found, float(np.max(np.abs(found.c), initial=0.0))
+        point.found, point.gap = found, _gap(map_, point, np.zeros(point.chart.size), found, values)
+        point.residual = float(np.max(np.abs(point.gap), initial=0.0))
         point.residuals.append(point.residual)
 
 
@@ -115,6 +130,9 @@ def _give_up(map_: ReturnMap, point: FixedPoint, tol: float) -> None:
     if resting := _rest(map_, point, tol):
         point.outcome = resting
         return
+    if point.member is not None and (alone := _alone(point)):
+        point.outcome = Outcome("does not converge", alone)
+        return
     last = f"; beside it the walker {point.attempts[-1]}" if point.attempts else ""
     text = (
         f"no gait that repeats itself was found: {point.residual:.2g} is left after {len(point.residuals)} iterations"
@@ -122,14 +140,40 @@ def _give_up(map_: ReturnMap, point: FixedPoint, tol: float) -> None:
     point.outcome = Outcome("does not converge", text + last)
 
 
+def _alone(point: FixedPoint) -> str:
+    """That gaits near the last state are isolated, so that none has the energy or speed asked for; '' if they are not.
+
+    It is so where what Newton's method cannot reduce is that of the member, and no multiplier there is 1.
+    """
+    size = point.chart.size
+    if point.slope is None or len(point.gap) == size:
+        return ""
+    sizes = np.linalg.svd(point.slope[:size], compute_uv=False)
+    if not size or sizes[-1] <= FAMILY * sizes[0]:
+        return ""
+    return (
+        f"no gait with {point.member} was found: the gaits near are isolated, none of their multipliers is 1. "
+        "Something takes or gives energy, so that energy and speed follow from the parameters; leave energy= and "
+        "speed= out, or change a parameter until the gait has them"
+    )
+
+
 def _stepped(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values) -> Measured | Outcome | None:
     """What the map gives after a step of Newton's method; None where no part of it leads nearer."""
     if point.slope is not None and not point.exact:
-        after = _damped(map_, point, found.c, values, FAST, 1.0)
+        after = _damped(map_, point, point.gap, values, FAST, 1.0)
         if after is not None:
             return after
     point.slope, point.exact = _slope(map_, point, found, values), True
-    return None if point.slope is None else _damped(map_, point, found.c, values)
+    return None if point.slope is None else _damped(map_, point, point.gap, values)
+
+
+def _gap(map_: ReturnMap, point: FixedPoint, c: Vector, found: Measured, values: Values) -> Vector:
+    """What is left at coordinates c from which the map gives the numbers `found`: c' − c, then of the member."""
+    left = found.c - c
+    if point.member is None:
+        return left
+    return np.append(left, point.member.misfit(map_, point.chart, c, found, values))
 
 
 def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:
@@ -162,7 +206,10 @@ def _slope(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values) 
     except SimulationError:
         return None
     P = derivative.matrix[: point.chart.size]
-    return np.eye(len(P)) - P if np.all(np.isfinite(P)) else None
+    slope = np.eye(len(P)) - P
+    if point.member is not None:
+        slope = np.vstack([slope, point.member.slope(map_, point.chart, found, derivative.matrix, values)])
+    return slope if np.all(np.isfinite(slope)) else None
 
 
 def _damped(
@@ -179,7 +226,7 @@ def _damped(
         c = part * step
         found = _measure(map_, point.chart, c, values, point)
         if isinstance(found, Measured):
-            left = found.c - c
+            left = _gap(map_, point, c, found, values)
             if float(np.max(np.abs(left))) <= min(needed, 1.0 - DECREASE * part) * before:
                 point.slope += np.outer(gap - left - point.slope @ c, c) / float(c @ c)
                 point.exact = False
@@ -196,7 +243,8 @@ def _moved(map_: ReturnMap, point: FixedPoint, c: Vector, found: Measured, value
     point.chart = Chart(old.section, old.at(c, parameters), parameters)
     if point.slope is not None:
         turn = point.chart.basis.T @ old.basis
-        point.slope = turn @ point.slope @ turn.T
+        size = len(turn)
+        point.slope = np.vstack([turn @ point.slope[:size] @ turn.T, point.slope[size:] @ turn.T])
     return numbers_of(point.chart, found.arrival)
 
 

@@ -11,7 +11,8 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import SimulationError
 from mbd.gait.cycle import LimitCycle, residual_by_unit
 from mbd.gait.exact_derivative import exact_derivative
-from mbd.gait.floquet import Multipliers, multipliers_of
+from mbd.gait.family import Member, floquet
+from mbd.gait.floquet import Multipliers
 from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured
 from mbd.gait.newton import FixedPoint, fixed_point
 from mbd.gait.outcome import Outcome
@@ -29,19 +30,21 @@ LATE = 10.0
 """Latest time of a return, over that of the first, beyond which the walk is over [-]."""
 NEAR = 1e-2
 """Distance [m, rad] within which the rows of the section hold a start that is taken as one on it."""
-LOSSLESS = 1e-3
-"""Distance of a multiplier from 1 within which it may be that of energy that nothing takes [-]."""
 RESOLVED = 0.1
 """Share of `tol` that the change with half the step may take [-]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A map with its section: what searches share. tol : of coordinates of the section"""
+    """A map with its section: what searches share.
+
+    tol : of coordinates of the section; member : of a family of gaits, that is looked for; None: the one near the start
+    """
 
     map: ReturnMap
     section: Section
     tol: float
+    member: Member | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +125,7 @@ def search(given: Search, start: State, values: Values, near: tuple[Chart, Matri
     """The gait near a state of the section; `near`: chart and P of a gait beside it."""
     map_, tol = given.map, given.tol
     map_.runs = 0
-    return gait_at(given, fixed_point(map_, given.section, start, values, tol, near), values)
+    return gait_at(given, fixed_point(map_, given.section, start, values, tol, near, given.member), values)
 
 
 def first_found(given: Search, states: Sequence[State], values: Values, dt: float | None) -> LimitCycle:
@@ -159,6 +162,9 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
     good = isinstance(found, Measured) and point.outcome.good
     arrival = found.arrival if isinstance(found, Measured) else found
     residual = residual_by_unit(chart, found.c) if isinstance(found, Measured) else {}
+    if given.member is not None and isinstance(found, Measured):
+        left = given.member.size * abs(given.member.misfit(map_, chart, zero, found, values))
+        residual[given.member.unit] = max(residual.get(given.member.unit, 0.0), left)
     way = arrival.travel if arrival is not None else np.zeros(len(map_.fixed))
     return LimitCycle(
         getattr(map_.model, "name", ""), map_.section, None if map_.mirror is None else map_.mirror.sides, map_.strides,
@@ -195,21 +201,4 @@ def _multipliers(
 ) -> Multipliers:
     if derivative is None or derivative.missing:
         return Multipliers(np.zeros(0, complex), np.zeros((chart.size, 0), complex), {}, float("nan"))
-    P, error = derivative.matrix[: chart.size], derivative.error[: chart.size]
-    found = multipliers_of(P, error)
-    if np.min(np.abs(found.values - 1.0), initial=1.0) > LOSSLESS:
-        return found
-    return multipliers_of(P, error, _energy_slope(map_, chart, values))
-
-
-def _energy_slope(map_: ReturnMap, chart: Chart, values: Mapping[str, float]) -> Matrix | None:
-    """∇(T + V) along the section, relative to the largest; None where the energy does not depend on the state."""
-    parameters, h = map_.vector(values), 1e-5
-    states = [chart.at(sign * h * unit, parameters) for unit in np.eye(chart.size) for sign in (1.0, -1.0)]
-    inputs = {name: np.stack([getattr(state, name) for state in states]) for name in ("q", "v", "z")}
-    inputs |= {"t": np.zeros(len(states)), "anchor": np.stack([state.anchors for state in states])}
-    kinetic, potential = map_.mechanism.energies(inputs, parameters)
-    total = (kinetic + potential).reshape(-1, 2)
-    slope = (total[:, 0] - total[:, 1]) / (2.0 * h)
-    size = float(np.linalg.norm(slope))
-    return slope / size if np.isfinite(size) and size > 0.0 else None
+    return floquet(map_, chart, derivative, values)

@@ -15,7 +15,7 @@ on the chart.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +31,7 @@ from mbd.gait.machines import remembered, state_anchors
 from mbd.gait.whole_turns import unwound
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import Mode, State
+from mbd.tape.derivatives import live
 
 __all__ = ["Chart", "Section", "section_of"]
 
@@ -40,6 +41,8 @@ STILL = 1e-9
 """Sliding velocity of a foot with friction, relative to 1 or the speed, below which it sticks [m/s]."""
 DEPENDENT = 1e-9
 """Singular value of rows relative to the largest below which one depends on others [-]."""
+SMALL = 1e-6
+"""Difference of velocities, relative to 1 or them, from which the gradient of what an event watches follows [-]."""
 CORRECTIONS, FINE = 12, 1e-14
 """Newton corrections of positions onto the section, and the residual [m, rad] at which they end."""
 
@@ -50,12 +53,13 @@ class Section:
 
     mode, armed : closed contacts and those that may close
     places : numbers of rows whose h holds; gaps : (value, rate) places in the program `guards` of gaps that are zero
-    rates : numbers of rows whose ḣ holds
+    rates : numbers of rows whose ḣ holds; speeds : places there of events that watch velocities
     held : numbers of anchors that are part of the state: of penalty contacts that act, what machines remember
     fixed : numbers of increments of q along which the walker moves on
     heading : turns about the vertical that change nothing; None: headings differ
     stored : numbers of anchors that machines store as it is reached
     states : numbers of the states of machines
+    carried : (fixed, held) by how much each held anchor moves on with the walker, as the place of a spring leg's foot
     """
 
     mechanism: Mechanism
@@ -70,6 +74,8 @@ class Section:
     heading: Heading | None = None
     stored: tuple[int, ...] = ()
     states: tuple[float, ...] = ()
+    speeds: tuple[int, ...] = ()
+    carried: Matrix = field(default_factory=lambda: np.zeros((0, 0)))
 
     def other_states(self, state: State) -> str:
         """Modes that are in other states than on the section, in words; '' where none is."""
@@ -100,10 +106,19 @@ class Section:
         return np.concatenate(values), np.vstack(slopes)
 
     def velocities(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Matrix]:
-        """ḣ and B of all that holds of velocities."""
+        """ḣ and B of all that holds of velocities, and the event that watches them with its gradient."""
+        n_v = self.mechanism.layout.n_v
         terms = self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
-        picked = list(self.rates)
-        return terms.rate[picked], terms.B[picked][:, : self.mechanism.layout.n_v]
+        picked, speeds = list(self.rates), list(self.speeds)
+        if not speeds:
+            return terms.rate[picked], terms.B[picked][:, :n_v]
+        v, z = y[:n_v], y[n_v:]
+        steps = SMALL * np.maximum(1.0, np.abs(v)) * np.eye(n_v)
+        ends = [[self._guards(q, v + sign * step, parameters, anchors, z)[speeds] for sign in (1.0, -1.0)]
+                for step in steps]  # fmt: skip
+        slopes = np.array([(high - low) / (2.0 * np.max(step)) for (high, low), step in zip(ends, steps, strict=True)])
+        here = self._guards(q, v, parameters, anchors, z)[speeds]
+        return np.append(terms.rate[picked], here), np.vstack([terms.B[picked][:, :n_v], slopes.T])
 
     def anchored(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> Vector:
         """The anchors with what closed unilateral contacts hold at q, and machines have just stored."""
@@ -117,9 +132,9 @@ class Section:
         found[list(self.stored)] = terms.captured[list(self.stored)]
         return found
 
-    def _guards(self, q: Vector, v: Vector, parameters: Vector, anchors: Vector) -> Vector:
+    def _guards(self, q: Vector, v: Vector, parameters: Vector, anchors: Vector, z: Vector | None = None) -> Vector:
         mechanism = self.mechanism
-        y = np.concatenate([v, np.zeros(mechanism.layout.n - len(v))])
+        y = np.concatenate([v, np.zeros(mechanism.layout.n - len(v)) if z is None else z])
         out = np.zeros(max(mechanism.sizes["guards"], 1))
         mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, out)
         return out
@@ -180,9 +195,11 @@ class Chart:
         z = base.z + parts[2]
         v = base.v + self.rates @ parts[1]
         rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
-        for _ in range(2):  # ḣ is linear in v
+        for _ in range(2 if not section.speeds else CORRECTIONS):  # ḣ is linear in v, what an event watches may not be
             change = self.off_rates @ np.linalg.lstsq(B @ self.off_rates, rate, rcond=None)[0]
             v, rate = v - change, rate - B @ change
+            if section.speeds:
+                rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
         anchors = section.anchored(q, np.concatenate([v, z]), parameters, anchors)
         return replace(
             base, time=0.0, q=q, v=v, z=z, anchors=anchors, mode=section.mode, armed=section.armed, memory=None,
@@ -192,10 +209,13 @@ class Chart:
     def of(self, state: State) -> Vector:
         """The coordinates of a state."""
         held, (q, v) = list(self.section.held), self.facing(state)
-        parts = (
-            self.places.T @ self.away(q), self.rates.T @ (v - self.state.v),
-            state.z - self.state.z, (state.anchors - self.state.anchors)[held] if held else np.zeros(0),
-        )  # fmt: skip
+        anchors = np.zeros(0)
+        if held:
+            moved = self.section.mechanism.equations.configuration.difference(self.state.q, q)
+            anchors = (state.anchors - self.state.anchors)[held] - moved[
+                list(self.section.fixed)
+            ] @ self.section.carried
+        parts = self.places.T @ self.away(q), self.rates.T @ (v - self.state.v), state.z - self.state.z, anchors
         return np.concatenate(parts)
 
     def away(self, q: Matrix) -> Matrix:
@@ -240,14 +260,47 @@ def section_of(
              if contact.name == name and name not in after]  # fmt: skip
     pairs += [(4 * contacts + e, 4 * contacts + guards + e) for e, guard in enumerate(manager.guards)
               if guard.name == name]  # fmt: skip
-    gaps = tuple(pair for pair in pairs if abs(out[pair[0]]) <= CLOSED)
+    touching = [pair for pair in pairs if abs(out[pair[0]]) <= CLOSED]
+    watching = _watching_velocities(mechanism, contacts, name)
+    gaps = tuple(pair for pair in touching if pair[0] not in watching)
+    speeds = tuple(pair[0] for pair in touching if pair[0] in watching)
     held = [k for c in manager.contacts if c.kind == "penalty" and c.name in after for k in c.anchors]
     held += [anchor for anchor in remembered(mechanism.equations) if anchor not in stored]
+    carried = _carried(mechanism, arrived, parameters, fixed, held)
     states = arrived.anchors[state_anchors(mechanism.equations)] if len(arrived.anchors) else ()
     return Section(
         mechanism, manager, arrived.mode, arrived.armed, tuple(places), gaps, tuple(sorted(set(rates))), tuple(held),
-        tuple(fixed), None if held else heading, tuple(sorted(stored)), tuple(float(each) for each in states),
+        tuple(fixed), None if held else heading, tuple(sorted(stored)), tuple(float(each) for each in states), speeds,
+        carried,
     )  # fmt: skip
+
+
+def _watching_velocities(mechanism: Mechanism, contacts: int, name: str) -> set[int]:
+    """Places in the program of gaps of events and contacts of a name that watch velocities."""
+    equations = mechanism.equations
+    found = {
+        4 * contacts + e for e, guard in enumerate(equations.guards)
+        if guard.name == name and any(node.op == "input" and node.data[0] == "v" for node in live([guard.value]))
+    }  # fmt: skip
+    return found | {c for c, contact in enumerate(equations.contacts) if contact.name == name and contact.is_velocity}
+
+
+def _carried(
+    mechanism: Mechanism, state: State, parameters: Vector, fixed: Sequence[int], held: Sequence[int]
+) -> Matrix:  # fmt: skip
+    """By how much what would be held changes along each coordinate that the walker moves on along (fixed, held)."""
+    found = np.zeros((len(fixed), len(held)))
+    if not held:
+        return found
+    y = np.concatenate([state.v, state.z])
+    compose = mechanism.equations.configuration.compose
+    for number, k in enumerate(fixed):
+        move = np.zeros(mechanism.layout.n_v)
+        move[k] = 0.5
+        ends = [mechanism.acceleration_terms(0.0, compose(state.q, sign * move), y, parameters, state.anchors).captured
+                for sign in (1.0, -1.0)]  # fmt: skip
+        found[number] = (ends[0] - ends[1])[list(held)]
+    return found
 
 
 def _row_space(rows: Matrix) -> Matrix:

@@ -20,7 +20,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import GaitError, SimulationError
 from mbd.gait.continuation import BranchPoint, Continuation
 from mbd.gait.cycle import LimitCycle
-from mbd.gait.map_derivative import Measured, map_derivative, measured
+from mbd.gait.map_derivative import Measured, measured
 from mbd.gait.search import Search, search
 
 __all__ = ["doubled"]
@@ -61,7 +61,7 @@ def doubled(given: Continuation, special: Any, base: Any) -> LimitCycle:
         start, value = pair
         values = given.with_value(value)
         state = point.chart.at(start, given.map.vector(values))
-        found = search(Search(twice, given.section, given.tol), state, values)
+        found = search(Search(twice, given.section, given.tol, given.member_at(value)), state, values)
         if not found.success or not _is_doubled(given, found, amplitude):
             continue
         along = np.abs(mode @ (point.chart.basis.T @ (found.chart.basis @ found.stability_of.modes)))
@@ -87,7 +87,12 @@ def _pair(given: Continuation, point: BranchPoint, mode: Vector, amplitude: floa
         one, other = ends
         if given.map.faults(values) or not isinstance(one, Measured) or not isinstance(other, Measured):
             return None
-        rest: list[Any] = [0.5 * (one.c + other.c) - s, (one.c - other.c) / (2.0 * amplitude) + d, [mode @ d - 1.0]]
+        here = given.member_gap(point.chart, s, one, value)
+        rest: list[Any] = [
+            0.5 * (one.c + other.c) - s + here,
+            (one.c - other.c) / (2.0 * amplitude) + d,
+            [mode @ d - 1.0],
+        ]
         gap = np.concatenate(rest)
         left = float(max(np.max(np.abs(rest[0])), amplitude * np.max(np.abs(rest[1]))))
         if left <= FINE:
@@ -95,14 +100,15 @@ def _pair(given: Continuation, point: BranchPoint, mode: Vector, amplitude: floa
         if left > 4.0 * before:
             return None
         before = min(before, left)
-        slopes = [_slope(given, point, s + sign * amplitude * d, value, end)
-                  for sign, end in ((1.0, one), (-1.0, other))]  # fmt: skip
-        if slopes[0] is None or slopes[1] is None:
+        found = [_slope(given, point, s + sign * amplitude * d, value, end)
+                 for sign, end in ((1.0, one), (-1.0, other))]  # fmt: skip
+        if found[0] is None or found[1] is None:
             return None
+        slopes, member = (found[0][0], found[1][0]), found[0][1]
         mean, change = 0.5 * (slopes[0] + slopes[1]), 0.5 * (slopes[0] - slopes[1])
         P, bend = mean[:, :size], change[:, :size]
         matrix = np.block([
-            [P - np.eye(size), amplitude * bend, mean[:, size:]],
+            [P - np.eye(size) + member[:, :size], amplitude * bend, mean[:, size:] + member[:, size:]],
             [bend / amplitude, P + np.eye(size), change[:, size:] / amplitude],
             [np.zeros((1, size)), mode[np.newaxis], np.zeros((1, 1))],
         ])  # fmt: skip
@@ -111,16 +117,18 @@ def _pair(given: Continuation, point: BranchPoint, mode: Vector, amplitude: floa
     return None
 
 
-def _slope(given: Continuation, point: BranchPoint, c: Vector, value: float, base: Measured) -> Matrix | None:
-    """[P, σ F_p] at a state beside the doubling; None where derivatives are missing."""
+def _slope(
+    given: Continuation, point: BranchPoint, c: Vector, value: float, base: Measured
+) -> tuple[Matrix, Matrix] | None:  # fmt: skip
+    """[P, σ F_p] at a state beside the doubling, and what picks the member; None where derivatives are missing."""
     try:
-        found = map_derivative(given.map, point.chart, c, given.with_value(value), [given.name], levels=2, base=base)
+        found = given.derived(point.chart, c, given.with_value(value), 2, base)
     except SimulationError:
         return None
     size = point.chart.size
     matrix = found.matrix[:size].copy()
     matrix[:, size] *= given.width
-    return None if found.missing else matrix
+    return None if found.missing else (matrix, given.member_part(point.chart, base, found, value))
 
 
 def _is_doubled(given: Continuation, found: LimitCycle, amplitude: float) -> bool:

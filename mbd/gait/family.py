@@ -1,0 +1,176 @@
+"""Gaits of a family: the member with a given energy or speed.
+
+Where nothing takes energy, gaits are not isolated: with each one there are others of more and less energy, and the
+return map has a multiplier 1 along them. One number more, g(c) = g₀, picks a member. Newton's method solves
+``F(c) − c = 0`` together with ``g₀ − g(c) = 0``: the rows of P − 1 depend on each other along the family, with ∇g
+beside them they do not. Where a square matrix is needed, w ∇gᵀ is added to P − 1, w = ∇E/‖∇E‖, and w times what is left
+of g to F(c) − c: as F keeps E, w is across F(c) − c, and both vanish together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import is_finite_number, shown
+from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.errors import ModelError
+from mbd.gait.floquet import Multipliers, multipliers_of
+from mbd.gait.map_derivative import MapDerivative, Measured
+from mbd.gait.return_map import ReturnMap, Values
+from mbd.gait.section import Chart
+from mbd.state import State
+
+__all__ = ["Member", "across", "energy_of", "energy_slope", "floquet", "member_of"]
+
+LOSSLESS = 1e-3
+"""Distance of a multiplier from 1 within which it may be that of energy that nothing takes [-]."""
+BESIDE = 1e-5
+"""Distance [m, rad, m/s, rad/s] of the states from whose energies the slope of energy follows."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """The number that picks one gait of a family: kind 'energy' T + V [J], or 'speed' [m/s], and its value."""
+
+    kind: Literal["energy", "speed"]
+    value: float
+
+    @property
+    def unit(self) -> str:
+        """'J' or 'm/s'."""
+        return "J" if self.kind == "energy" else "m/s"
+
+    @property
+    def size(self) -> float:
+        """By which its misfit is divided: its value, at least 1."""
+        return max(1.0, abs(self.value))
+
+    def number(self, map_: ReturnMap, state: State, numbers: Vector, size: int, values: Values) -> float:
+        """Its value at a state from which the map gives these numbers (see `Measured`)."""
+        if self.kind == "energy":
+            return float(energy_of(map_, [state], values)[0])
+        return _speed(map_, numbers[size:])[0]
+
+    def misfit(self, map_: ReturnMap, chart: Chart, c: Vector, found: Measured, values: Values) -> float:
+        """(g₀ − g)/size at coordinates from which the map gives the numbers `found`."""
+        state = chart.at(c, map_.vector(values)) if self.kind == "energy" else chart.state
+        return (self.value - self.number(map_, state, found.numbers, found.size, values)) / self.size
+
+    def slope(self, map_: ReturnMap, chart: Chart, found: Measured, derivative: Matrix, values: Values) -> Vector:
+        """∇g/size by the coordinates of the chart, with the derivative of the numbers of the map."""
+        if self.kind == "energy":
+            return energy_slope(map_, chart, values) / self.size
+        return self.by_numbers(map_, found, derivative) / self.size
+
+    def by(self, map_: ReturnMap, chart: Chart, found: Measured, column: Vector, name: str, values: Values) -> float:
+        """∂g/∂p/size by a parameter, of which the numbers of the map have the derivative `column`."""
+        if self.kind == "speed":
+            return float(self.by_numbers(map_, found, column[:, np.newaxis])[0] / self.size)
+        value = float(values[name])
+        h = BESIDE * max(1.0, abs(value))
+        ends = [{**values, name: value + sign * h} for sign in (1.0, -1.0)]
+        high, low = (energy_of(map_, [chart.at(np.zeros(chart.size), map_.vector(end))], end)[0] for end in ends)
+        return float((high - low) / (2.0 * h) / self.size)
+
+    def by_numbers(self, map_: ReturnMap, found: Measured, derivative: Matrix) -> Vector:
+        """The derivative of the speed from that of the numbers of the map."""
+        return _speed(map_, found.numbers[found.size :])[1] @ derivative[found.size :]
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.value:g} {self.unit}"
+
+
+def member_of(energy: Any, speed: Any) -> Member | None:
+    """The member that arguments ask for.
+
+    Raises
+    ------
+    ModelError
+        where both are given, and for what is no finite number.
+    """
+    given = [(kind, value) for kind, value in (("energy", energy), ("speed", speed)) if value is not None]
+    faults = [f"{kind} must be a finite number, got {shown(value)}" for kind, value in given
+              if not is_finite_number(value)]  # fmt: skip
+    if len(given) == 2:
+        faults.append("energy and speed each pick one gait of a family; give one of them")
+    if faults:
+        raise ModelError(faults)
+    return Member(given[0][0], float(given[0][1])) if given else None  # type: ignore[arg-type]
+
+
+def energy_of(map_: ReturnMap, states: Sequence[State], values: Values) -> Vector:
+    """T + V of states [J], with what closed penalty contacts and spring legs hold."""
+    parameters = map_.vector(values)
+    inputs = {name: np.stack([getattr(state, name) for state in states]) for name in ("q", "v", "z")}
+    inputs |= {"t": np.zeros(len(states)), "anchor": np.stack([state.anchors for state in states])}
+    kinetic, potential = map_.mechanism.energies(inputs, parameters)
+    total = np.asarray(kinetic + potential, dtype=float)
+    held, contacts = _held(map_)
+    if contacts:
+        out = np.zeros(len(contacts))
+        for k, state in enumerate(states):
+            y = np.concatenate([state.v, state.z])
+            held(map_.mechanism.block(0.0, state.q, y, state.anchors), parameters, out)
+            total[k] += sum(value for name, value in zip(contacts, out, strict=True) if name in state.mode.closed)
+    return total
+
+
+def energy_slope(map_: ReturnMap, chart: Chart, values: Values) -> Vector:
+    """∇(T + V) along the section."""
+    parameters = map_.vector(values)
+    states = [chart.at(sign * BESIDE * unit, parameters) for unit in np.eye(chart.size) for sign in (1.0, -1.0)]
+    total = energy_of(map_, states, values).reshape(-1, 2)
+    return np.asarray((total[:, 0] - total[:, 1]) / (2.0 * BESIDE))
+
+
+def across(map_: ReturnMap, chart: Chart, values: Values) -> Vector:
+    """w = ∇E/‖∇E‖, across which the map leads nowhere; zeros where the energy does not depend on the state."""
+    slope = energy_slope(map_, chart, values)
+    size = float(np.linalg.norm(slope))
+    return slope / size if np.isfinite(size) and size > 0.0 else np.zeros(chart.size)
+
+
+def floquet(map_: ReturnMap, chart: Chart, derivative: MapDerivative, values: Values) -> Multipliers:
+    """The multipliers of P, that of energy apart where nothing takes any."""
+    P, error = derivative.matrix[: chart.size, : chart.size], derivative.error[: chart.size, : chart.size]
+    found = multipliers_of(P, error)
+    if np.min(np.abs(found.values - 1.0), initial=1.0) > LOSSLESS:
+        return found
+    w = across(map_, chart, values)
+    return multipliers_of(P, error, w if np.any(w) else None)
+
+
+def _held(map_: ReturnMap) -> tuple[ScalarFunction, tuple[str, ...]]:
+    """The program of the energies that penalty contacts can give back, and their names."""
+    equations = map_.mechanism.equations
+    memory = equations.memory
+    if "energies of contacts" not in memory:
+        with equations.tape.lock:
+            effects = [effect for effect in equations.effects if effect.elastic is not None]
+            nodes = [effect.elastic for effect in effects if effect.elastic is not None]
+            names = tuple(equations.contacts[effect.contact].name for effect in effects)
+            program = scalar_function(nodes, map_.mechanism.layout, "energies of contacts")
+            memory["energies of contacts"] = program, names
+    found: tuple[ScalarFunction, tuple[str, ...]] = memory["energies of contacts"]
+    return found
+
+
+def _speed(map_: ReturnMap, numbers: Vector) -> tuple[float, Vector]:
+    """The speed of one application and its derivative by (period, travel, times and lengths of steps)."""
+    ways = len(map_.fixed)
+    period, travel, lengths = numbers[0], numbers[1 : 1 + ways], numbers[2 + ways :: 2]
+    slope = np.zeros(len(numbers))
+    if ways:
+        way = map_.forward * travel
+        distance = float(np.linalg.norm(way))
+        slope[1 : 1 + ways] = map_.forward * way / (distance or 1.0)
+    else:
+        distance = float(np.sum(lengths))
+        slope[2 + ways :: 2] = 1.0
+    slope[0] = -distance / period
+    return distance / period, slope / period
