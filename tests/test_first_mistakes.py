@@ -383,3 +383,36 @@ def test_an_event_that_ends_a_run_is_no_success(tmp_path):
     pytest.importorskip("pandas")
     lines = run.to_csv(tmp_path / "run", ["pin.angle"]).read_text().splitlines()
     assert lines[0].split(",")[1] == "pin.angle" and len(lines) == 1 + len(run.time)
+
+
+def rod_within_a_cone() -> mbd.Model:
+    """A rod on a ball joint within a cone."""
+    model, rod = mbd.Model("ball"), mbd.RigidBody("rod", mass=2.0, inertia=(0.1, 0.02, 0.1))
+    hip = mbd.Spherical("hip", model.ground.origin, rod.point(0.0, 0.3))
+    model.connect(hip)
+    model.constrain(mbd.Unilateral("cone", mbd.cone(hip, 0.4)))
+    return model
+
+
+def test_a_ball_joint_is_asked_for_an_angle():
+    model = rod_within_a_cone()
+    with pytest.raises(mbd.UnknownNameError, match="'hip' turns freely and has 'hip.orientation', an axis"):
+        mbd.assemble(model, position={"hip.angle": 0.3})
+    start = mbd.assemble(model, position={"hip.orientation": ((0, 0, 1), 0.2)})
+    run = mbd.simulate(model, start, dt=1e-3, until=0.01)
+    with pytest.raises(mbd.UnknownNameError, match=r"did you mean 'hip.euler.zxy.1'"):
+        run["hip.angle"]
+    assert run["hip.euler.zxy.1"][0] == pytest.approx(0.2)
+    assert "0 rad (cone.normal)" in run.summary()
+
+
+@pytest.mark.parametrize("kind", ["controller", "sampled law"])
+def test_a_period_that_was_meant_as_a_frequency_is_doubted(kind):
+    model, pin = pendulum()
+    model.apply(mbd.Motor("drive", pin, 0.0))
+    if kind == "controller":
+        model.apply(mbd.Controller("PD", lambda t, values, state: {}, period=100, writes=("drive.torque",)))
+    else:
+        model.apply(mbd.SampledLaw("PD", 100, {"drive.torque": lambda q: -q}, arguments=("pin.angle",)))
+    with pytest.warns(mbd.MbdWarning, match="'PD' samples once in 100 s; .* 100 Hz is period=0.01"):
+        mbd.assemble(model)

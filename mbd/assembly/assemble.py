@@ -153,6 +153,10 @@ def assemble(
     return assembled
 
 
+TURNS = ("", "angle", "angles", "euler", "flexion", "rotation", "rotation_vector", "quaternion")
+"""What a reader may call the orientation of a joint that turns freely."""
+
+
 @dataclass(frozen=True)
 class _Named:
     """Values that a start names: q, v and z by number, any other position or rate as a condition."""
@@ -180,7 +184,7 @@ def _named(
         if name in coordinates
         else f"position: {name!r} is a rate; give it in velocity={{{name!r}: …}}"
         if name in rates
-        else "position: " + nearest(name, coordinates, "coordinate")
+        else "position: " + _no_coordinate(name, coordinates)
         for name in as_given(unknown)
     ]
     faults += ["velocity: " + _no_rate(name, rates) for name in as_given(strange)]
@@ -189,6 +193,18 @@ def _named(
         for numbers, given in ((coordinates, position), (states, position), (rates, velocity))
     )
     return _Named(q, v, z, places, speeds), faults
+
+
+def _no_coordinate(name: str, coordinates: Mapping[str, int]) -> str:
+    """Why a name is no coordinate; a joint that turns freely has an orientation and no angle."""
+    joint, _, last = name.partition(".")
+    if f"{joint}.orientation.w" not in coordinates or last not in TURNS:
+        return nearest(name, coordinates, "coordinate")
+    whole = f"{joint}.orientation"
+    return (
+        f"no coordinate named {name!r}; {joint!r} turns freely and has {whole!r}, an axis with an angle [rad] such as "
+        f"{{{whole!r}: ((0, 0, 1), 0.3)}}, Euler angles such as ('zxy', (0.3, 0, 0)), or a quaternion (w, x, y, z)"
+    )
 
 
 def _no_rate(name: str, rates: Mapping[str, int]) -> str:

@@ -259,10 +259,17 @@ class LimitCycle:
             found["speed"] = f"{self.speed:.5g} m/s"
         if np.isfinite(self.cost_of_transport):
             found["cost of transport"] = f"{self.cost_of_transport:.4g}"
-        found["largest multiplier"] = f"{self.largest_multiplier:.6f} ({self.stability})"
         worst = max(self.residual.values(), default=0.0)
+        found["largest multiplier"] = f"{self.largest_multiplier:.6f} ({self.stability}{self._lasting(worst)})"
         found["residual"] = f"{worst:.1g}"
         return found
+
+    def _lasting(self, residual: float) -> str:
+        """How long a run stays near an unstable gait, whose residual grows to 1 % by the largest multiplier."""
+        if self.stability != "unstable":
+            return ""
+        count = np.log(0.01 / max(residual, 1e-15)) / np.log(self.largest_multiplier)
+        return f": a run from its state leaves it after about {max(1, round(float(count)))} applications of the map"
 
     def __repr__(self) -> str:
         return f"{self.name}: " + ", ".join(

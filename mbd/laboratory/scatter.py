@@ -62,11 +62,11 @@ def noise_remarks(equations: Equations, motion: Motion, effort: Matrix, driven: 
     """A sentence on the moment (R, n_v) that noise in a recorded motion scatters most; none where it hardly does."""
     whole = equations.configuration
     found: list[tuple[float, int, Scatter]] = []
-    for k in np.flatnonzero(driven):
+    for k in map(int, np.flatnonzero(driven)):
         coordinate = motion.q[:, whole.places[k]] if whole.places[k] >= 0 else np.zeros(len(motion.time))
         scatter = scatter_of(motion.time, coordinate, effort[:, k])
         if scatter is not None:
-            found.append((scatter.moment / float(np.ptp(effort[:, k])), int(k), scatter))
+            found.append((scatter.moment / float(np.ptp(effort[:, k])), k, scatter))
     if not found:
         return []
     share, k, scatter = max(found)

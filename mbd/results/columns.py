@@ -113,8 +113,9 @@ class Columns(ABC):
                 f"no result named {name!r}: {wrong}; there are '{joint}.euler.zxy' and others: {', '.join(SEQUENCES)}"
             )
         owner = name.rpartition(".")[0]
-        moments = [full for kind in ("net_moment", "net_force") if self.knows(full := f"{owner}.{kind}")]
-        return nearest(name, (*self.names, *self.vectors), "result", "The run has", moments)
+        kinds = ("net_moment", "net_force", "euler.zxy.1")  # which are not listed
+        beside = [full for kind in kinds if self.knows(full := f"{owner}.{kind}")]
+        return nearest(name, (*self.names, *self.vectors), "result", "The run has", beside)
 
 
 class ModelColumns(StoredStates, Columns):

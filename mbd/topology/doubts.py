@@ -22,9 +22,14 @@ GRIPPING = 10.0
 """Coefficient of friction above which it may be given in percent [-]."""
 
 
+SLOW = 2.0
+"""Time between samples of a controller above which it may be a frequency [s]."""
+
+
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    return _lengths(model) + _masses(model) + _turned(model) + _twice(model) + _grips(model) + _awaited(model)
+    parts = (_lengths, _masses, _turned, _twice, _grips, _periods, _awaited)
+    return [sentence for part in parts for sentence in part(model)]
 
 
 def _lengths(model: Any) -> list[str]:
@@ -96,6 +101,17 @@ def _grips(model: Any) -> list[str]:
         f"friction of '{contact.name}' is {contact.friction:g}; a coefficient is a ratio of forces, rubber has about 1"
         for contact in getattr(model, "constraints", ())
         if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > GRIPPING
+    ]
+
+
+def _periods(model: Any) -> list[str]:
+    """Controllers that hardly ever sample, because their period was meant as a frequency."""
+    words = [*getattr(model, "controllers", ()), *getattr(model, "machines", ())]
+    return [
+        f"'{word.name}' samples once in {period:g} s; period is the time between samples, and {period:g} Hz is "
+        f"period={1.0 / period:.3g}"
+        for word in words
+        if (period := getattr(word, "period", None)) is not None and period > SLOW
     ]
 
 

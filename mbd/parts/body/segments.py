@@ -97,7 +97,8 @@ def person(mass: float, height: float, table: str = "Winter") -> Person:
     mass : M of the whole person [kg]
     height : H [m]
     table : 'Winter' (D. A. Winter, Biomechanics and Motor Control of Human Movement, 2009, table 4.1), 'de Leva male'
-        or 'de Leva female' (1996)
+        or 'de Leva female' (1996). Winter's foot has the length from heel to toe and a radius of gyration for that from
+        malleolus to metatarsal head, so that its inertia is about four times that of a foot
 
     Raises
     ------
