@@ -387,20 +387,25 @@ class Mechanism:
 
     def terms_of(self, block: Vector, parameters: Vector) -> AccelerationTerms:
         """The same at the inputs in a block; its accelerations and multipliers enter no more than R and the limits."""
-        layout = self.layout
-        n, rows = layout.n, layout.n_rows
+        n, rows = self.layout.n, self.layout.n_rows
         out = np.zeros(self.sizes["accelerations"])
         self.common["accelerations"](block, parameters, out)
-        lengths = (n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1)
-        starts = list(accumulate(lengths, initial=0))
-        M, f, R, B, h, rate, bias, captured, kinetic = (out[a:b] for a, b in pairwise(starts))
-        limits, impulses = np.split(out[starts[-1] :], [layout.n_frictions])
+        M, f, R, B, h, rate, bias, captured, kinetic, limits, impulses = [out[part] for part in self._parts]
         return AccelerationTerms(
             M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0]),
-            limits, impulses.reshape(len(self.equations.impulses), layout.n_v),
+            limits, impulses.reshape(len(self.equations.impulses), self.layout.n_v),
         )  # fmt: skip
 
-    @property
+    @cached_property
+    def _parts(self) -> list[slice]:
+        """Where the parts of `AccelerationTerms` stand in the output of their program."""
+        layout = self.layout
+        n, rows = layout.n, layout.n_rows
+        lengths = (n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1, layout.n_frictions)
+        starts = list(accumulate(lengths, initial=0))
+        return [slice(a, b) for a, b in pairwise([*starts, self.sizes["accelerations"]])]
+
+    @cached_property
     def sizes(self) -> dict[str, int]:
         """Length of the output of each common program."""
         layout = self.layout

@@ -10,8 +10,10 @@ both, wherever parameters enter a mirrored gait.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +48,8 @@ WIDEST, GROWTH = 1e12, 30.0
 EVENTS = slice(4, 7)
 """Those of events among the numbers that are watched."""
 
-Pairs = list[tuple[Vector, Vector]]
-"""Numbers of mirrored states, exchanged, and those of their images."""
+Pairs = tuple[Vector, Vector, NDArray[np.intp]]
+"""Numbers of mirrored states, exchanged, those of their images, and where each kind of them begins."""
 
 
 def require_alike(
@@ -88,14 +90,13 @@ def moves_sides_alike(
     ----------
     vector : parameter vector at a value of it; value : its own
     """
-    base, h = _pairs(mechanism, mirror, vector(value)), EFFECT * (abs(value) or 1.0)
+    mine, its, starts = _pairs(mechanism, mirror, vector(value))
+    size, h = _sizes(mine, starts), EFFECT * (abs(value) or 1.0)
     while h <= WIDEST * max(abs(value), 1.0):
-        beside = _pairs(mechanism, mirror, vector(value + h))
-        effect = apart = 0.0
-        for (mine, its), (mine_there, its_there) in zip(base, beside, strict=True):
-            size = _size(mine)
-            effect = max(effect, _largest(mine_there - mine) / size, _largest(its_there - its) / size)
-            apart = max(apart, _largest((mine_there - its_there) - (mine - its)) / size)
+        mine_there, its_there, _ = _pairs(mechanism, mirror, vector(value + h))
+        changes = (mine_there - mine, its_there - its, (mine_there - its_there) - (mine - its))
+        own, others, apart = (float(np.max(_largest(change, starts) / size)) for change in changes)
+        effect = max(own, others)
         if effect > EFFECT:
             return apart <= SHARE * effect
         h *= GROWTH
@@ -136,30 +137,58 @@ def _difference(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> flo
     contacts = {contact.name: contact for contact in mechanism.equations.contacts}
     if any(contact.restitution != contacts[mirror.name(name)].restitution for name, contact in contacts.items()):
         return np.inf
-    pairs = _pairs(mechanism, mirror, parameters)
-    return max((_largest(mine - its) / _size(mine) for mine, its in pairs), default=0.0)
+    mine, its, starts = _pairs(mechanism, mirror, parameters)
+    return float(np.max(_largest(mine - its, starts) / _sizes(mine, starts), initial=0.0))
 
 
-def _size(numbers: Vector) -> float:
-    return _largest(numbers[np.isfinite(numbers)]) or 1.0
+def _sizes(numbers: Vector, starts: NDArray[np.intp]) -> Vector:
+    """The largest finite modulus of each kind; 1 where there is none."""
+    largest = np.maximum.reduceat(np.where(np.isfinite(numbers), np.abs(numbers), 0.0), starts)
+    return np.where(largest == 0.0, 1.0, largest)
 
 
-def _largest(numbers: Vector) -> float:
-    """The largest modulus; what is no number on both sides counts as none."""
-    return float(np.nanmax(np.abs(numbers))) if np.any(np.isfinite(numbers)) else 0.0
+def _largest(numbers: Vector, starts: NDArray[np.intp]) -> Vector:
+    """The largest modulus of each kind; what is no number on both sides counts as none."""
+    finite = np.logical_or.reduceat(np.isfinite(numbers), starts)
+    return np.where(finite, np.fmax.reduceat(np.abs(numbers), starts), 0.0)
 
 
-def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
-    """What is compared, at some states with their mirror images."""
-    layout, random = mechanism.layout, np.random.default_rng(3)
-    configuration, found = mechanism.equations.configuration, list[tuple[Vector, Vector]]()
-    acting = _acting(mechanism.equations, mirror)
-    places = _watched_places(mechanism.equations, mirror)
-    order = np.concatenate([mirror.v, layout.n_v + mirror.z]).astype(np.intp)
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """What of a comparison depends on no parameter.
+
+    states : (q, y, anchors) of states and of their mirror images
+    acting, storing : see `_acting`, `_storing`; watched : see `_watched_places`; impulses : places of their images
+    order, signs : of velocities and first-order states
+    """
+
+    states: list[tuple[tuple[Vector, ...], tuple[Vector, ...]]]
+    acting: list[int]
+    storing: list[int]
+    watched: list[NDArray[np.intp]]
+    impulses: dict[tuple[str, int], tuple[str, int]]
+    order: NDArray[np.intp]
+    signs: Vector
+
+
+def _places(mechanism: Mechanism, mirror: Mirror) -> _Places:
+    """These of a mechanism and a mirror, found once."""
+    known: WeakKeyDictionary[Mirror, _Places] = mechanism.equations.memory.setdefault(
+        "compared with mirror images", WeakKeyDictionary()
+    )
+    if mirror not in known:
+        known[mirror] = _found_places(mechanism, mirror)
+    return known[mirror]
+
+
+def _found_places(mechanism: Mechanism, mirror: Mirror) -> _Places:
+    layout, random, equations = mechanism.layout, np.random.default_rng(3), mechanism.equations
+    configuration, states = equations.configuration, []
+    storing = _storing(equations)
     signs = np.ones(layout.n)
     if mirror.reflection is not None:
         signs[: layout.n_v] = mirror.reflection.v
-    for number in range(max([len(POSES), *(len(machine.states) for machine in mechanism.equations.machines)])):
+    for number in range(max([len(POSES), *(len(machine.states) for machine in equations.machines)])):
         # a state and its mirror image; machines and contacts hold something, as they do in motion
         width = POSES[number % len(POSES)]
         q, y = (
@@ -170,28 +199,41 @@ def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
         image_q = mirror.of_q(q)
         image_y = np.concatenate([mirror.of_v(y[: layout.n_v]), y[layout.n_v :][mirror.z]])
         held = in_state(mechanism, number)
-        storing = _storing(mechanism.equations)
         held[storing] = random.uniform(0.1, 0.5, len(storing))
-        at, image = (q, y, held), (image_q, image_y, mirror.of_anchors(held))
+        states.append(((q, y, held), (image_q, image_y, mirror.of_anchors(held))))
+    return _Places(
+        states, _acting(equations, mirror), storing, _watched_places(equations, mirror),
+        {(c.name, when): (mirror.name(c.name), when) for c in equations.contacts for when in range(3)},
+        np.concatenate([mirror.v, layout.n_v + mirror.z]).astype(np.intp), signs,
+    )  # fmt: skip
+
+
+def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
+    """What is compared, at some states with their mirror images."""
+    places, found = _places(mechanism, mirror), list[tuple[Vector, Vector]]()
+    order, signs = places.order, places.signs
+    square, both_signs = np.ix_(order, order), np.outer(signs, signs)
+    for at, image in places.states:
         here, there = _numbers(mechanism, parameters, *at), _numbers(mechanism, parameters, *image)
         # numbers of the one in the places and with the signs of the other
         for mine, its in zip(here["matrices"], there["matrices"], strict=True):
-            found.append((np.ravel(mine[np.ix_(order, order)] * np.outer(signs, signs)), np.ravel(its)))
+            found.append((np.ravel(mine[square] * both_signs), np.ravel(its)))
         for mine, its in zip(here["vectors"], there["vectors"], strict=True):
             found.append((mine[order] * signs, its))
         watched = [
-            (mine[place], its) for place, mine, its in zip(places, here["watched"], there["watched"], strict=True)
+            (mine[place], its) for place, mine, its in zip(places.watched, here["watched"], there["watched"], strict=True)
         ]
-        watched[EVENTS] = [(mine[acting], its[acting]) for mine, its in watched[EVENTS]]
+        watched[EVENTS] = [(mine[places.acting], its[places.acting]) for mine, its in watched[EVENTS]]
         found += watched
         found += [
-            (mirror.of_v(here["impulses"][mirror.name(contact), when]), its)
-            for (contact, when), its in there["impulses"].items()
+            (mirror.of_v(here["impulses"][places.impulses[key]]), its) for key, its in there["impulses"].items()
         ]
         stored = mirror.of_anchors(here["stored"])
-        found += [(stored[[k]], there["stored"][[k]]) for k in storing]
+        found += [(stored[[k]], there["stored"][[k]]) for k in places.storing]
         found += _resets(mechanism, mirror, parameters, at, image)
-    return found
+    found = [pair for pair in found if len(pair[0])]
+    starts = np.array([0, *np.cumsum([len(mine) for mine, _ in found[:-1]])], dtype=np.intp)
+    return np.concatenate([mine for mine, _ in found]), np.concatenate([its for _, its in found]), starts
 
 
 def _acting(equations: Equations, mirror: Mirror) -> list[int]:
@@ -219,7 +261,8 @@ def _numbers(mechanism: Mechanism, parameters: Vector, q: Vector, y: Vector, anc
     # what is watched
     guards = np.zeros(max(mechanism.sizes["guards"], 1))
     mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, guards)
-    parts = np.split(guards, np.cumsum([n_c, n_c, n_c, n_c, n_g, n_g, n_f, 2 * n_f]))
+    ends = accumulate([n_c, n_c, n_c, n_c, n_g, n_g, n_f, 2 * n_f], initial=0)
+    parts = [guards[first:end] for first, end in pairwise([*ends, len(guards)])]
     slides, conditions = parts[6], parts[8][:n_g] if equations.machines else np.ones(n_g)
     both = [guard.direction == 0 for guard in equations.guards]  # the sign of their values tells nothing
     events = [np.where(both, np.abs(part), part) for part in parts[4:6]]
@@ -227,7 +270,9 @@ def _numbers(mechanism: Mechanism, parameters: Vector, q: Vector, y: Vector, anc
     penalties = [c for c, contact in enumerate(equations.contacts) if contact.force is not None]
     loaded = mechanism.acceleration_terms(0.0, q, y, parameters, anchors, penalties, np.sign(slides), lam)
     # impulses by what they wait for
-    impulses = {(contact.name, when): np.zeros(layout.n_v) for contact in equations.contacts for when in range(3)}
+    impulses = {}
+    if equations.impulses:
+        impulses = {(contact.name, when): np.zeros(layout.n_v) for contact in equations.contacts for when in range(3)}
     for impulse, vector in zip(equations.impulses, terms.impulses, strict=True):
         impulses[equations.contacts[impulse.contact].name, impulse.order] += vector
     return {
@@ -261,10 +306,10 @@ def _watched_places(equations: Equations, mirror: Mirror) -> list[NDArray[np.int
 
 def _resets(
     mechanism: Mechanism, mirror: Mirror, parameters: Vector, at: tuple[Vector, ...], image: tuple[Vector, ...]
-) -> Pairs:
+) -> list[tuple[Vector, Vector]]:
     """The states after the resets of all events, of a state and of its image, as far as resets can be recorded."""
     guards = {guard.name: guard for guard in mechanism.equations.guards if guard.reset is not None}
-    found: Pairs = []
+    found = list[tuple[Vector, Vector]]()
     for name, guard in guards.items():
         mine, its = (_after(mechanism, each, parameters, *state)
                      for each, state in ((guard, at), (guards.get(mirror.name(name), guard), image)))  # fmt: skip

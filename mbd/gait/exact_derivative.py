@@ -101,7 +101,8 @@ def _tangent(chart: Chart, state: State, parameters: Vector) -> Matrix:
     """T (n_v + n_v, size) at a state of the section."""
     section, configuration = chart.section, chart.section.mechanism.equations.configuration
     compose, away = configuration.compose, configuration.difference(chart.state.q, state.q)
-    _, G = section.positions(state.q, parameters, state.anchors)
+    _, slopes = section.positions(state.q, parameters, state.anchors)
+    G = slopes()
     free, off = (_tangents(configuration, away, part) for part in (chart.places, chart.off_places))
     moves = free - off @ np.linalg.lstsq(G @ off, G @ free, rcond=None)[0]
 

@@ -14,7 +14,7 @@ on the chart.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -92,18 +92,20 @@ class Section:
         """1 for each closed contact."""
         return self.manager.flags(self.mode.closed)
 
-    def positions(self, q: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Matrix]:
-        """h and G = ∂h/∂x of all that holds of positions."""
+    def positions(self, q: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Callable[[], Matrix]]:
+        """h of all that holds of positions, and what gives G = ∂h/∂x."""
         mechanism, n_v = self.mechanism, self.mechanism.layout.n_v
         terms = mechanism.acceleration_terms(0.0, q, np.zeros(mechanism.layout.n), parameters, anchors)
         picked = list(self.places)
-        values, slopes = [terms.h[picked]], [terms.B[picked][:, :n_v]]
-        for value, rate in self.gaps:
-            here = self._guards(q, np.zeros(n_v), parameters, anchors)
-            along = [self._guards(q, unit, parameters, anchors)[rate] - here[rate] for unit in np.eye(n_v)]
-            values.append(here[[value]])
-            slopes.append(np.array([along]))
-        return np.concatenate(values), np.vstack(slopes)
+        guards = self._guards(q, np.zeros(mechanism.layout.n - n_v), parameters, anchors)
+        here = guards(np.zeros(n_v)) if self.gaps else np.zeros(0)
+
+        def slopes() -> Matrix:
+            along = [guards(unit) for unit in np.eye(n_v)] if self.gaps else []
+            rows = [np.array([[moved[rate] - here[rate] for moved in along]]) for _, rate in self.gaps]
+            return np.vstack([terms.B[picked][:, :n_v], *rows])
+
+        return np.concatenate([terms.h[picked], here[[value for value, _ in self.gaps]]]), slopes
 
     def velocities(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Matrix]:
         """ḣ and B of all that holds of velocities, and the event that watches them with its gradient."""
@@ -114,10 +116,10 @@ class Section:
             return terms.rate[picked], terms.B[picked][:, :n_v]
         v, z = y[:n_v], y[n_v:]
         steps = SMALL * np.maximum(1.0, np.abs(v)) * np.eye(n_v)
-        ends = [[self._guards(q, v + sign * step, parameters, anchors, z)[speeds] for sign in (1.0, -1.0)]
-                for step in steps]  # fmt: skip
+        guards = self._guards(q, z, parameters, anchors)
+        ends = [[guards(v + sign * step)[speeds] for sign in (1.0, -1.0)] for step in steps]
         slopes = np.array([(high - low) / (2.0 * np.max(step)) for (high, low), step in zip(ends, steps, strict=True)])
-        here = self._guards(q, v, parameters, anchors, z)[speeds]
+        here = guards(v)[speeds]
         return np.append(terms.rate[picked], here), np.vstack([terms.B[picked][:, :n_v], slopes.T])
 
     def anchored(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> Vector:
@@ -132,12 +134,19 @@ class Section:
         found[list(self.stored)] = terms.captured[list(self.stored)]
         return found
 
-    def _guards(self, q: Vector, v: Vector, parameters: Vector, anchors: Vector, z: Vector | None = None) -> Vector:
-        mechanism = self.mechanism
-        y = np.concatenate([v, np.zeros(mechanism.layout.n - len(v)) if z is None else z])
-        out = np.zeros(max(mechanism.sizes["guards"], 1))
-        mechanism.common["guards"](mechanism.block(0.0, q, y, anchors), parameters, out)
-        return out
+    def _guards(self, q: Vector, z: Vector, parameters: Vector, anchors: Vector) -> Callable[[Vector], Vector]:
+        """What gives values and rates of all guards by velocities."""
+        mechanism, at_v = self.mechanism, self.mechanism.layout.v
+        block = mechanism.block(0.0, q, np.concatenate([np.zeros(mechanism.layout.n_v), z]), anchors)
+        length = max(mechanism.sizes["guards"], 1)
+
+        def values(v: Vector) -> Vector:
+            out = np.zeros(length)
+            block[at_v : at_v + len(v)] = v
+            mechanism.common["guards"](block, parameters, out)
+            return out
+
+        return values
 
 
 class Chart:
@@ -152,9 +161,9 @@ class Chart:
     def __init__(self, section: Section, state: State, parameters: Vector) -> None:
         self.section, self.state, self.parameters = section, state, parameters
         layout, q, y = section.mechanism.layout, state.q, np.concatenate([state.v, state.z])
-        _, G = section.positions(q, parameters, state.anchors)
+        _, slopes = section.positions(q, parameters, state.anchors)
         _, B = section.velocities(q, y, parameters, state.anchors)
-        G = G.copy()
+        G = slopes()
         G[:, list(section.fixed)] = 0.0
         unmoved = np.eye(layout.n_v)[list(section.fixed)]
         self.turning = np.zeros(layout.n_v)
@@ -185,11 +194,11 @@ class Chart:
         move, size = self.places @ parts[0], np.inf
         for _ in range(CORRECTIONS):
             q = compose(base.q, move)
-            h, G = section.positions(q, parameters, anchors)
+            h, slopes = section.positions(q, parameters, anchors)
             before, size = size, float(np.max(np.abs(h), initial=0.0))
             if size <= FINE or (size >= before and size < 1e-12):
                 break
-            move = move - self.off_places @ np.linalg.lstsq(G @ self.off_places, h, rcond=None)[0]
+            move = move - self.off_places @ np.linalg.lstsq(slopes() @ self.off_places, h, rcond=None)[0]
         if not size < 1e-9:
             raise SimulationError(f"no state of the section is near: {size:.2g} m or rad are left of its rows")
         z = base.z + parts[2]
