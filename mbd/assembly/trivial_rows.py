@@ -43,7 +43,11 @@ def manager_of(mechanism: Mechanism, parameters: Vector) -> ActiveSetManager:
     ModelError
         see `trivial_rows`.
     """
-    return ActiveSetManager(mechanism.equations, trivial_rows(mechanism, parameters))
+    trivial = trivial_rows(mechanism, parameters)
+    known: ActiveSetManager | None = mechanism.named.get("manager")
+    if known is None or known.trivial != trivial:
+        known = mechanism.named["manager"] = ActiveSetManager(mechanism.equations, trivial)
+    return known
 
 
 def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:

@@ -97,6 +97,7 @@ class Mechanism:
         for name, make in rare.items():  # twice a restart, and nowhere else
             self._compiled(name, lambda name=name, make=make: ({name: make(equations)}, {}), rarely=True)  # type: ignore[misc]
         self.named: dict[str, Any] = {}
+        self.idle: dict[Hashable, Any] = {}  # what runs have left for the next ones
         self.notes: list[str] = []
         self.postponed: list[Postponed] = []
         self.without_effect: frozenset[str] = frozenset()

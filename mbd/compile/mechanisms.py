@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Collection, Mapping
+from operator import is_
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -17,26 +18,49 @@ from mbd.topology.check import parameter_check
 
 __all__ = ["mechanism_of", "require_model", "tunable_model"]
 
-_KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], tuple[Any, Mechanism]]] = WeakKeyDictionary()
-_TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], tuple[Any, Any]]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept]] = WeakKeyDictionary()
+_TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept]] = WeakKeyDictionary()
 _LOCK = threading.Lock()
 free_in_child(_LOCK)
 
 
 def _description(model: Any) -> Any:
     """What the equations depend on, by identity of the words."""
-    words = [
-        getattr(model, kind, ())
-        for kind in ("joints", "forces", "constraints", "controllers", "markers", "observations")
-    ]
+    words = [getattr(model, kind, ()) for kind in ("joints", "forces", "constraints", "controllers", "observations")]
     groups = tuple(tuple(group.values() if isinstance(group, Mapping) else group) for group in words)
     return groups, *(getattr(model, key, None) for key in ("gravity", "cut", "tunable"))
 
 
 def _same(old: Any, new: Any) -> bool:
     groups = zip(old[0], new[0], strict=True)
-    alike = all(len(a) == len(b) and all(x is y for x, y in zip(a, b, strict=True)) for a, b in groups)
+    alike = all(len(a) == len(b) and all(map(is_, a, b)) for a, b in groups)
     return alike and old[1:] == new[1:]
+
+
+class _Kept:
+    """What was made of a model, as long as its words and the named points of its bodies are the same."""
+
+    def __init__(self, model: Any, described: Any, made: Any) -> None:
+        self.described, self.made = described, made
+        self._bodies = bodies_of(model)
+        self._points = self._present()
+
+    def _present(self) -> list[Any]:
+        return [point for body in self._bodies for point in body.points.values()]
+
+    def serves(self, described: Any) -> bool:
+        """Whether it is still what the model would make."""
+        if not _same(self.described, described):
+            return False
+        points = self._present()
+        return len(points) == len(self._points) and all(map(is_, points, self._points))
+
+
+def bodies_of(model: Any) -> list[Any]:
+    """The bodies whose named points are results, which follow from the words."""
+    if not isinstance(model, Description):
+        return []
+    return list(({id(frame.body): frame.body for frame in model.points()} | {id(model.ground): model.ground}).values())
 
 
 def require_model(model: Any) -> None:
@@ -86,11 +110,11 @@ def tunable_model(model: Any, names: Collection[str]) -> Any:
     now, wanted = _description(model), frozenset(names)
     with _LOCK:
         known = _TUNABLE.setdefault(model, {}).get(wanted)
-    if known is not None and _same(known[0], now):
-        return known[1]
+    if known is not None and known.serves(now):
+        return known.made
     found = model.with_tunable(*sorted(wanted))
     with _LOCK:
-        _TUNABLE[model][wanted] = (now, found)
+        _TUNABLE[model][wanted] = _Kept(model, now, found)
     return found
 
 
@@ -98,8 +122,9 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
     now = _description(model)
     with _LOCK:
         known = _KNOWN.setdefault(model, {}).get((backend, tunable))
-    if known is not None and _same(known[0], now):
-        return known[1]
+    if known is not None and known.serves(now):
+        kept: Mechanism = known.made
+        return kept
     described = model
     if tunable:
         described = model.with_tunable(*sorted(tunable))
@@ -115,5 +140,5 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
         idle = sorted(made.without_effect)
         made.notes += [f"{name!r} enters no equation of this model: its value has no effect" for name in idle]
     with _LOCK:
-        _KNOWN[model][backend, tunable] = (now, made)
+        _KNOWN[model][backend, tunable] = _Kept(model, now, made)
     return made

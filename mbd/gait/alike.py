@@ -9,7 +9,7 @@ both, wherever parameters enter a mirrored gait.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import Any
@@ -162,7 +162,7 @@ class _Places:
     order, signs : of velocities and first-order states
     """
 
-    states: list[tuple[tuple[Vector, ...], tuple[Vector, ...]]]
+    states: Sequence[tuple[tuple[Vector, ...], tuple[Vector, ...]]]
     acting: list[int]
     storing: list[int]
     watched: list[NDArray[np.intp]]
@@ -220,14 +220,11 @@ def _pairs(mechanism: Mechanism, mirror: Mirror, parameters: Vector) -> Pairs:
             found.append((np.ravel(mine[square] * both_signs), np.ravel(its)))
         for mine, its in zip(here["vectors"], there["vectors"], strict=True):
             found.append((mine[order] * signs, its))
-        watched = [
-            (mine[place], its) for place, mine, its in zip(places.watched, here["watched"], there["watched"], strict=True)
-        ]
+        pairs = zip(places.watched, here["watched"], there["watched"], strict=True)
+        watched = [(mine[place], its) for place, mine, its in pairs]
         watched[EVENTS] = [(mine[places.acting], its[places.acting]) for mine, its in watched[EVENTS]]
         found += watched
-        found += [
-            (mirror.of_v(here["impulses"][places.impulses[key]]), its) for key, its in there["impulses"].items()
-        ]
+        found += [(mirror.of_v(here["impulses"][places.impulses[key]]), its) for key, its in there["impulses"].items()]
         stored = mirror.of_anchors(here["stored"])
         found += [(stored[[k]], there["stored"][[k]]) for k in places.storing]
         found += _resets(mechanism, mirror, parameters, at, image)

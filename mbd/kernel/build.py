@@ -36,6 +36,7 @@ APART = (
     "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look", "schemes.newton.retreat",
     "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step", "stepping.restart.lower_to_step",
     "contact.cone_steps.come_to_zero", "stepping.advance.advance", "stepping.begin_run.begin_run",
+    "stepping.begin_run.judge_start",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
@@ -48,6 +49,8 @@ LISTED = contract.SCHEMES
 
 ENTRY_FUNCTION = """
 def mbd_kernel(K: Kernel) -> int:
+    if K.many == 2:
+        return judge_start(K)
     return march_many(K) if K.many == 1 else advance(K)
 """
 
@@ -120,12 +123,14 @@ def kernel_text() -> str:
 def kernel_functions() -> list[Function]:
     """The kernel as typed trees."""
     from mbd.kernel.stepping.advance import advance
+    from mbd.kernel.stepping.begin_run import judge_start
     from mbd.kernel.stepping.many_runs import march_many
     from mbd.kernel.translation.memory_check import check_memory
     from mbd.kernel.translation.translate import Source, functions_of, translate
 
     text, names = contract.dispatch()
-    hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), {**names, "advance": advance, "march_many": march_many})
+    names = {**names, "advance": advance, "march_many": march_many, "judge_start": judge_start}
+    hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), names)
     found = translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks})
     check_memory(found)
     return found

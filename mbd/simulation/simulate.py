@@ -25,6 +25,7 @@ from mbd.progress import run_bar
 from mbd.simulation.arguments import check_arguments, end_of
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run.control import reset_faults
+from mbd.simulation.run.idle import leave
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.strategy import chosen
 from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
@@ -148,6 +149,8 @@ def simulate(
         raise _failure(problem, trajectory, run.cause)
     if wrt is not None and not problem:
         _differentiate(trajectory, wrt, model, scheme)
+    if dt is not None and not problem:
+        leave(run.stepper)
     return trajectory
 
 

@@ -21,7 +21,7 @@ class Runs(SchemeAbilities):
     chunk: int = place("limits")  # steps before control returns
     chunk_of_runs: int = place("limits")  # the same, for runs that are not at their last step
     steps_left: int = place("limits")  # before Python looks whether somebody wants to interrupt
-    many: int = place("limits")  # 1: a call takes runs, one after the other
+    many: int = place("limits")  # 1: a call takes runs, one after the other; 2: it judges a start
     run: int = place("limits")  # the present one
     n_runs: int = place("limits")
     begun: int = place("limits")  # 1: it has begun

@@ -1,4 +1,4 @@
-"""How one of many runs begins: its start put into the arrays, judged as `mbd.simulation.run.begin` judges one."""
+"""How a run begins: the start in the arrays, where one of many is put first, is judged as in `simulation.run.begin`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mbd.kernel.records import Guards, Kernel, Mechanism, Switching
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.restart import fill_block, refresh_scales
 
-__all__ = ["begin_run"]
+__all__ = ["begin_run", "judge_start"]
 
 LONG_AGO = float("-inf")
 """When the last switch was, before any [s]."""
@@ -24,6 +24,14 @@ CLOSE, SLOW = 1e-8, 1e-9
 def begin_run(K: Kernel) -> int:
     """The run `K.run` from its line of starts; `DOUBTFUL_START` where it is for Python to judge."""
     put_start(K)
+    status = judge_start(K)
+    if status == 0:
+        K.begun = 1
+    return status
+
+
+def judge_start(K: Kernel) -> int:
+    """On which sides of contacts and guards the start in the arrays lies; `DOUBTFUL_START` where Python must judge."""
     for i in range(K.n_block):
         K.block[i] = 0.0
     K.block[0] = K.time
@@ -42,7 +50,6 @@ def begin_run(K: Kernel) -> int:
             return DOUBTFUL_START
         for e in range(K.n_guards):
             set_side(K, e)
-    K.begun = 1
     return 0
 
 

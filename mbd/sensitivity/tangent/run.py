@@ -49,7 +49,7 @@ class TangentStepper(Stepper):
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
-        self.straight = False
+        self.straight = self.judges_starts = False
         self.kernel.treelike = 0
         self._of: dict[str, tuple[Any, Lanes]] = {}
         self._words = np.zeros(len(PLACES), dtype=np.int64)

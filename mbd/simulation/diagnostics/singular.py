@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbd.arrays import Matrix
 from mbd.assembly.islands import islands_of_rows
 from mbd.kernel import codes
 
@@ -23,6 +24,8 @@ CLOSE = 0.1
 """How far from there something that is to happen may be to be the cause, in steps [-]."""
 SINGULAR_START = 1e-7
 """Smallest singular value of the rows at a start, over the largest, below which branches of motions cross there [-]."""
+FEW_ROWS, CLEARLY = 24, 1e3
+"""Rows whose islands are looked at only where their smallest singular value is below so many times that bound [-]."""
 MOST_ROWS = 200
 """Rows above which a start is not asked for that [-]."""
 STEP_FAILURES = frozenset(
@@ -145,6 +148,8 @@ def singular_start(run: RunData) -> list[str]:
         return []
     y = np.concatenate([start.v, start.z])
     terms = run.mechanism.acceleration_terms(start.time, start.q, y, run.first_parameters, start.anchors)
+    if _is_clearly_regular(terms, rows):
+        return []
     found = _part_left(terms, rows)
     if not found[0] < SINGULAR_START * found[2]:
         return []
@@ -166,10 +171,26 @@ def _smallest(run: RunData, ahead: float) -> tuple[float, int]:
     return _part_left(terms, v.rows[: v.n_active].tolist())[:2]
 
 
+def _scaled(terms: AccelerationTerms, rows: Sequence[int]) -> Matrix:
+    """Rows of B on columns scaled by √M_ii."""
+    mass = np.abs(np.diag(terms.M))
+    return np.asarray(terms.B[list(rows)] / np.sqrt(np.where(mass > 0.0, mass, 1.0)))
+
+
+def _is_clearly_regular(terms: AccelerationTerms, rows: Sequence[int]) -> bool:
+    """Whether few rows are so far from a singular configuration that nothing closer need be known."""
+    if not len(rows) <= min(FEW_ROWS, len(terms.M)):
+        return False
+    jacobian = _scaled(terms, rows)
+    if not np.isfinite(jacobian).all():
+        return False
+    sizes = np.linalg.svd(jacobian, compute_uv=False)
+    return bool(sizes[-1] > CLEARLY * SINGULAR_START * sizes[0])
+
+
 def _part_left(terms: AccelerationTerms, rows: Sequence[int]) -> tuple[float, int, float]:
     """Smallest singular value of rows of B on columns scaled by √M_ii, the row with most part in it; the largest."""
-    mass = np.abs(np.diag(terms.M))
-    jacobian = terms.B[list(rows)] / np.sqrt(np.where(mass > 0.0, mass, 1.0))
+    jacobian = _scaled(terms, rows)
     if not np.isfinite(jacobian).all():
         return np.inf, 0, 0.0
     least, weakest, largest = np.inf, 0, 0.0

@@ -55,6 +55,9 @@ def begin(run: RunData, start: State) -> None:
         run.begins_behind_jump = True
     v.time = v.grid_start = jump.right if run.begins_behind_jump and jump is not None else start.time
     v.last_switch = -np.inf
+    if _is_judged(run):
+        v.restart_due, v.mode_id = 1, -1
+        return
     require_consistent(run, start)
     v.restart_due, v.mode_id = 1, -1
     guards = guard_values(run)
@@ -63,6 +66,16 @@ def begin(run: RunData, start: State) -> None:
         raise ModelError(inside)
     for e in range(n_guards):
         set_side(run, e, guards)
+
+
+def _is_judged(run: RunData) -> bool:
+    """Whether compiled code finds that the start holds its rows, and notes on which sides of all guards it lies.
+
+    What it doubts, or knows nothing of, is judged here, in the same way and in words.
+    """
+    if not run.stepper.judges_starts or run.begins_behind_jump or run.mechanism.equations.facings:
+        return False
+    return run.stepper.judge_start() == 0
 
 
 def require_consistent(run: RunData, start: State) -> None:

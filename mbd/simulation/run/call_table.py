@@ -45,6 +45,10 @@ class CallTable:
         self.address = self._words.ctypes.data
         self.fill(functions, kernel)
 
+    def forget_code(self) -> None:
+        """Ask for the addresses of all functions once more, which may be others."""
+        self._code = np.zeros(0, dtype=np.int64)
+
     def fill(self, functions: Sequence[Any], kernel: Kernel) -> None:
         """Bring the table up to what the next call needs."""
         values = vars(kernel)

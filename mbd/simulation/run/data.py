@@ -22,6 +22,7 @@ from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.run.boundaries import WINDOW, Boundaries
 from mbd.simulation.run.event_log import EventLog
+from mbd.simulation.run.idle import stepper_of
 from mbd.simulation.run.stepper import Stepper
 from mbd.simulation.run.whole_turns import TurnCounter
 from mbd.state import State
@@ -128,7 +129,7 @@ class RunData:
         parameters = self._parameters()
         self.first_parameters = parameters.copy()
         compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
-        self.stepper = self.stepper_kind(mechanism, manager, integrator, parameters, dt, compiled_options)
+        self.stepper = stepper_of(self.stepper_kind, mechanism, manager, integrator, parameters, dt, compiled_options)
         self.kernel = self.stepper.kernel
         self.kernel.chunk = _steps_at_once(self.stepper)
         width, capacity = self.kernel.width, self.kernel.capacity

@@ -31,6 +31,8 @@ LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
 """Coefficient of a row below which another does not depend on it [-]."""
+SMALL = 1 << 16
+"""Numbers in the arrays of a run up to which they are kept for another one [-]."""
 SUBSTEPS = 4
 """Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
 
@@ -55,6 +57,29 @@ def follows(equations: Equations) -> int:
     return 2 if any(contact.opens_on == "when" for contact in rubbing) else 0
 
 
+class Fresh:
+    """The record and the arrays of a stepper before a run, of which only numbers other than 0 are kept.
+
+    is_small : whether the arrays are short enough to be worth it
+    """
+
+    def __init__(self, kernel: Kernel, rooms: list[Any]) -> None:
+        self.is_small = sum(map(len, rooms)) <= SMALL
+        if self.is_small:
+            self._values = dict(vars(kernel))
+            self._places = [np.flatnonzero(room) for room in rooms]
+            self._numbers = [room[places] for room, places in zip(rooms, self._places, strict=True)]
+
+    def restore(self, kernel: Kernel, rooms: list[Any]) -> None:
+        """Put everything back."""
+        values = vars(kernel)
+        values.clear()
+        values.update(self._values)
+        for room, places, numbers in zip(rooms, self._places, self._numbers, strict=True):
+            room[:] = 0
+            room[places] = numbers
+
+
 class Stepper:
     """One run's numbers: everything the kernel reads and writes.
 
@@ -72,8 +97,10 @@ class Stepper:
         options: dict[str, Any],
     ) -> None:
         self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
+        self.key: Any = None  # of runs that may have it after this one
         self.compiled = is_compiled(mechanism, integrator)
         self.straight = self.compiled  # with straight-line code for factors, which machine code alone is worth
+        self.judges_starts = self.compiled
         self.own = own_scheme(integrator)
         self.stabilized = integrator.stabilized
         layout = mechanism.layout
@@ -96,11 +123,31 @@ class Stepper:
         self.kernel.treelike = int(self.functions[-1] is not None)
         self.kernel.code = self.functions
         self.modes: list[Any] = []
+        self._n_of_modes = 0  # functions of these
         self.dependent: dict[int, tuple[int, ...]] = {}
         self._table: CallTable | None = None
         self._provisional = False  # whether addresses in the table may have changed
         self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
+        self._fresh = Fresh(self.kernel, self.shelves.rooms) if self.compiled else None
         assert layout.n == self.kernel.n
+
+    @property
+    def reusable(self) -> bool:
+        """Whether its arrays can be made as they were, for another run, in less time than new ones take."""
+        return self._fresh is not None and self._fresh.is_small
+
+    def begin_again(self, parameters: Vector, end: float) -> None:
+        """Make everything as it was before the run that is over, but for parameters and the end of the next one."""
+        assert self._fresh is not None
+        v = self.kernel
+        self._fresh.restore(v, self.shelves.rooms)
+        del self.functions[len(self.functions) - self._n_of_modes :]
+        self._n_of_modes, self.modes, self.dependent = 0, [], {}
+        v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
+        self.system.parameters, v.end, self.resumed_at = v.params, end, float("nan")
+        if self._table is not None:
+            self._table.forget_code()
+            self._provisional = self.provisional
 
     def _sizes(self, dt: float, options: dict[str, Any]) -> Kernel:
         layout = self.mechanism.layout
@@ -194,6 +241,7 @@ class Stepper:
             v.mode_order[count] = len(v.orders)
             v.orders = np.concatenate([v.orders, code.order])
         self.functions += known
+        self._n_of_modes += len(known)
         self.modes.append(code)
         dependence = v.dependence.reshape(v.n_rows, -1) if v.n_rows else v.dependence
         for row in range(v.n_rows):
@@ -223,6 +271,14 @@ class Stepper:
         self.kernel.many = 1
         try:
             return self._called()
+        finally:
+            self.kernel.many = 0
+
+    def judge_start(self) -> int:
+        """Judge the start in the arrays, in compiled code: see `mbd.kernel.stepping.begin_run.judge_start`."""
+        self.kernel.many, self.kernel.n_block = 2, self.mechanism.layout.size
+        try:
+            return self._advance_compiled()
         finally:
             self.kernel.many = 0
 

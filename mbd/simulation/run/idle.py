@@ -1,0 +1,69 @@
+"""Steppers that runs have left: arrays, tables and addresses that stand already for the next run of the same kind."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.integrators.base import Integrator
+from mbd.integrators.stepping import own_scheme
+from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.kernel.schemes.contract import NO_SCHEME
+from mbd.simulation.run.stepper import Stepper
+
+__all__ = ["leave", "stepper_of"]
+
+KEPT = 8
+"""Steppers of a mechanism that are kept at most [-]."""
+
+
+def stepper_of(
+    kind: type[Stepper],
+    mechanism: Mechanism,
+    manager: ActiveSetManager,
+    integrator: Integrator,
+    parameters: Vector,
+    dt: float,
+    options: dict[str, Any],
+) -> Stepper:
+    """A stepper for a run, as if it were new: one that an earlier run of this kind has left, where there is one."""
+    key = _key(kind, manager, integrator, dt, options)
+    found: Stepper | None = None if key is None else _idle(mechanism).pop(key, None)
+    if found is None:
+        found = kind(mechanism, manager, integrator, parameters, dt, options)
+        found.key = key
+    else:
+        found.manager, found.integrator = manager, integrator
+        found.begin_again(parameters, float(options.get("end", 0.0)))
+    return found
+
+
+def leave(stepper: Stepper) -> None:
+    """Keep the stepper of a run that is over, of whose arrays nobody holds a part any more."""
+    if stepper.key is None or not stepper.reusable:
+        return
+    idle = _idle(stepper.mechanism)
+    if len(idle) >= KEPT:
+        idle.clear()
+    idle[stepper.key] = stepper
+
+
+def _idle(mechanism: Mechanism) -> dict[Hashable, Stepper]:
+    return mechanism.idle
+
+
+def _key(
+    kind: type[Stepper], manager: ActiveSetManager, integrator: Integrator, dt: float, options: Mapping[str, Any]
+) -> Hashable:
+    """What the arrays of a stepper and its numbers depend on, besides the mechanism; None where that cannot be told."""
+    if own_scheme(integrator) is NO_SCHEME:
+        return None
+    own = tuple((name, value) for name, value in sorted(options.items()) if name != "end")
+    key = (kind, integrator, *sorted(integrator.numbers().items()), manager.trivial, dt, *own)
+    try:
+        hash(key)
+    except TypeError:
+        return None
+    return key

@@ -1,0 +1,100 @@
+"""A run that takes the arrays of an earlier one of its kind is, to the bit, the run that has new ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings, strategies as st
+
+import mbd
+from mbd.compile.mechanisms import mechanism_of
+from mbd.simulation.run.begin import guard_values, require_consistent, set_side
+from mbd.simulation.simulate import REST_SPEED, laid_out
+from mbd.testing.mechanisms import random_scene
+from tests.comparisons import at_least, compared
+from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start
+
+SCHEMES = (mbd.HHT(alpha=0.05), mbd.RungeKutta853(), mbd.RadauIIA())
+OPTIONS = {
+    "contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": REST_SPEED, "backend": "auto",
+}  # fmt: skip
+TOLD = ("steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts", "modes")
+
+
+def assert_same(one: mbd.Trajectory, other: mbd.Trajectory) -> None:
+    """All rows, events, counts and notes, and what the ends remember."""
+    for name in ("time", "q", "v", "z", "a", "lam", "closed", "phase"):
+        np.testing.assert_array_equal(getattr(one.record, name), getattr(other.record, name), err_msg=name)
+    assert [repr(event) for event in one.events] == [repr(event) for event in other.events]
+    assert {name: one.stats[name] for name in TOLD} == {name: other.stats[name] for name in TOLD}
+    assert (one.message, one.stats["notes"]) == (other.message, other.stats["notes"])
+    assert one.final.memory.seal == other.final.memory.seal
+
+
+@at_least(10)
+@settings(max_examples=12)
+@given(seed=st.integers(0, 300), scheme=st.sampled_from(SCHEMES), contact=st.sampled_from(["events", "nonsmooth"]))
+def test_a_run_after_others_is_the_same(seed, scheme, contact):
+    model, rng = random_scene(seed, bodies=2), np.random.default_rng(seed)
+    if not isinstance(scheme, mbd.HHT):
+        contact = "auto"
+    base = mbd.assemble(model)
+    starts = [mbd.assemble(model, velocity={n: rng.uniform(-1, 1) for n in base.velocity_names}) for _ in range(2)]
+
+    def run(start):
+        return mbd.simulate(model, start, scheme, dt=0.01, until=0.4, contact=contact, on_failure="return")
+
+    new = run(starts[0])
+    other = run(starts[1])
+    again = run(starts[0])  # in the arrays of the last one
+    if new.success and other.success:
+        compared()
+    if new.success:
+        assert_same(new, again)
+
+
+def test_arrays_are_taken_and_given_back():
+    model = kneed_walker()
+    start, idle = kneed_walker_start(model), mechanism_of(model).idle
+    mbd.simulate(model, start, dt=1e-3, until=0.01)
+    (left,) = idle.values()
+    mbd.simulate(model, start, dt=1e-3, until=0.01)
+    assert list(idle.values()) == [left]
+    mbd.simulate(model, start, dt=1e-3, until=0.01, parameters={"hip.mass": 0.6})
+    mbd.simulate(model, start, dt=2e-3, until=0.01)  # of another kind
+    assert left in idle.values() and len(idle) == 2
+
+
+def test_a_run_within_a_run_has_arrays_of_its_own():
+    """An observer, a controller or a reset may simulate the same model while a run is under way."""
+    model = ball()
+    start, inner = mbd.assemble(model, position={"fall.displacement": 1.0}), []
+
+    def observer(time: float, state: mbd.State) -> None:
+        if len(inner) < 3:
+            inner.append(mbd.simulate(model, start, dt=1e-3, until=0.6))
+
+    outer = mbd.simulate(model, start, dt=1e-3, until=0.6, observers=[observer])
+    assert_same(outer, mbd.simulate(model, start, dt=1e-3, until=0.6))
+    assert inner
+    for each in inner:
+        assert_same(each, outer)
+
+
+@at_least(10)
+@settings(max_examples=12)
+@given(seed=st.integers(0, 300))
+def test_compiled_code_judges_starts_as_python_does(seed):
+    """Sides of guards and contacts that touch; a start that breaks rows is left to Python, which names them."""
+    model, rng = random_scene(seed, bodies=2), np.random.default_rng(seed)
+    base = mbd.assemble(model)
+    start = mbd.assemble(model, velocity={n: rng.uniform(-1, 1) for n in base.velocity_names})
+    run = laid_out(model, start, mbd.HHT(), 0.01, 0.1, {}, OPTIONS).at_start()
+    v = run.kernel
+    touched, sides = v.touched[: v.n_contacts].copy(), v.side[: v.n_guards].copy()
+    compared()
+    require_consistent(run, start)
+    guards = guard_values(run)
+    for e in range(v.n_guards):
+        set_side(run, e, guards)
+    np.testing.assert_array_equal(v.side[: v.n_guards], sides)
+    assert set(touched) <= {0, 1}
