@@ -15,7 +15,7 @@ PACKAGE = Path(mbd.__file__).parent
 
 RANKS = [
     ("errors", "later", "arguments", "arrays", "state", "free_memory", "notebook", "notes", "progress"),
-    ("tape",),
+    ("tape", "trees"),
     ("bodies",),
     ("scope",),
     ("joints",),

@@ -27,7 +27,7 @@ from mbd.tape.node import Node, Tape
 
 __all__ = ["fingerprint", "source_digest"]
 
-SOURCES = ("arrays.py", "configuration.py", "scope.py", "bodies", "compile", "equations", "joints", "tape")
+SOURCES = ("arrays.py", "configuration.py", "scope.py", "bodies", "compile", "equations", "joints", "tape", "trees")
 """Of the package: what programs are made by. Joints say how their coordinates compose, bodies have the algebra."""
 
 FIELDS = (

@@ -25,7 +25,6 @@ all levels give the same bits, it does not matter to any result when that happen
 from __future__ import annotations
 
 import ctypes
-import re
 import sys
 import time
 import weakref
@@ -45,9 +44,8 @@ from mbd.compile.cache import ObjectCache, default_cache, key_of
 from mbd.compile.forking import COMPILING
 from mbd.compile.functions import ByName
 from mbd.compile.host import host
-from mbd.compile.ir import LIBRARY, module
+from mbd.compile.ir import LIBRARY, Module
 from mbd.compile.layout import Layout
-from mbd.compile.pieces import pieces
 from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
@@ -272,16 +270,15 @@ class Library(ByName[MachineFunction]):
     def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False) -> None:
         """Compile, or fetch from the cache, one function per name and list of outputs; `rarely` called: at level 0."""
         for name in programs:
-            if not re.fullmatch(r"[A-Za-z_][\w.]*", name, re.ASCII):
-                raise ModelError(f"a compiled function cannot be called {name!r}; use letters, digits, '_' and '.'")
             if name in self._functions:
                 raise ModelError(f"this library already has a function {name!r}; give every function its own name")
         begin = time.perf_counter()
         final = 0 if rarely else self.level
-        text = module(programs, self.layout, host().fused, **CUTS.get(final, {}))
+        module = Module(programs, self.layout, host().fused, **CUTS.get(final, {}))
+        text = module.text()
         written = time.perf_counter()
-        large = not rarely and self.hasty is not None and text.count("\n") > self.hasty
-        texts = pieces(text) if large else [text]
+        large = not rarely and self.hasty is not None and module.lines > self.hasty
+        texts = module.pieces() if large else [text]
         keys = tuple(tag_key(_tag(text, final)) for text in texts)
         known = [self.cache.load(key) for key in keys]
         hasty = large and None in known

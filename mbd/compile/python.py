@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -18,10 +17,9 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.layout import Layout
-from mbd.compile.statements import Dialect, arguments, statements
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.derivatives import live
-from mbd.tape.node import Node, Table, Tape
+from mbd.tape.node import CONDITIONS, Node, Table, Tape
 
 __all__ = ["ArrayFunction", "ScalarFunction", "array_function", "scalar_function"]
 
@@ -101,26 +99,72 @@ def _literal(value: float) -> str:
 # one state ------------------------------------------------------------------------------------------------------
 
 
-_SCALAR = Dialect(
-    operations=SCALAR,
-    literal=_literal,
-    number="    {} = {}",
-    condition="    {} = {}",
-    block="b[{}]",
-    parameter="p[{}]",
-    piece=(
-        "    k{k} = piece(parameters, {start}, {n}, {x})",
-        "    s{k} = {x} - float(parameters[{start} + k{k}])",
-        "    c{k} = parameters[{rows} + 4 * k{k} : {rows} + 4 * k{k} + 4].tolist()",
-    ),
-)
-
-_SCALAR_SAFE = replace(_SCALAR, operations=SCALAR | {"div": "divide({}, {})"})
+_CAREFUL = SCALAR | {"div": "divide({}, {})"}
 
 
-def scalar_source(outputs: Sequence[Node], layout: Layout, dialect: Dialect = _SCALAR) -> str:
-    """Source of ``function(block, parameters, out)``."""
-    lines, results = statements(outputs, layout, dialect)
+def _cubic(row: str, s: str, order: int) -> str:
+    """The order-th derivative of ``Σ_k row_k s^k`` (Horner)."""
+    text = "0.0" if order == 3 else ""  # so that a NaN comes out again
+    for power in range(3, order - 1, -1):
+        factor = math.perm(power, order)
+        c = f"{row}[{power}]" if factor == 1 else f"{factor}.0 * {row}[{power}]"
+        text = f"({text}) * {s} + {c}" if text else c
+    return text
+
+
+def _arguments(node: Node, name: Callable[[Node], str], as_number: str = "{}") -> list[str]:
+    """Texts of a node's arguments, numbers turned into conditions and back where the operation wants the other."""
+    conditions = 1 if node.op == "where" else len(node.args) if node.op in ("and", "or", "not") else 0
+    texts = []
+    for k, arg in enumerate(node.args):
+        text = name(arg)
+        if k < conditions and arg.op not in CONDITIONS:
+            text = f"({text} != 0.0)"
+        elif k >= conditions and arg.op in CONDITIONS:
+            text = as_number.format(text)
+        texts.append(text)
+    return texts
+
+
+def scalar_source(outputs: Sequence[Node], layout: Layout, operations: Mapping[str, str] = SCALAR) -> str:
+    """Source of ``function(block, parameters, out)``: an assignment for each operation, in the order of the tape."""
+    names: dict[int, str] = {}
+    pieces: dict[tuple[int, int], int] = {}
+    lines: list[str] = []
+
+    def name(node: Node) -> str:
+        text = names.get(node.index)
+        if text is None:  # a constant, or an input that is asked for the first time
+            if node.op == "const":
+                text = _literal(node.data)
+            else:
+                kind, index = node.data
+                text = f"v{node.index}"
+                lines.append(f"    {text} = {f'p[{index}]' if kind == 'p' else f'b[{layout.place(kind, index)}]'}")
+            names[node.index] = text
+        return text
+
+    for node in live(outputs):
+        if not node.args:
+            continue
+        if node.op == "table":
+            table, order = node.data
+            start, n, x = layout.table_offsets[table.index], len(table.breaks), name(node.args[0])
+            k = pieces.get((table.index, node.args[0].index))
+            if k is None:
+                k = pieces[table.index, node.args[0].index] = len(pieces)
+                row = f"{start + n} + 4 * k{k}"
+                lines += (
+                    f"    k{k} = piece(parameters, {start}, {n}, {x})",
+                    f"    s{k} = {x} - float(parameters[{start} + k{k}])",
+                    f"    c{k} = parameters[{row} : {row} + 4].tolist()",
+                )
+            text = _cubic(f"c{k}", f"s{k}", order)
+        else:
+            text = operations.get(node.op, f"{node.op}({{}})").format(*_arguments(node, name))
+        lines.append(f"    v{node.index} = {text}")
+        names[node.index] = f"v{node.index}"
+    results = [name(node) for node in outputs]
     return "\n".join(
         (
             "def function(block, parameters, out):",
@@ -148,7 +192,7 @@ class ScalarFunction:
             self._plain(block, parameters, out)
         except (ZeroDivisionError, OverflowError, ValueError):
             if self._safe is None:
-                source = scalar_source(self._outputs, self._layout, _SCALAR_SAFE)
+                source = scalar_source(self._outputs, self._layout, _CAREFUL)
                 self._safe = _execute(source, _SAFE, self.name)
             self._safe(block, parameters, out)
 
@@ -214,7 +258,7 @@ def array_source(outputs: Sequence[Node]) -> tuple[str, dict[str, int], dict[str
             text = f"lookup(*T{table.index}, {node.data[1]}, {names[node.args[0].index]})"
         else:
             text = ARRAYS.get(node.op, f"{node.op}({{}})").format(
-                *arguments(node, lambda arg: names[arg.index], "({} + 0.0)")
+                *_arguments(node, lambda arg: names[arg.index], "({} + 0.0)")
             )
         for arg in node.args:
             uses[arg.index] -= 1

@@ -19,9 +19,17 @@ from mbd.kernel.schemes import contract
 
 if TYPE_CHECKING:  # the trees of the kernel's functions are made only where it is built
     from mbd.compile.host import Host
-    from mbd.kernel.translation.tree import Function
+    from mbd.trees.tree import Function
 
-__all__ = ["compiled", "kernel_functions", "kernel_object", "kernel_text", "object_of", "source_digest"]
+__all__ = [
+    "compiled",
+    "kernel_c_source",
+    "kernel_functions",
+    "kernel_object",
+    "kernel_text",
+    "object_of",
+    "source_digest",
+]
 
 ENTRY = "mbd_kernel"
 
@@ -56,9 +64,10 @@ def mbd_kernel(K: Kernel) -> int:
 
 
 def source_digest() -> str:
-    """Hash of everything the kernel is made from: this folder, and schemes from elsewhere with what they import."""
+    """Hash of what the kernel is made from: this folder, its printers, schemes from elsewhere and what they import."""
     folder, digest = Path(__file__).parent, hashlib.sha256(repr(contract.SCHEMES).encode())  # the order is the number
-    for path in sorted({*folder.rglob("*.py"), *_beside(contract.SCHEMES)}):
+    trees = (folder.parent / "trees").glob("*.py")
+    for path in sorted({*folder.rglob("*.py"), *trees, *_beside(contract.SCHEMES)}):
         name = path.relative_to(folder) if path.is_relative_to(folder) else path.name
         digest.update(f"{name}\n".encode() + path.read_bytes())
     return digest.hexdigest()
@@ -118,6 +127,14 @@ def kernel_text() -> str:
     from mbd.kernel.translation.llvm import llvm_text
 
     return llvm_text(kernel_functions(), ENTRY)
+
+
+def kernel_c_source() -> str:
+    """The kernel as a C99 file with the function ``int64_t mbd_kernel(int64_t *table)`` (see `mbd.trees.c`)."""
+    from mbd.kernel.translation.llvm import PLACES
+    from mbd.trees.c import HEAD, c_text
+
+    return f"{HEAD}\n{c_text(kernel_functions(), ENTRY, PLACES)}"
 
 
 def kernel_functions() -> list[Function]:

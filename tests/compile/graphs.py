@@ -14,15 +14,15 @@ import numpy as np
 from hypothesis import strategies as st
 
 from mbd.arrays import Vector
+from mbd.compile.c import c_source
 from mbd.compile.host import host
-from mbd.compile.ir import module
+from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Machine, call, emit_object
 from mbd.errors import TraceError
 from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Tape
 from mbd.tape.operations import value
-from tests.compile.c_source import source
 
 __all__ = ["COMPILER", "Graph", "against", "by_c", "by_llvm", "close", "graphs", "inputs_of", "run"]
 
@@ -163,7 +163,7 @@ def by_llvm(
     programs: Mapping[str, Sequence[Node]], layout: Layout = LAYOUT, level: int = 1, **options: int
 ) -> dict[str, Call]:
     """Machine code without any cache."""
-    text = module(programs, layout, host().fused, **options)
+    text = Module(programs, layout, **{"fused": host().fused} | options).text()
     machine = Machine()
     addresses = machine.load(emit_object(text, level), [f"mbd.{name}" for name in programs])
 
@@ -177,11 +177,13 @@ def by_llvm(
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 
-def by_c(programs: Mapping[str, Sequence[Node]], folder: Path, layout: Layout = LAYOUT) -> dict[str, Call]:
-    """The C export, compiled by the system's C compiler."""
+def by_c(
+    programs: Mapping[str, Sequence[Node]], folder: Path, layout: Layout = LAYOUT, **options: int
+) -> dict[str, Call]:
+    """C text, compiled by the system's C compiler."""
     assert COMPILER is not None
-    (folder / "graph.c").write_text(source(programs, layout))
-    flags = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Werror", "-Wno-unused-variable", "-shared", "-fPIC"]
+    (folder / "graph.c").write_text(c_source(programs, layout, **options))
+    flags = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Werror", "-Wno-unused", "-shared", "-fPIC"]
     subprocess.run([COMPILER, *flags, "graph.c", "-o", "graph.so", "-lm"], cwd=folder, check=True, timeout=300)
     library = ctypes.CDLL(str(folder / "graph.so"))
-    return {name: call(ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0) for name in programs}
+    return {name: call(ctypes.cast(getattr(library, f"mbd_{name}"), ctypes.c_void_p).value or 0) for name in programs}

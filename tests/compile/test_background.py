@@ -18,9 +18,8 @@ import mbd
 from mbd.compile import backend, background, llvm, mechanisms
 from mbd.compile.cache import ObjectCache
 from mbd.compile.host import host
-from mbd.compile.ir import module
+from mbd.compile.ir import Module
 from mbd.compile.llvm import Library, Machine, call, emit_object
-from mbd.compile.pieces import pieces
 from mbd.kernel.entry import entry
 from mbd.simulation.run.stepper import Stepper
 from tests.compile.chains import chain
@@ -61,7 +60,7 @@ def do(jobs):
 @settings(max_examples=25)
 def test_pieces_together_give_the_same_bits(graph):
     whole = run(by_llvm({"f": graph.outputs})["f"], graph)
-    texts = pieces(module({"f": graph.outputs}, graph.layout, host().fused, large=0, part=7), 20)
+    texts = Module({"f": graph.outputs}, graph.layout, host().fused, large=0, part=7).pieces(20)
     for text in texts:
         binding.parse_assembly(text).verify()
     machine = Machine()
@@ -72,12 +71,13 @@ def test_pieces_together_give_the_same_bits(graph):
 
 def test_large_texts_are_cut_and_every_function_is_in_one_piece():
     programs = {"r": LINKS.outputs, "energy": [LINKS.energy]}
-    text = module(programs, LINKS.layout)
-    texts = pieces(text)
+    module = Module(programs, LINKS.layout)
+    text = module.text()
+    texts = module.pieces()
     assert len(texts) > 3 and max(len(piece) for piece in texts) < len(text) / 2
     for name in programs:
         assert sum(f"define void @mbd.{name}(" in piece for piece in texts) == 1
-    assert pieces(text, 10**6) == [text]
+    assert module.pieces(10**6) == [text]
 
 
 # functions --------------------------------------------------------------------------------------------------------

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 
 from mbd.compile.cache import ObjectCache
 from mbd.compile.host import host
-from mbd.compile.instructions import MANY_ZEROS
-from mbd.compile.ir import LARGE, module
+from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Library, call, emit_object, load_object
+from mbd.compile.lowering import LARGE, MANY_ZEROS
 from mbd.errors import ModelError, UnknownNameError
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape
@@ -47,8 +47,8 @@ def test_a_function_cut_into_parts_gives_the_same_bits(graph):
 
 def test_big_functions_are_cut_and_small_ones_are_not():
     small, big = chain(3), chain(10)
-    assert "@mbd.r.1" not in module({"r": small.outputs}, small.layout)
-    text = module({"r": big.outputs}, big.layout)
+    assert "@mbd.r.1" not in Module({"r": small.outputs}, small.layout).text()
+    text = Module({"r": big.outputs}, big.layout).text()
     assert "@mbd.r.1(" in text
     whole = by_llvm({"r": big.outputs}, big.layout, large=10 * LARGE)["r"]
     cut = by_llvm({"r": big.outputs}, big.layout)["r"]
@@ -72,11 +72,11 @@ def test_zeros_side_by_side_are_all_written_and_nothing_else_is(between, level):
 
 def test_sines_and_cosines_of_four_angles_are_one_call():
     links = chain(4)
-    text = module({"r": links.outputs}, links.layout)
+    text = Module({"r": links.outputs}, links.layout).text()
     assert text.count("call fastcc") == 1
     tape = Tape()
     x = tape.input("q", 0)
-    text = module({"f": [sin(x), cos(x), sin(cos(x))]}, Layout(1, 1, 0, 0, 0, 0, 0))
+    text = Module({"f": [sin(x), cos(x), sin(cos(x))]}, Layout(1, 1, 0, 0, 0, 0, 0)).text()
     assert text.count("call fastcc") == 2  # the second needs the first
 
 
@@ -84,14 +84,14 @@ def test_sines_and_cosines_of_four_angles_are_one_call():
 @settings(max_examples=15)
 def test_the_text_is_valid_whatever_the_graph(graph):
     for fused in (False, True):
-        llvm.parse_assembly(module({"f": graph.outputs}, graph.layout, fused, large=0, part=9)).verify()
+        llvm.parse_assembly(Module({"f": graph.outputs}, graph.layout, fused, large=0, part=9).text()).verify()
 
 
 def test_the_same_program_has_the_same_text_and_the_same_bytes():
     first, second = chain(3), chain(3)
     other = Tape()
     other.input("lam", 0) * other.input("lam", 1)  # an index further than usual
-    texts = [module({"r": links.outputs}, links.layout) for links in (first, second)]
+    texts = [Module({"r": links.outputs}, links.layout).text() for links in (first, second)]
     assert texts[0] == texts[1]
     assert emit_object(texts[0]) == emit_object(texts[1])
 
@@ -101,7 +101,7 @@ def test_what_else_the_tape_holds_does_not_change_the_text():
 
     def text(tape):
         x, y = tape.input("q", 0), tape.input("q", 1)
-        return module({"f": [sin(x) * y + cos(x)]}, layout)
+        return Module({"f": [sin(x) * y + cos(x)]}, layout).text()
 
     used = Tape()
     _ = used.input("t") * used.input("v", 1)

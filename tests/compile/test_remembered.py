@@ -12,7 +12,7 @@ import mbd
 from mbd.compile import backend, llvm, mechanism
 from mbd.compile.cache import ObjectCache
 from mbd.compile.fingerprint import fingerprint
-from mbd.compile.ir import module
+from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.compile.mechanism import Mechanism
 from mbd.equations import programs
@@ -63,7 +63,7 @@ def texts(equations):
         mode = (list(rows), (), stabilized, range(len(equations.frictions)), ())
         made |= {f"tangent {stabilized}": programs.newton(equations, *mode)}
         made |= {f"residual {stabilized}": programs.residual(equations, *mode)}
-    return module({name.replace(" ", "_"): nodes for name, nodes in made.items()}, layout)
+    return Module({name.replace(" ", "_"): nodes for name, nodes in made.items()}, layout).text()
 
 
 def made(model, cache, modes=2):

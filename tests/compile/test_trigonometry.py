@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from mbd.compile.host import host
-from mbd.compile.ir import module
+from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Machine, call, emit_object
-from mbd.compile.trigonometry import HALF_PI, LIMIT, WIDTHS
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape
+from mbd.trees.trigonometry import HALF_PI, LIMIT, WIDTHS
 
 mp = mpmath.MPContext()
 mp.prec = 240
@@ -28,7 +28,7 @@ def sines_and_cosines(width, fused):
     tape = Tape()
     angles = [tape.input("q", k) for k in range(width)]
     layout = Layout(width, width, 0, 0, 0, 0, 0)
-    text = module({"f": [f(angle) for angle in angles for f in (sin, cos)]}, layout, fused)
+    text = Module({"f": [f(angle) for angle in angles for f in (sin, cos)]}, layout, fused).text()
     machine = Machine()
     run = call(machine.load(emit_object(text, 1), ["mbd.f"])[0])
 

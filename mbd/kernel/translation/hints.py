@@ -7,13 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mbd.errors import nearest
+from mbd.trees.tree import kind_of
 
-__all__ = ["called", "expected", "kind_of", "no_function", "no_value", "shown", "statement", "unknown_field"]
-
-KINDS = {
-    "bool": "a bool", "int": "an int", "real": "a float", "ints": "an array of ints", "reals": "an array of floats",
-    "kernel": "a record of the kernel", "none": "nothing",
-}  # fmt: skip
+__all__ = ["called", "expected", "no_function", "no_value", "shown", "statement", "unknown_field"]
 
 STATEMENTS = "an assignment, a call, if, while, for … in range(…), break, continue, pass or return"
 
@@ -43,11 +39,6 @@ CALLS = {
     "enumerate": "for i in range(…)",
     "dot": "a loop that adds up",
 }
-
-
-def kind_of(kind: str) -> str:
-    """A kind of value in words."""
-    return KINDS.get(kind, repr(kind))
 
 
 def instead(node: ast.AST) -> str:

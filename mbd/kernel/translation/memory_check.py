@@ -9,7 +9,7 @@ from typing import Any
 from mbd.errors import CapabilityError
 from mbd.kernel.records import TABLE, Kernel
 from mbd.kernel.schemes import contract
-from mbd.kernel.translation.tree import Call, Field, Function
+from mbd.trees.tree import Call, Field, Function
 
 __all__ = ["check_memory"]
 

@@ -1,4 +1,4 @@
-"""Functions of the kernel's Python → typed trees (`mbd.kernel.translation.tree`).
+"""Functions of the kernel's Python → typed trees (`mbd.trees.tree`).
 
 The kernel uses little of Python: numbers, flat arrays, fields of its records, ``if``, ``while``, ``for … in range``,
 slices that are filled with a number or copied, calls of its own functions by position. A name means what it means in
@@ -19,8 +19,9 @@ from typing import Any
 
 from mbd.errors import CapabilityError
 from mbd.kernel.records import TABLE
-from mbd.kernel.translation import hints, tree
+from mbd.kernel.translation import hints
 from mbd.kernel.translation.shorthand import each, formula_of
+from mbd.trees import tree
 
 __all__ = ["Misread", "Source", "functions_of", "source_of", "translate"]
 
@@ -262,7 +263,7 @@ class _Body:
             raise CapabilityError(hints.expected("an element of an array", node))
         base = self.value(node.value)
         if base.kind not in ("ints", "reals"):
-            raise CapabilityError(f"expected an array, got {ast.unparse(node.value)!r}, {hints.kind_of(base.kind)}")
+            raise CapabilityError(f"expected an array, got {ast.unparse(node.value)!r}, {tree.kind_of(base.kind)}")
         own = base.kind[:-1]
         return tree.Element(base, self.value(node.slice), own, base.name if isinstance(base, tree.Field) else own)
 
@@ -279,7 +280,7 @@ class _Body:
             return _power(left, right)
         kind = "real" if sign == "/" else tree.joined(tree.joined(left.kind, right.kind), "int")
         if not sign or (sign == "//" and kind != "int"):
-            came = f"{type(operator).__name__} of {hints.kind_of(kind)}"
+            came = f"{type(operator).__name__} of {tree.kind_of(kind)}"
             raise CapabilityError(f"expected + − * / ** of numbers, // and % of ints, got {came}")
         return tree.Operation(sign, left, right, kind)
 
@@ -299,7 +300,7 @@ class _Body:
             kind = tree.joined(last.kind, right.kind)
             if not sign or kind not in ("bool", "int", "real"):
                 raise CapabilityError(
-                    f"expected < <= > >= == != of numbers, got {type(operator).__name__} of {hints.kind_of(kind)}"
+                    f"expected < <= > >= == != of numbers, got {type(operator).__name__} of {tree.kind_of(kind)}"
                 )
             rest.append((sign, right))
             last = right
@@ -351,7 +352,7 @@ def _converts(kind: str, needed: str) -> None:
     """Whether a value of one kind may stand where another is needed."""
     numbers = ("bool", "int", "real")
     if kind != needed and (kind not in numbers or needed not in numbers):
-        raise CapabilityError(f"expected {hints.kind_of(needed)}, got {hints.kind_of(kind)}")
+        raise CapabilityError(f"expected {tree.kind_of(needed)}, got {tree.kind_of(kind)}")
 
 
 def _number(value: object) -> tree.Number:

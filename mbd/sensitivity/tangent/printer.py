@@ -1,4 +1,4 @@
-"""Typed trees of the kernel (`mbd.kernel.translation.tree`) → LLVM IR in which every real carries its derivatives.
+"""Typed trees of the kernel (`mbd.trees.tree`) → LLVM IR in which every real carries its derivatives.
 
 A real is a value and a vector of `LANES` derivatives, one for each direction; an array of reals is two addresses, the
 array and one with a vector for each of its numbers; the kernel is two tables, whose fields have the same places. Rules
@@ -16,8 +16,8 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 
 from mbd.kernel.records import TABLE
-from mbd.kernel.translation import tree
 from mbd.kernel.translation.llvm import HEAD, LLVM, TAGS, Body, Value, tags
+from mbd.trees import tree
 
 __all__ = ["LANES", "tangent_text"]
 
@@ -274,11 +274,10 @@ class TangentBody(Body):
             return value
         return Dual(value, self.emit(f"load {VECTOR}, ptr {of(place)}, align 8, !tbaa !{TAGS[node.what]}"))
 
-    def operation(self, operator: str, left: Value, right: Value, kind: str) -> str:
+    def operation(self, operator: str, a: str, b: str, kind: str) -> str:
+        value = super().operation(operator, a, b, kind)
         if kind != "real":
-            return super().operation(operator, left, right, kind)
-        a, b = self.cast(left, kind), self.cast(right, kind)
-        value = super().operation(operator, (a, kind), (b, kind), kind)
+            return value
         of_a, of_b = of(a), of(b)
         if operator in "+-":
             return self.dual(value, self.sum(of_a, of_b, "fadd" if operator == "+" else "fsub"))

@@ -1,4 +1,6 @@
-"""Functions of the kernel as typed trees: what stands between Python and any target (see `translation.translate`).
+"""Functions of the kernel as typed trees: what stands between Python and any target.
+
+`kernel.translation.translate` makes them, `trees.llvm` and `trees.c` print them.
 
 Kinds of values: 'bool', 'int' (64 bits), 'real' (double), 'ints' and 'reals' (addresses of arrays), 'kernel' (of the
 table of fields), 'none'. An operation, a comparison, a choice and an extreme convert their operands to the kind that
@@ -14,15 +16,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from mbd.errors import CapabilityError
-from mbd.kernel.translation.hints import kind_of
 
 __all__ = [
     "NUMBERS", "Assign", "Break", "Call", "Choice", "Compare", "Continue", "Convert", "Do", "Element", "Evaluate",
     "Expression", "Extreme", "Field", "Function", "If", "Junction", "Local", "Number", "Operation", "Range", "Return",
-    "Statement", "Unary", "Update", "While", "joined",
+    "Statement", "Unary", "Update", "While", "joined", "kind_of",
 ]  # fmt: skip
 
 NUMBERS = ("bool", "int", "real")
+KINDS = {
+    "bool": "a bool", "int": "an int", "real": "a float", "ints": "an array of ints", "reals": "an array of floats",
+    "kernel": "a record of the kernel", "none": "nothing",
+}  # fmt: skip
+
+
+def kind_of(kind: str) -> str:
+    """A kind of value in words."""
+    return KINDS.get(kind, repr(kind))
 
 
 def joined(*kinds: str) -> str:

@@ -1,0 +1,21 @@
+"""Tape outputs as C99 text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from mbd.compile.layout import Layout
+from mbd.compile.lowering import LARGE, PART, lower
+from mbd.tape.node import Node
+from mbd.trees.c import HEAD, Straight
+
+__all__ = ["c_source"]
+
+
+def c_source(programs: Mapping[str, Sequence[Node]], layout: Layout, large: int = LARGE, part: int = PART) -> str:
+    """A file with one ``void mbd_name(const double *block, const double *parameters, double *out)`` per program.
+
+    With ``-ffp-contract=off`` it gives the bits of machine code without fused multiply-add (see `mbd.trees.c`).
+    large, part : see `mbd.compile.lowering.lower`
+    """
+    return "\n".join([HEAD, *(function.text() for function in lower(programs, layout, Straight, large, part))])
