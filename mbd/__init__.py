@@ -93,12 +93,15 @@ if TYPE_CHECKING:
         Damper as Damper,
         DCMotor as DCMotor,
         Motor as Motor,
+        Muscle as Muscle,
+        PolynomialPath as PolynomialPath,
         Potential as Potential,
         Rotor as Rotor,
         Samples as Samples,
         Spring as Spring,
         TabulatedSpring as TabulatedSpring,
         TorsionSpring as TorsionSpring,
+        ViaPoint as ViaPoint,
         bias_forces as bias_forces,
         mass_matrix as mass_matrix,
     )
@@ -150,6 +153,7 @@ if TYPE_CHECKING:
     from mbd.laboratory.kinematics_result import InverseKinematics as InverseKinematics
     from mbd.laboratory.models.read_model import read_model as read_model
     from mbd.laboratory.models.report import ImportedModel as ImportedModel, ImportReport as ImportReport
+    from mbd.laboratory.muscle_forces import MuscleForces as MuscleForces, muscle_forces as muscle_forces
     from mbd.laboratory.read import read as read
     from mbd.laboratory.recording import PlateRecord as PlateRecord, Recording as Recording
     from mbd.laboratory.scale import scale as scale
@@ -220,6 +224,7 @@ _HOMES = {
     "mbd.laboratory.inverse_kinematics": "inverse_kinematics",
     "mbd.laboratory.kinematics_result": "InverseKinematics",
     "mbd.laboratory.models.read_model": "read_model",
+    "mbd.laboratory.muscle_forces": "MuscleForces muscle_forces",
     "mbd.laboratory.models.report": "ImportReport ImportedModel",
     "mbd.laboratory.read": "read",
     "mbd.laboratory.recording": "PlateRecord Recording",
@@ -227,8 +232,8 @@ _HOMES = {
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
-    "mbd.forces": "Applied Bushing DCMotor Damper Motor Potential Rotor Samples Spring TabulatedSpring TorsionSpring "
-    "bias_forces mass_matrix",
+    "mbd.forces": "Applied Bushing DCMotor Damper Motor Muscle PolynomialPath Potential Rotor Samples Spring "
+    "TabulatedSpring TorsionSpring ViaPoint bias_forces mass_matrix",
     "mbd.gait.basin.basin": "basin",
     "mbd.gait.basin.result": "Basin",
     "mbd.gait.branch": "Branch branch",

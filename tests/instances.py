@@ -196,6 +196,17 @@ FORCES: list[tuple[str, Callable[[Frame, Frame, Joint], Force]]] = [
         ),
     ),
     ("motor", lambda a, b, joint: mbd.Motor("force", joint, torque=4.0)),
+    *several(
+        "muscle",
+        lambda a, b, joint, **how: mbd.Muscle("force", (a, b), 900.0, 0.12, 0.2, 0.3, 0.4, **how),
+        elastic={},
+        rigid={"tendon": "rigid"},
+        activated={"activation_time": 0.0, "deactivation_time": 0.0},
+    ),
+    (
+        "muscle by a polynomial",
+        lambda a, b, joint: mbd.Muscle("force", mbd.PolynomialPath(joint, {0: 0.3, 1: -0.04}), 900.0, 0.1, 0.2),
+    ),
     ("potential", lambda a, b, joint: mbd.Potential("force", quartic, "hinge.angle")),
 ]
 

@@ -15,8 +15,8 @@ GROUPS = {
     "Nonholonomic MaxwellStop HystereticStop Event Impulse Mode Transition SampledLaw Controller When touchdown "
     "rolling_touchdown profile_touchdown disk_touchdown sphere_touchdown Plane Ball height flexion "
     "extension cone twist distance separation measure",
-    "Forces": "Spring SpringLeg Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Rotor Applied "
-    "Potential Samples mass_matrix bias_forces",
+    "Forces": "Spring SpringLeg Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Rotor Muscle ViaPoint "
+    "PolynomialPath Applied Potential Samples mass_matrix bias_forces",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load batch Batch sweep Sweep latin_hypercube sobol",
@@ -26,7 +26,8 @@ GROUPS = {
     "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch PointCurve basin Basin",
     "Laboratory": "read Recording PlateRecord ForcePlate assign_plates scale read_model ImportedModel "
     "ImportReport "
-    "inverse_kinematics InverseKinematics inverse_dynamics InverseDynamics",
+    "inverse_kinematics InverseKinematics inverse_dynamics InverseDynamics "
+    "muscle_forces MuscleForces",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",
 }

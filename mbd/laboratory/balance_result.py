@@ -40,6 +40,7 @@ class InverseDynamics:
     Attributes
     ----------
     run : the motion as a run, with the multipliers found; ``found.run.page("walk.html")`` shows it
+    driven, effort : (n_v,) which velocities are driven, and (R, n_v) what acts along them [N, N m]
     notes : what was done where the answer is not unique, and with contacts, a sentence each
     """
 
@@ -55,8 +56,8 @@ class InverseDynamics:
     ) -> None:
         self.run, self.notes = run, notes
         self._outside = outside
-        self._joints, self._driven = joints, driven
-        self._effort, self._residual = effort, residual
+        self._joints, self.driven = joints, driven
+        self.effort, self._residual = effort, residual
 
     @property
     def time(self) -> Vector:
@@ -71,14 +72,14 @@ class InverseDynamics:
         units = equations.configuration.velocity_units
         v, net = self.run.record.v, self._net
         for joint, name, places in self._joints:
-            if self._driven[places[0]]:
+            if self.driven[places[0]]:
                 for k in places:
                     kind = "moment" if units[k].startswith("rad") else "force"
-                    for word, values in (kind, self._effort[:, k]), (f"net_{kind}", self._effort[:, k] + net[:, k]):
+                    for word, values in (kind, self.effort[:, k]), (f"net_{kind}", self.effort[:, k] + net[:, k]):
                         found[effort_name(equations.velocity_names[k], word)] = values
                         if len(places) == 1:
                             found[f"{name}.{word}"] = values
-                power = sum((self._effort[:, k] * v[:, k] for k in places), np.zeros(len(v)))
+                power = sum((self.effort[:, k] * v[:, k] for k in places), np.zeros(len(v)))
                 found[f"{name}.power"] = power
                 continue
             for k in places:
@@ -160,7 +161,7 @@ class InverseDynamics:
         return write_storage(path, self.run.name, self.time, {name: table[name].to_numpy() for name in table}, False)
 
     def __repr__(self) -> str:
-        driven = [name for _, name, places in self._joints if self._driven[places[0]]]
+        driven = [name for _, name, places in self._joints if self.driven[places[0]]]
         lines = [f"InverseDynamics of '{self.run.name}': {len(self.time)} frames, {len(driven)} driven joints"]
         efforts = [name for name in self._own if name.endswith((".moment", ".force"))]
         largest = sorted(efforts, key=lambda name: -float(np.abs(self._own[name]).max(initial=0.0)))[:1]

@@ -37,6 +37,8 @@ class ImportedModel:
     model : a `Model` of plain words, to be changed like any other
     bodies, joints : by their names in the file
     report : what of the file is in it
+    muscles : `mbd.Muscle` by their names; they act after ``found.model.apply(*found.muscles.values())``, and
+        `mbd.muscle_forces` takes them as they are
     posture : coordinates of the file's own posture, where it says one: ``mbd.assemble(found.model, found.posture)``
     """
 
@@ -45,6 +47,7 @@ class ImportedModel:
     joints: dict[str, Joint]
     report: ImportReport
     posture: dict[str, Any] = field(default_factory=dict)
+    muscles: dict[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"ImportedModel '{self.model.name}': {len(self.bodies)} bodies, {len(self.joints)} joints\n{self.report}"

@@ -1,0 +1,6 @@
+"""Muscles: curves of force, paths over joints, activation and contraction."""
+
+from mbd.forces.muscles.muscle import Muscle
+from mbd.forces.muscles.paths import PolynomialPath, ViaPoint
+
+__all__ = ["Muscle", "PolynomialPath", "ViaPoint"]

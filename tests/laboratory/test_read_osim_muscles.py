@@ -1,0 +1,117 @@
+"""Muscles of OpenSim's files: paths of points that stay, move, and join in a part of a range; numbers and words."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.laboratory.models.osim_functions import simm_spline
+from tests.laboratory.test_read_osim import FORMATS, document, written
+
+
+def body_of(version, name):
+    return (
+        f"<socket_parent_frame>/bodyset/{name}</socket_parent_frame>" if version == "40000" else f"<body>{name}</body>"
+    )
+
+
+def named(version, owner, name):
+    """The coordinate of a point: its path in the format 40000, its name before."""
+    path = f"/jointset/any/{name}"
+    return f"<socket_{owner}>{path}</socket_{owner}>" if version == "40000" else f"<{owner}>{name}</{owner}>"
+
+
+def muscles(version, kind="Thelen2003Muscle", wrap="", more=""):
+    functions = {
+        "x": "<SimmSpline><x>-2 -1 0 1</x><y>0.04 0.03 0.05 0.04</y></SimmSpline>",
+        "y": "<LinearFunction><coefficients>0.02 -0.3</coefficients></LinearFunction>",
+        "z": "<Constant><value>0.01</value></Constant>",
+    }
+    moving = "".join(
+        f"<{axis}_location>{function}</{axis}_location>{named(version, f'{axis}_coordinate', 'knee')}"
+        for axis, function in functions.items()
+    )
+    return f"""<ForceSet><objects><{kind} name="vasti">
+<max_isometric_force>5000</max_isometric_force><optimal_fiber_length>0.09</optimal_fiber_length>
+<tendon_slack_length>0.13</tendon_slack_length><pennation_angle_at_optimal>0.05</pennation_angle_at_optimal>{more}
+<GeometryPath><PathPointSet><objects>
+<PathPoint name="1">{body_of(version, "femur")}<location>0.03 -0.2 0.02</location></PathPoint>
+<ConditionalPathPoint name="2">{body_of(version, "femur")}<location>0.04 -0.35 0.01</location>
+{named(version, "coordinate", "knee")}<range>-2 0.2</range></ConditionalPathPoint>
+<MovingPathPoint name="3">{body_of(version, "femur")}{moving}</MovingPathPoint>
+<PathPoint name="4">{body_of(version, "tibia")}<location>0.04 -0.08 0</location></PathPoint>
+</objects></PathPointSet>{wrap}</GeometryPath></{kind}></objects></ForceSet>"""
+
+
+def with_muscle(version, text):
+    whole = document(version)
+    a, b = whole.index("<ForceSet>"), whole.index("</ForceSet>") + len("</ForceSet>")
+    return whole[:a] + text + whole[b:]
+
+
+@pytest.mark.parametrize("version", FORMATS)
+def test_a_path_has_the_length_of_its_points(version, tmp_path):
+    found = mbd.read_model(written(tmp_path, with_muscle(version, muscles(version))))
+    muscle = found.muscles["vasti"]
+    assert (muscle.max_force, muscle.fiber_length, muscle.tendon_length, muscle.pennation) == (5000, 0.09, 0.13, 0.05)
+    assert any("curves of De Groote" in line for line in found.report.approximated)
+    femur, tibia = found.bodies["femur"], found.bodies["tibia"]
+    first, second, last = femur.point(0.03, -0.2, 0.02), femur.point(0.04, -0.35, 0.01), tibia.point(0.04, -0.08, 0.0)
+    found.model.apply(muscle)
+    spline = simm_spline(np.array([-2.0, -1, 0, 1]), np.array([0.04, 0.03, 0.05, 0.04]))
+    for knee in -1.3, 0.4:
+        state = mbd.assemble(found.model, found.posture | {"knee.angle": knee})
+        moving = femur.point(spline(knee), 0.02 * knee - 0.3, 0.01, name=f"moving {round(100 * knee)}")
+        places = {}
+        for k, frame in enumerate((first, second, moving, last)):
+            x, y, z = frame.offset
+            mark = mbd.Marker(f"mark {round(100 * knee)} {k}", frame.body, (x, y, z))
+            places[k] = mbd.assemble(found.model, found.posture | {"knee.angle": knee})[mark.full_name]
+        order = (0, 1, 2, 3) if knee < 0.2 else (0, 2, 3)
+        length = sum(np.linalg.norm(places[b] - places[a]) for a, b in pairwise(order))
+        assert state["vasti.length"] == pytest.approx(length, abs=1e-14)
+
+
+def test_what_is_not_kept_is_said(tmp_path):
+    wrap = "<PathWrapSet><objects><PathWrap name='w'><wrap_object>rod</wrap_object></PathWrap></objects></PathWrapSet>"
+    found = mbd.read_model(written(tmp_path, with_muscle("40000", muscles("40000", "DeGrooteFregly2016Muscle", wrap))))
+    assert any("wrapping surfaces go straight" in line for line in found.report.approximated)
+    assert found.muscles["vasti"].damping == 0.0
+    assert "1 muscles" in " ".join(found.report.understood)
+    off = muscles("40000", more="<appliesForce>false</appliesForce>")
+    found = mbd.read_model(written(tmp_path, with_muscle("40000", off)))
+    assert not found.muscles
+    assert any("switched off" in line for line in found.report.left_out)
+    undamped = muscles("40000", "Millard2012EquilibriumMuscle", more="<fiber_damping>0</fiber_damping>")
+    millard = mbd.read_model(written(tmp_path, with_muscle("40000", undamped)))
+    assert millard.muscles["vasti"].curves == "millard"
+    assert any("has no damping" in line for line in millard.report.approximated)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "/bodyset/tibia</socket_parent_frame><location>0.04",
+            "/bodyset/fibula</socket_parent_frame><location>0.04",
+            "fibula",
+        ),
+        ("<location>0.04 -0.08 0</location>", "<location>0.04 -0.08</location>", "location must be 3 numbers"),
+        ("any/knee</socket_coordinate>", "any/neck</socket_coordinate>", "coordinate 'neck'"),
+        ("<max_isometric_force>5000", "<max_isometric_force>-5", "max_force -5 N"),
+        (
+            "<SimmSpline><x>-2 -1 0 1</x><y>0.04 0.03 0.05 0.04</y></SimmSpline>",
+            "<Unknown/>",
+            "x of a point of muscle 'vasti'",
+        ),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(old, new, sentence, tmp_path):
+    text = with_muscle("40000", muscles("40000"))
+    assert old in text
+    with pytest.raises(mbd.ModelError, match=sentence) as found:
+        mbd.read_model(written(tmp_path, text.replace(old, new)))
+    assert "line" in str(found.value)
