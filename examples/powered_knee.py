@@ -1,8 +1,9 @@
 """A powered prosthetic knee swings through: bent by one spring and damper of its motor, straightened by another.
 
-The motor acts as a spring and a damper whose stiffness, damping and rest angle depend on the phase: as the knee is bent
-by 50° and hardly moves, late swing follows. The hip is moved as in walking. The numbers are of the order of those of
-the Open Source Leg, not taken from its publication.
+The motor acts as a spring and a damper whose stiffness, damping and rest angle depend on the phase: as the knee is
+bent by 50° and hardly moves, late swing follows. Impedances and these thresholds are those of the walking controller
+that the Open Source Leg publishes (package opensourceleg). Here the hip is moved as in walking and nothing loads the
+foot, so that stance begins as the knee is nearly straight.
 
 A. F. Azocar et al., Design and clinical implementation of an open-source bionic leg, Nature Biomedical Engineering 4
 (2020) 941.

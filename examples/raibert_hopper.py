@@ -17,21 +17,14 @@ hip = mbd.Revolute("hip", body.origin, leg.start)
 slide = mbd.Prismatic("slide", leg.end, foot.origin, axis=(0, -1, 0), stiffness=4e3, rest=0.2, loss=mbd.Viscous(20.0))
 model.connect(mbd.Planar("trunk", model.ground.origin, body.origin), hip, slide)
 model.constrain(mbd.Unilateral("toe", mbd.touchdown(foot.origin)))
-model.apply(
-    mbd.Mode(
-        "phase", ("flight", "compression", "thrust"),
-        transitions=[
-            mbd.Transition("flight", "compression", on="toe"),
-            mbd.Transition("compression", "thrust", when="slide.rate", direction=1),
-            mbd.Transition(("compression", "thrust"), "flight", on="toe opened"),
-        ],
-        numbers={"speed": 1.2, "gain": 0.03}, remembers={"stance time": {"flight": "stance.time"}},
-        sets={"slide spring.rest": {"thrust": 0.22}},
-    ),
-    mbd.Mode("stance", ("off", "on"), transitions=[
-        mbd.Transition("off", "on", on="phase: compression"), mbd.Transition("on", "off", on="phase: flight"),
-    ]),
-)  # fmt: skip
+lands, leaves = mbd.Transition("off", "on", on="toe"), mbd.Transition("on", "off", on="toe opened")
+thrusts = mbd.Transition("compression", "thrust", when="slide.rate", direction=1)
+both = mbd.Transition(("compression", "thrust"), "flight", on="toe opened")
+phases, own = ("flight", "compression", "thrust"), {"speed": 1.2, "gain": 0.03}
+phase = mbd.Mode("phase", phases, transitions=[mbd.Transition("flight", "compression", on="toe"), thrusts, both],
+                 numbers=own, remembers={"stance time": {"flight": "stance.time"}},
+                 sets={"slide spring.rest": {"thrust": 0.22}})  # fmt: skip
+model.apply(phase, mbd.Mode("stance", ("off", "on"), transitions=[lands, leaves]))
 
 
 def place(leg_angle, leg_rate, body_angle, body_rate, speed, wanted, gain, time):
@@ -40,15 +33,13 @@ def place(leg_angle, leg_rate, body_angle, body_rate, speed, wanted, gain, time)
     return -60.0 * (body_angle + leg_angle - goal) - 4.0 * (body_rate + leg_rate)
 
 
-def upright(angle, rate):
-    return 100.0 * angle + 40.0 * rate
+def upright(leg_angle, leg_rate, body_angle, body_rate, *_):
+    return 100.0 * body_angle + 40.0 * body_rate
 
 
 names = ["hip.angle", "hip.rate", "trunk.angle", "trunk.angle.rate", "trunk.x.rate"]
 names += ["phase.speed", "phase.gain", "phase.stance time"]
-model.apply(
-    mbd.Motor("placement", hip, torque={"flight": place}, by="phase", arguments=names),
-    mbd.Motor("posture", hip, torque={"on": upright}, by="stance", arguments=["trunk.angle", "trunk.angle.rate"]),
-)
+laws = {"flight": place, "compression": upright, "thrust": upright}
+model.apply(mbd.Motor("hip drive", hip, torque=laws, by="phase", arguments=names))
 start = mbd.assemble(model, {"trunk.y": 1.0, "slide.displacement": 0.2, "trunk.angle": 0.0}, {"trunk.x.rate": 0.0})
 integrator, dt, until = mbd.RungeKutta853(), 2e-3, 10.0

@@ -41,8 +41,14 @@ NAMES = tuple(
             "rolling-coin",
             "tippe-top",
             "walker-in-space",
+            "ankle-push-off",
+            "mpk-swing-control",
             "powered-knee",
+            "push-off-wheel",
             "raibert-hopper",
+            "reflex-walker",
+            "slip-runner",
+            "spring-mass-walker",
             "torso-walker",
         )
     )
@@ -404,6 +410,56 @@ def test_the_hopper_settles_to_the_gait_that_is_stable() -> None:
     hops = np.diff([event.time for event in strikes(run, "toe")])
     share = (hops[-1] - found.period) / (hops[-4] - found.period)  # of three hops
     assert share == pytest.approx(abs(found.multipliers[0]) ** 3, rel=0.05)
+
+
+def test_the_knee_that_reads_and_brakes_moves_as_between_its_samples_by_hand() -> None:
+    """A valve constant between outputs, 5 ms after each sample; at the stop the knee stays straight."""
+    run, deg = run_of("mpk-swing-control"), math.pi / 180.0
+    m, length, center, inertia = 3.5, 0.42, 0.2, 0.06
+
+    def rates(t: float, y: Any, valve: float) -> list[float]:
+        w = math.pi / 0.45
+        hip, rate, push = (deg * x for x in (
+            7.5 - 17.5 * math.cos(w * t), 17.5 * w * math.sin(w * t), 17.5 * w * w * math.cos(w * t)))  # fmt: skip
+        torque = -valve * y[1] - m * g * center * math.sin(hip + y[0])
+        torque -= m * length * center * (math.cos(y[0]) * push + math.sin(y[0]) * rate**2)
+        return [y[1], torque / (inertia + m * center**2) - push]
+
+    def straight(t: float, y: Any, valve: float) -> Any:
+        return y[0]
+
+    straight.terminal = True  # type: ignore[attr-defined]
+    options: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853", "events": straight}
+    time, state, valve, most = 0.0, np.array([-25 * deg, -360 * deg]), 0.2, 0.0
+    for sample in 0.01 * np.arange(70):
+        found = solve_ivp(rates, (time, sample), state, args=(valve,), **options) if sample > time else None
+        if found is not None and found.status == 1:
+            break
+        angle, rate = state if found is None else found.y[:, -1]
+        until = float(sample) + 0.005
+        found = solve_ivp(rates, (sample, until), [angle, rate], args=(valve,), **options)
+        if found.status == 1:
+            break
+        time, state, most = until, found.y[:, -1], min(most, found.y[0, -1])
+        beyond, left = max(-angle - 45 * deg, 0.0), max(angle + 25 * deg, 0.0)
+        valve = 0.2 + (20.0 * beyond if rate < 0.0 else 6.0 * left)
+    stopped = strikes(run, "stop")[0]
+    assert stopped.time == pytest.approx(found.t[-1], abs=1e-10)
+    assert run.at([stopped.time], side="left")["knee.rate"][0] == pytest.approx(found.y[1, -1], abs=1e-9)
+    assert np.degrees(np.min(run["knee.angle"])) == pytest.approx(-64.77, abs=0.05)
+
+
+def test_a_runner_and_a_walker_on_springs_repeat_themselves() -> None:
+    for name, highest in (("slip-runner", "apex"), ("spring-mass-walker", "highest")):
+        run, found = run_of(name), script(name)["gait"]
+        times = [event.time for event in run.events if event.name == highest]
+        np.testing.assert_allclose(times, found.period * np.arange(1, len(times) + 1), atol=1e-8)
+        assert found.stability == "stable"
+    assert script("slip-runner")["gait"].speed == pytest.approx(5.0, abs=1e-10)
+    force, down = run["left leg.force"], run["left leg.force"] > 0.0
+    humps = np.flatnonzero((force[1:-1] > force[:-2]) & (force[1:-1] > force[2:])) + 1
+    stances = np.flatnonzero(~down[:-1] & down[1:])
+    assert len(humps) >= 2 * (len(stances) - 1)
 
 
 def test_the_compass_gait_is_the_published_one() -> None:

@@ -27,7 +27,8 @@ SHOWN, POSES, CURVE = 1.6, 9, 240
 
 TOPICS = {
     "Walkers and prostheses": "prosthetic-leg kneed-walker amputee-in-space compass-gait walker-in-space "
-    "chapter-walker rimless-wheel simplest-walker-lagrangian torso-walker powered-knee raibert-hopper",
+    "chapter-walker rimless-wheel simplest-walker-lagrangian torso-walker ankle-push-off "
+    "push-off-wheel reflex-walker powered-knee mpk-swing-control raibert-hopper slip-runner spring-mass-walker",
     "Gait studies": "find-a-gait steeper-slope basin-picture compare-two-knees tune-a-knee-damper identify-a-shank "
     "from-the-laboratory",
     "Linkages and pendulums": "four-bar slider-crank pendulum double-pendulum long-pendulum lagrangian-double-pendulum",
