@@ -50,7 +50,8 @@ class Shape:
     """Something that is drawn.
 
     kind : 'plane' (at rest), 'moving plane', 'surface', 'wheel', 'ball', 'blade' or 'held' (what never opens, or
-        rolls); of spatial mechanisms 'solid', 'limb' (a link with a moment about its long axis) and 'hinge'
+        rolls); of spatial mechanisms 'solid', 'limb' (a link with a moment about its long axis), 'hinge' and 'cone' (a
+        stop of directions)
     name : of the constraint that has it, or the first of them, of the body, of the joint; `drawn(name, …)` are its
         results: place, normal and forward of a moving plane, height (of PLACE and time) of a surface, spoke and axle of
         a wheel, along of a blade, first and second axis of a body, axis of a joint, arm of a contact
@@ -58,7 +59,8 @@ class Shape:
         ball its contacts, whose arm leads from the center to where they touch
     points : the frame that touches, of each contact
     place : frame of the center of a wheel or a ball, of a blade, of a body's center, of a joint
-    numbers : normal and offset of a plane at rest; mass and Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a solid or a limb
+    numbers : normal and offset of a plane at rest; half the angle of a cone [rad]; of a solid or a limb
+        mass and Ixx, Iyy, Izz, Ixy, Ixz, Iyz
     across : of a surface, the names of what its height depends on, such as 'xt'
     form : of a solid, 'box', 'cylinder' or 'ball' where words of the model tell it; of what is held 'normal' or 'grip'
     """

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from mbd.bodies.algebra import rotate
+from mbd.bodies.algebra import dot, rotate
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.link import Link
@@ -20,6 +20,7 @@ from mbd.bodies.values import Vector3
 from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.sphere_touchdown import SphereTouchdown
+from mbd.constraints.turning_measures import Cone
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.shapes import Shape, drawn
 from mbd.joints.base import Joint
@@ -44,7 +45,11 @@ def solids_of(model: Description) -> tuple[Shape, ...]:
               numbers=(mass, *moments), form=getattr(body, "form", "") or forms.get(body.name, ""))
         for body, mass, moments in _solids(model)
     ]  # fmt: skip
-    return (*bodies, *(Shape("hinge", name, place=frame.full_name) for name, frame, _ in _hinges(model.joints)))
+    hinges = (Shape("hinge", name, place=frame.full_name) for name, frame, _ in _hinges(model.joints))
+    stops = (
+        Shape("cone", name, place=cone.joint.parent.full_name, numbers=(cone.limit,)) for name, cone in _cones(model)
+    )
+    return (*bodies, *hinges, *stops)
 
 
 def offer_solids(outputs: Outputs, scope: Scope, model: Description) -> None:
@@ -58,6 +63,23 @@ def offer_solids(outputs: Outputs, scope: Scope, model: Description) -> None:
             outputs.triple(drawn(body.name, what), partial(direction, body.origin, axis), AXES, listed=False)
     for name, frame, axis in _hinges(model.joints):
         outputs.triple(drawn(name, "axis"), partial(direction, frame, axis), AXES, listed=False)
+    for name, cone in _cones(model):
+        outputs.triple(drawn(name, "axis"), partial(direction, cone.joint.parent, _middle(cone)), AXES, listed=False)
+
+
+def _cones(model: Description) -> list[tuple[str, Cone]]:
+    """Name and measure of every stop that is a cone of directions."""
+    words = ((word, getattr(word, "measure", None)) for word in model.constraints)
+    return [(word.name, measure) for word, measure in words if isinstance(measure, Cone)]
+
+
+def _middle(cone: Cone) -> Vector3:
+    """The middle of a cone in the parent's frame, on the side on which the child has its center."""
+    child = cone.joint.child
+    away = [c - o for c, o in zip(child.body.center.offset, child.offset, strict=True)]
+    along = dot(rotate(child.rotation, cone.axis) if child.rotation is not None else cone.axis, tuple(away))
+    x, y, z = cone.direction
+    return (-x, -y, -z) if isinstance(along, float) and along < 0.0 else (x, y, z)
 
 
 def _solids(model: Description) -> Iterable[tuple[Body, float, tuple[float, ...]]]:

@@ -97,7 +97,7 @@ class Facts:
         for shape in self.shapes:
             vectors = {
                 "moving plane": ("place", "normal", "forward"), "wheel": ("spoke", "axle"), "blade": ("along",),
-                "solid": ("first", "second"), "limb": (), "hinge": ("axis",), "held": WAYS,
+                "solid": ("first", "second"), "limb": (), "hinge": ("axis",), "cone": ("axis",), "held": WAYS,
             }.get(shape.kind, ())  # fmt: skip
             found += [drawn(shape.name, what) for what in vectors]
             if shape.kind in ("moving plane", "surface"):

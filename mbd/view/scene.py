@@ -16,7 +16,7 @@ from mbd.view.instants import Instants
 from mbd.view.pushes import Push, pushes
 from mbd.view.scenery import FIT, Ground, Scenery, plane_of_motion, scenery
 from mbd.view.seen_once import once, solid_ones
-from mbd.view.solids import Hinge, Solid, hinges, limbs, solids
+from mbd.view.solids import Hinge, Solid, Stop, hinges, limbs, solids, stops
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -43,7 +43,8 @@ class Scene:
     around : grounds that the model has, wheels, blades; grounds : planes at rest, those that only the motion shows too
     markers : numbers of the points that are shown with their names
     spatial : whether anything moves out of the x–y plane, or could
-    solids, hinges : bodies and axes of joints of a spatial mechanism; limbs : radii of links that have one [m]
+    solids, hinges, stops : bodies, axes of joints and their cones, of a spatial mechanism
+    limbs : radii of links that have one [m]
     turn : from ground axes to those of the scene (3, 3)
     """
 
@@ -62,6 +63,7 @@ class Scene:
     hinges: tuple[Hinge, ...] = ()
     limbs: Mapping[str, float] = field(default_factory=dict)
     turn: Matrix = field(default_factory=lambda: np.eye(3))
+    stops: tuple[Stop, ...] = ()
 
 
 def scene(run: Trajectory, count: int | Instants) -> Scene:
@@ -96,6 +98,7 @@ def scene(run: Trajectory, count: int | Instants) -> Scene:
     return Scene(
         instants, points, positions, segments, masses, around, grounds, touches, pushed, named,
         bool(points) and (deep or bool(bodies_seen or axes) or _is_deep(run)), bodies_seen, axes, limbs(run), turn,
+        stops(run, instants, turn),
     )  # fmt: skip
 
 

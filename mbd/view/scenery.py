@@ -131,7 +131,7 @@ def scenery(run: Trajectory, instants: Instants, turn: Matrix, points: NDArray[n
     directions: dict[str, tuple[Matrix, Matrix, Matrix]] = {}
     arms: dict[str, Matrix] = {}
     for shape in run.facts.shapes:
-        if shape.kind in ("solid", "limb", "hinge", "held") or not _known(run, shape):
+        if shape.kind in ("solid", "limb", "hinge", "cone", "held") or not _known(run, shape):
             continue
         if shape.kind == "plane":
             normal = turn @ np.array(shape.numbers[:3])

@@ -17,7 +17,7 @@ from mbd.view.instants import Instants
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Hinge", "Solid", "hinges", "limbs", "quaternions", "rotations", "solids"]
+__all__ = ["Hinge", "Solid", "Stop", "hinges", "limbs", "quaternions", "rotations", "solids", "stops"]
 
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -43,6 +43,16 @@ class Hinge:
     name: str
     place: Matrix
     axis: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """A cone of directions at a joint, at the instants: its tip [m] and its middle, (F, 3); half its angle [rad]."""
+
+    name: str
+    place: Matrix
+    axis: Matrix
+    angle: float
 
 
 def limbs(run: Trajectory) -> dict[str, float]:
@@ -92,6 +102,18 @@ def hinges(run: Trajectory, instants: Instants, turn: Matrix) -> tuple[Hinge, ..
         )
         for shape in run.facts.shapes
         if shape.kind == "hinge" and _known(run, shape, "axis")
+    )  # fmt: skip
+
+
+def stops(run: Trajectory, instants: Instants, turn: Matrix) -> tuple[Stop, ...]:
+    """The cones that stop joints."""
+    return tuple(
+        Stop(
+            shape.name, _vector(run, instants, shape.place, turn),
+            _vector(run, instants, drawn(shape.name, "axis"), turn), shape.numbers[0],
+        )
+        for shape in run.facts.shapes
+        if shape.kind == "cone" and _known(run, shape, "axis")
     )  # fmt: skip
 
 

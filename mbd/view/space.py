@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Vector
-from mbd.view.camera import FIRST, VIEWS
+from mbd.view.camera import VIEWS
+from mbd.view.first_view import first_view
 from mbd.view.forms import mesh
 from mbd.view.packing import finite, packed, side
 from mbd.view.scene import Scene
@@ -24,7 +25,7 @@ COARSE = 5.0
 
 
 def space(picture: Scene, step: float) -> dict[str, Any]:
-    """Solids and hinges over time, facets of each kind of solid in use, ground axes (columns), views of the camera.
+    """Solids, hinges and stops over time, facets of each kind of solid in use, ground axes (columns), camera views.
 
     step : of places [m]
     """
@@ -45,9 +46,13 @@ def space(picture: Scene, step: float) -> dict[str, Any]:
             {"name": hinge.name, "at": _series(hinge.place, step), "axis": _series(hinge.axis, TURN)}
             for hinge in picture.hinges
         ],
+        "cones": [
+            {"name": stop.name, "at": _series(stop.place, step), "axis": _series(stop.axis, TURN), "angle": stop.angle}
+            for stop in picture.stops
+        ],
         "meshes": {kind: _mesh(kind) for kind in sorted(kinds)},
         "axes": picture.turn.round(9).T.tolist(),
-        "views": {"reset": FIRST, **VIEWS},
+        "views": {"reset": first_view(picture), **VIEWS},
     }  # fmt: skip
 
 

@@ -78,7 +78,7 @@ function drawTimes(g, w, top, bottom) {
   g.textAlign = "center"; g.textBaseline = "top"; g.lineWidth = 1;
   for (let t = Math.ceil(first / tick) * tick; t <= last + 1e-9 * tick; t += tick) {
     g.strokeStyle = colors.line; g.beginPath(); g.moveTo(toX(t, w), top); g.lineTo(toX(t, w), bottom); g.stroke();
-    g.fillStyle = colors.muted; g.fillText(label(t, tick) + " s", Math.min(toX(t, w), w - 16), bottom + 6);
+    g.fillStyle = colors.muted; g.fillText(label(t, tick) + " s", Math.min(toX(t, w), w - 2 - g.measureText(label(t, tick) + " s").width / 2), bottom + 6);
   }
 }
 const barHeight = Math.max(9, Math.min(19, 130 / Math.max(run.contacts.length, 1)));
@@ -97,9 +97,10 @@ function drawBars() {
   });
   drawCursor(g, w, 0, h - 18);
 }
+const digits = (x) => (Math.abs(x) >= 1000 && Math.abs(x) < 1e6 ? x.toFixed(0) : x.toPrecision(3)).replace("-", "\u2212");
 function writeLegend() {
-  const chart = run.charts[state.chart], p = locate(state.t);
-  chart.series.forEach((line, k) => { el("legend").children[k].lastChild.textContent = ` ${line.name} ${mix(line.values, p).toPrecision(4)}`; });
+  const chart = run.charts[state.chart], p = locate(state.t), unit = chart.unit ? ` ${chart.unit}` : "";
+  chart.series.forEach((line, k) => { el("legend").children[k].lastChild.textContent = ` ${line.name} ${digits(mix(line.values, p))}${unit}`; });
 }
 function chooseChart(k) {
   state.chart = k;

@@ -6,6 +6,7 @@ for (const sheet of run.sheets) {
   const size = sheet.rows * sheet.count;
   sheet.at = sheet.at.map((axis) => unpack(axis, size)); sheet.risen = [new Float64Array(size), ...sheet.risen.map((heights) => unpack(heights, size))];
 }
+for (const cone of run.cones) { cone.at = sequence(cone.at); cone.axis = sequence(cone.axis); cone.contact = run.contacts.find((contact) => contact.name === cone.name); }
 const here = (part, p) => part.map((axis) => mix(axis, p));
 
 // ---- camera -------------------------------------------------------------------------------------------------
@@ -52,6 +53,7 @@ function drawScene() {
   for (const [solid, color, second] of [...joints(p, r), ...blades(p, r)]) addSolid(solid, color, second);
   for (const [solid, color] of el("forces").checked ? arrows(p, r) : []) { addSolid(solid, color); addSolid(solid, color, color, hiddenFacets, 0.4); }
   if (el("ghosts").checked) ghosts(v, r);
+  stops(p, r);
   traces(v, p);
   for (const sheet of run.sheets) drawSheet(v, sheet, cast.map(([solid]) => solid));
   for (const floor of floors(p)) drawFloor(v, floor, cast.map(([solid]) => solid));
@@ -106,6 +108,16 @@ function joints(p, r) { // a pin along each axis, else a ball; a block where a p
     else if (!centers.some((center) => Math.hypot(...plus(center, at, -1)) < 0.1 * r)) found.push([capsule(at, at, 1.3 * r), light, light]);
   }
   return found;
+}
+function stops(p, r) { // cones that directions of bodies stay within: a rim and lines to it, strong while they are reached
+  for (const cone of run.cones) {
+    const at = here(cone.at, p), [across, beside, along] = axesAlong(unitOf(here(cone.axis, p))), length = 0.3 * extent();
+    const touched = cone.contact && cone.contact.closed.some(([a, b]) => a <= state.t && state.t <= b + 0.03 * span);
+    const color = touched ? tint(colors.force) : blend(tint(colors.muted), tint(colors.paper), 0.35), [c, s] = [Math.cos(cone.angle), Math.sin(cone.angle)];
+    const rim = Array.from({ length: 49 }, (_, k) => { const turn = (k * Math.PI) / 24; return seen([0, 1, 2].map((a) => at[a] + length * (c * along[a] + s * (Math.cos(turn) * across[a] + Math.sin(turn) * beside[a])))); });
+    const line = (a, b, width) => { ribbon(solidFacets, a, b, width, color); ribbon(hiddenFacets, a, b, width, color, 0.4); };
+    rim.slice(1).forEach((q, k) => { line(rim[k], q, 0.45 * r); if (k % 4 === 0) line(seen(at), q, 0.25 * r); });
+  }
 }
 const kept = new Map();
 const keep = (name, make) => { if (!kept.has(name)) kept.set(name, make()); return kept.get(name); };
