@@ -308,19 +308,27 @@ def judge_return(K: Events, e: int, v0: float, v1: float, h: float) -> None:
 def pull_of(K: Balance, c: int, h: float) -> float:
     """The multiplier of a closed contact at the candidate, positive where it pulls.
 
-    That of index 3 lags behind after a start; where it is small beside the forces the consistent one is asked.
+    That of a step lags behind; where it is small beside the forces (index 3), or beside what it changed by in the step,
+    the consistent one is asked.
     """
     pull = float(K.lam1[K.normal[c]])
-    if is_doubtful(K, pull) and consistent(K, K.time + h, K.q1, K.y1) == 0:
+    if is_doubtful(K, pull, pull - K.lam[K.normal[c]]) and consistent(K, K.time + h, K.q1, K.y1) == 0:
         return float(K.impulse[K.normal[c]])
     return pull
 
 
-def is_doubtful(K: Model, force: float) -> bool:
-    """Whether the sign of a force that follows from multipliers of index 3 is asked of consistent ones."""
-    if K.stabilized == 1 or K.strategy == 1:
+def is_doubtful(K: Model, force: float, change: float) -> bool:
+    """Whether the sign of a force that follows from multipliers of a step is asked of consistent ones.
+
+    The multipliers of an implicit step of low order balance its own accelerations, which may lag by what the step
+    changes: where the motion is prescribed they are off by a part of the change of the force within the step.
+    Those of long steps, which are looked at in parts (`guard_substeps`), are consistent.
+    """
+    if K.explicit == 1 or K.n_substeps > 1 or K.strategy == 1:
         return False
-    return bool(abs(force) < DOUBTFUL * largest_force(K))
+    if abs(force) < abs(change):
+        return True
+    return bool(K.stabilized == 0 and abs(force) < DOUBTFUL * largest_force(K))
 
 
 def judge_friction(K: Switching, f: int, h: float) -> None:
@@ -330,7 +338,7 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
     if K.sticks[f] == 1:
         m0 = K.guards0[K.at_limit + f] - pull_of_both(K, f, K.lam)
         m1 = K.guards1[K.at_limit + f] - pull_of_both(K, f, K.lam1)
-        if is_doubtful(K, m1):
+        if is_doubtful(K, m1, change_of_margin(K, f)):
             m1 = margin(K, f, K.time + h)
         if m1 < -pull_round_off(K, f, K.lam1):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
@@ -360,6 +368,16 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
 def pull_round_off(K: Frictions, f: int, lam: Reals) -> float:
     """Round-off of what is left of a sticking friction, from the pull of given multipliers."""
     return PULL_ROUND_OFF * pull_of_both(K, f, lam)
+
+
+def change_of_margin(K: Switching, f: int) -> float:
+    """Most by which limit − |λ_T| of a sticking friction may have changed in the step, by its own multipliers."""
+    row = K.friction_row[f]
+    change = K.lam1[row] - K.lam[row]
+    if K.partner[f] >= 0:
+        row = K.friction_row[K.partner[f]]
+        change = sqrt(change * change + (K.lam1[row] - K.lam[row]) ** 2)
+    return float(abs(change) + abs(K.guards1[K.at_limit + f] - K.guards0[K.at_limit + f]))
 
 
 def along_slip(K: Frictions, f: int, values: Reals, first: int) -> float:

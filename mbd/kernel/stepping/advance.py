@@ -205,7 +205,8 @@ def calm(K: Switching) -> bool:
     """Where a contact seems to pull at the end of a step: start the scheme again before it, once; True if so.
 
     Velocities, accelerations and multipliers are made consistent there, which ends their oscillation; the step is taken
-    again. What index 3 leaves of the velocity of a friction that sticks would be a slip to the restart.
+    again. What index 3 leaves of the velocity of a friction that sticks would be a slip to the restart; of a row it is
+    a distance in any short step, by which none that ends next to the start holds the row.
     """
     if K.restarted_here == 1 or K.near_singular > 0:
         return False
@@ -428,6 +429,8 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             if event == TURNS_AWAY:  # each time one more direction is held no longer
                 h = shorter_turn(K, h)
             elif is_shortened(K, event):  # no step ends where an event was looked for: it is nearer than it seems
+                if K.stabilized == 0 and K.n_active > 0 and calm(K):
+                    return -1
                 h *= SHORTER
             else:
                 break
