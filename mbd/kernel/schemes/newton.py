@@ -104,7 +104,8 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             error = second_look(K, o_r, m, c_C, c_K, tolerance, iteration)
             if error < 0.0:
                 return no_candidate(K, h, t1, int(-error))
-        if error <= 1.0 and (K.uneven_masses == 0 or has_settled(moved, last, 1e-4 * first)):
+        whole = last if halvings == 0 else 0.0  # what is left of a correction by half is no round-off
+        if error <= 1.0 and (K.uneven_masses == 0 or has_settled(moved, whole, 1e-4 * first)):
             if further == further_corrections():
                 return conclude_step(K, h, t1)
             further += 1
@@ -112,8 +113,8 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             fresh = False  # the old tangent has done its work: renew it at the same iterate
             before = 1e300
             continue
-        before = error
-        left = error
+        before = K.failure_size  # as measured: one that passes as round-off is no bound for the next
+        left = K.failure_size
         halvings = 0
         ready = tangent and straight  # the correction has come with the tangent
         shifting = ready and take_shift(K, m)
@@ -136,7 +137,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             if K.exact == 0:  # the predictor's error measures that of the step: stay far below it
                 tolerance = min(K.tolerance, max(1e-4 * moved, tolerance))
         fresh = tangent or error > 1.0 or moved <= 0.3 * last or further > 0
-        last = last if fresh else 0.0
+        last = last if tangent else 0.0  # an old tangent leaves much of an error too: only a new one tells round-off
     return no_candidate(K, h, t1, NOT_CONVERGED)
 
 

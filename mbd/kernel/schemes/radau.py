@@ -186,8 +186,9 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
             load_stage(K, 2, h, t1)
             if lower_to_step(K):
                 error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
-        before = error
-        left = error
+                K.failure_size = error
+        before = K.failure_size  # as measured: one that passes as round-off is no bound for the next
+        left = K.failure_size
         retreats = 0
         if renew and not factor_stages(K, K.n + m):
             status = SINGULAR
@@ -300,11 +301,12 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
             status = STAGNATED
     if status == NOT_CONVERGED and evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
         return 0
-    if (m > 0 or stuck) and evaluate_stages(K, h, t1, m, 1.0, 0.0, 0.0, False) <= 16.0:  # rows are round-off
+    if m > 0 or stuck:
         add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
-        if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
-            K.n_stagnations += 1
-            return 0
+        if evaluate_stages(K, h, t1, m, 1.0, 0.0, 0.0, False) <= 16.0:  # rows are round-off
+            if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
+                K.n_stagnations += 1
+                return 0
     return status
 
 
