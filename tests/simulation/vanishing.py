@@ -10,7 +10,7 @@ from typing import Any
 
 import mbd
 
-__all__ = ["BALANCED", "DRIVEN", "Scene", "Units", "balanced", "driven"]
+__all__ = ["BALANCED", "DRIVEN", "Scene", "Units", "balanced", "driven", "shaft"]
 
 
 @dataclass(frozen=True)
@@ -169,3 +169,27 @@ def balanced(kind: str, seed: int, units: Units, cut: str = "auto") -> Scene:
     model.connect(mbd.Spherical("ball", ground.origin, a.origin), mbd.Revolute("hinge", a.origin, b.origin, axis=y),
                   mbd.Universal("u", b.origin, ground.origin, axis=upright, second_axis=x))  # fmt: skip
     return Scene(model, {"velocity": {"hinge.angle": spin}}, heavy=heavy)
+
+
+def shaft(seed: int, cut: str) -> tuple[Scene, Any]:
+    """Balanced wheels over universal joints at one point, the first driven by a table, and the table."""
+    rng = random.Random(f"shaft {seed}")
+    model = mbd.Model("shaft", gravity=(0.0, -9.81 * (rng.random() < 0.5), 0.0), cut=cut)
+    end, velocity, position = model.ground.origin, dict[str, float](), dict[str, float]()
+    for k in range(3):
+        size = rng.uniform(0.01, 0.03)
+        wheel = mbd.RigidBody(f"wheel {k}", rng.uniform(0.5, 2.0), (size, size, 2.0 * size))
+        if k:
+            joint: Any = mbd.Universal(f"joint {k}", end, wheel.origin, axis=(1, 0, 0), second_axis=(0, 1, 0))
+            position[f"joint {k}.first"] = rng.choice([0.0, 0.3])
+            for axis in ("first", "second"):
+                velocity[f"joint {k}.{axis}"] = rng.choice([3.0, rng.uniform(-3.0, 3.0)])
+        else:
+            joint = mbd.Revolute("joint 0", end, wheel.origin)
+        model.connect(joint)
+        end = wheel.origin
+    times = [0.0, rng.uniform(0.08, 0.15), rng.uniform(0.2, 0.25)]
+    values = [0.0, rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1)]
+    table = mbd.Samples(times, values, kind="spline", ends="clamped")
+    model.constrain(mbd.Bilateral("drive", model.joints[0], value=table))
+    return Scene(model, {"position": position, "velocity": velocity}), table

@@ -120,9 +120,9 @@ def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
 
     Scales, which were raised to terms at the iterate, are those with their floors then.
     """
+    add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
     if residual_size(K, o_r, m, 0.0, 0.0, 1.0, both) > 16.0:  # rows
         return False
-    add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
     return residual_size(K, o_r, 0, 0.0, 0.0, K.tolerance, both) <= 1.0
 
 
