@@ -175,7 +175,7 @@ class Mode(Machine):
         put(self, "sets", {name: _numbers(values, self, name) for name, values in self.sets.items()})
         if faults := [*self._name_faults(), *self._label_faults()]:
             raise ModelError(faults)
-        if faults := self._graph_faults():
+        if faults := [*self._graph_faults(), *self._timer_faults()]:
             raise ModelError(faults)
 
     def _name_faults(self) -> list[str]:
@@ -201,6 +201,15 @@ class Mode(Machine):
             for label in dict.fromkeys(taken)
             if taken.count(label) > 1
         ]
+
+    def _timer_faults(self) -> list[str]:
+        """Numbers of its own that are times of timers and are not positive."""
+        own = {f"{self.name}.{label}": value for label, value in self.numbers.items()}
+        late = dict.fromkeys(str(each.after) for each in self.transitions if str(each.after) in own)
+        return [
+            f"Mode '{self.name}': {name!r} is the time of a timer, but {own[name]:g} s is not positive; give a time > 0"
+            for name in late if own[name] <= 0.0
+        ]  # fmt: skip
 
     def _graph_faults(self) -> list[str]:
         """States that are never entered, and a start that is never left."""
@@ -344,8 +353,9 @@ class Mode(Machine):
         return found
 
     def domains(self) -> dict[str, Domain]:
-        """Times of timers are positive."""
-        timers = [name for name in self.parameters() if name.endswith(".after")]
+        """Times of timers are positive, those that are its own numbers too."""
+        named = {each.after for each in self.transitions}
+        timers = [name for name in self.parameters() if name.endswith(".after") or name in named]
         return dict.fromkeys(timers, positive("is not positive; give a time > 0", "s"))
 
 

@@ -252,6 +252,7 @@ def mention_faults(model: Description) -> list[str]:
     known |= {name.removesuffix(".x") for name in known if name.endswith(".x") and f"{name[:-1]}z" in known}
     owners = {force.name for force in model.forces}
     words: list[Force | Constraint] = [*model.forces, *model.constraints]
+    laws = {name for word in words for name in word.laws()}
     for word in words:
         for mention in word.mentions():
             if isinstance(mention, Joint) and mention.name not in joints:
@@ -259,6 +260,12 @@ def mention_faults(model: Description) -> list[str]:
                     f"'{word.name}' refers to the joint '{mention.name}', which is not connected; "
                     "pass it to model.connect as well"
                 )
+            if isinstance(mention, str) and mention in laws:
+                found.append(
+                    f"'{word.name}': {mention!r} is what a law gives, so that a law that asks for it may ask for "
+                    "itself; let both laws call the same function"
+                )
+                continue
             state = isinstance(mention, str) and mention.rpartition(".")[0] in owners  # a first-order state of a force
             if isinstance(mention, str) and mention not in known and not state:
                 found.append(f"'{word.name}': {_unknown(model, mention, known)}")

@@ -367,6 +367,7 @@ T = mbd.Transition
     (lambda: T("a", "b"), "takes one cause, on=, when= or after=; got none"),
     (lambda: T("a", "b", after=1.0, on="foot"), "got on and after"),
     (lambda: T("a", "b", when=3.0), "when is a measure"),
+    (lambda: mode(T("a", "b", after="m.t"), numbers={"t": -0.1}), "'m.t' is the time of a timer, but -0.1 s"),
     (lambda: mode(remembers={"time": "t"}), "names two things"),
     (lambda: mode(sets={"x.y": {"c": 1.0}}), "sets 'x.y' in"),
 ])  # fmt: skip
@@ -390,6 +391,8 @@ def mode(*transitions: mbd.Transition, **more: Any) -> mbd.Mode:
     ([lambda j: mode(), lambda j: mbd.TorsionSpring("k", j, 1.0, {"a": 1.0}, by="m")], "no value for 'b' of 'm'"),
     ([lambda j: mode(), lambda j: mbd.Motor("drive", j, force={"c": 1.0}, by="m")], "no state named 'c'"),
     ([lambda j: mode(), lambda j: mbd.Motor("drive", j, force={"a": 1.0}, by="n")], "no mode named 'n'"),
+    ([lambda j: mbd.Motor("one", j, force=lambda x: x, arguments=["two.force"]),
+      lambda j: mbd.Motor("two", j, force=lambda x: x, arguments=["one.force"])], "'two.force' is what a law gives"),
 ])  # fmt: skip
 def test_bad_names_of_modes_are_errors_at_build(words: Any, message: str) -> None:
     model = mbd.Model("slider")

@@ -75,6 +75,19 @@ def test_the_ledger_closes_and_names_pushes_and_strikes(order):
     assert ("pushed", "push 1") in kinds and ("closed", "spoke 1") in kinds and ("opened", "spoke 0") in kinds
 
 
+@pytest.mark.parametrize("order", ["before", "with", "after"])
+def test_the_ledger_closes_where_rows_take_an_impulse(order):
+    """A guide takes all that pushes across it, the floor the fall."""
+    model, ball = mbd.Model("guided"), mbd.PointMass("ball", 1.0)
+    model.connect(mbd.Translation("place", model.ground.origin, ball.origin))
+    model.constrain(
+        mbd.Unilateral("floor", mbd.height(ball.origin)), mbd.Bilateral("guide", mbd.measure("place.x")),
+        mbd.Impulse("kick", ball.origin, 1.0, "floor", direction=(1, 0), order=order),
+    )  # fmt: skip
+    run = mbd.simulate(model, mbd.assemble(model, {"place.y": 0.5}), mbd.RungeKutta853(), dt=0.01, until=0.5)
+    assert abs(run.final["place.x.rate"]) < 1e-12 and np.max(np.abs(run.energy.numerical)) < 1e-12
+
+
 def test_twins_agree_on_impulses():
     runs = [mbd.simulate(*wheel(), mbd.HHT(), dt=5e-3, until=0.5, backend=each) for each in ("llvm", "python")]
     np.testing.assert_allclose(runs[0]["float.x"], runs[1]["float.x"], rtol=1e-9)

@@ -133,13 +133,19 @@ def loss_in(K: ContactForces, c: int) -> float:
     return loss
 
 
-def loss_elsewhere(K: ContactForces) -> float:
-    """What friction in joints, and contacts that were closed before, took in an impact."""
+def loss_elsewhere(K: Switching) -> float:
+    """What friction in joints, and contacts that were closed before, took in an impact.
+
+    Where an impulse of the user's acts in the same problem, rows that always hold take their part of it, −½ Λ B·Δv.
+    """
     loss = 0.0
     for k in range(K.n_rows):
         c = K.row_contact[k]
         if (c < 0 and K.row_friction[k] >= 0) or (c >= 0 and not strikes(K, c)):
             loss += loss_of(K, k)
+        elif c < 0 and K.n_impulses > 0:
+            for j in range(K.n):
+                loss -= 0.5 * K.impulse[k] * K.acc[K.acc_B + k * K.n + j] * K.jump[j]
     return loss
 
 
