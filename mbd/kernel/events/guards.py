@@ -48,6 +48,7 @@ from mbd.kernel.stepping.restart import (
     largest_force,
     limit_of,
 )
+from mbd.kernel.stepping.scales import ROUGH
 
 __all__ = [
     "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
@@ -59,8 +60,6 @@ DOUBTFUL = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
 REST = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
-PULL_ROUND_OFF = 1e-12
-"""Part of the pull of a sticking friction below which it is not beyond its limit [-]."""
 CLOSE_BY = 1e-3
 """Part of what a guard changes by in a step, at its first rate, above zero where the turn is looked at itself [-]."""
 LOST = 1e-10
@@ -365,9 +364,9 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
             consider(K, STICK_BRIEF, f, bottom, 0.0)
 
 
-def pull_round_off(K: Frictions, f: int, lam: Reals) -> float:
-    """Round-off of what is left of a sticking friction, from the pull of given multipliers."""
-    return PULL_ROUND_OFF * pull_of_both(K, f, lam)
+def pull_round_off(K: ContactRows, f: int, lam: Reals) -> float:
+    """Round-off of what is left of a sticking friction at given multipliers: that of all forces enters each of them."""
+    return ROUGH * EPS * max(pull_of_both(K, f, lam), largest_force(K))
 
 
 def change_of_margin(K: Switching, f: int) -> float:

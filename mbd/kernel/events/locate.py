@@ -44,6 +44,8 @@ JUMP = 1e-6
 """Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
 UNEXPLAINED = 0.5
 """What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
+AT_SURFACE = 1e-10
+"""Part of its terms within which a gap is at rest on its surface [-]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
 EARLIER, LATER = -2, -1
@@ -300,6 +302,27 @@ def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> floa
     return 0.0
 
 
+def parts_slowly(K: Kernel, c: int, high: float) -> int:
+    """0 where a gap at rest on its surface rises, though a step ends below; 1 where it falls; − status if a step fails.
+
+    As the force of a contact passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs
+    by in a step of any size. Its rate, which grows with the square, tells: no shorter step may end with one that falls.
+    """
+    place = high
+    rising = 0
+    for _ in range(MOST_LOOKS):
+        place *= 0.5
+        status = event_candidate(K, place, K.time + place)
+        if status != 0:
+            return -status
+        way = place * K.guards1[K.at_gap_rate + c]
+        if way < -gap_tolerance(K, c):
+            return 1
+        if way > gap_tolerance(K, c):
+            rising += 1
+    return 0 if rising > 0 else 1
+
+
 def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
     """Root of the fired guard between two distances from the accepted state; K.event_after its distance."""
     t = K.time
@@ -336,6 +359,14 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         low = find_way(K, kind, index, high, near)
         if low < 0.0:
             return int(-low)
+        if low == 0.0 and kind == CLOSE and abs(K.guards0[index]) <= AT_SURFACE * gap_scale(K, index):
+            status = parts_slowly(K, index, high)
+            if status <= 0:
+                if status == 0:
+                    K.active[index] = 1
+                    K.event_kind = -1
+                    K.event_after = high
+                return -status
         if low == 0.0:
             event_at_start(K)
         f_low = guard_value(K, kind, index, t + low)
