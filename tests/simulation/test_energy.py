@@ -70,12 +70,17 @@ def test_a_run_whose_energy_explodes_ends_in_an_error_that_keeps_it(name):
 
 
 def test_a_run_that_fails_after_an_explosion_names_both():
-    model, start = thrown()
-    run = mbd.simulate(model, start, DAMPED, dt=0.05, until=3.0, on_failure="return")
-    assert not run.success
-    first, _, second = run.message.partition("; before that, ")
-    assert "numerical energy" not in first and "numerical energy gain" in second
-    assert mbd.replay(run.failure).reproduced
+    found = 0
+    for rate in range(14, 28, 2):  # which of them grow for long enough before a step fails is a matter of round-off
+        model, start = thrown(float(rate))
+        run = mbd.simulate(model, start, DAMPED, dt=0.05, until=3.0, on_failure="return")
+        first, _, second = run.message.partition("; before that, ")
+        if run.success or not second:
+            continue
+        assert "numerical energy" not in first and "numerical energy gain" in second
+        assert mbd.replay(run.failure).reproduced
+        found += 1
+    assert found > 0
 
 
 def test_smaller_steps_of_the_same_scenes_are_right():
@@ -364,13 +369,40 @@ def test_a_step_beyond_the_pole_of_a_potential_is_no_motion(scheme):
 
 
 @pytest.mark.parametrize(("dt", "told"), [(0.03, True), (1e-3, False)])
-def test_non_smooth_steps_tell_a_gain_above_a_fiftieth(dt, told):
-    """A ball that is lifted out of the floor by m g times its depth, of the size of dt: 6.8 % here."""
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+def test_non_smooth_steps_tell_a_gain_above_a_fiftieth(scheme, restitution, dt, told):
+    """A ball that is lifted out of the floor by m g times its depth, of the size of dt: 6.8 % in the first impact.
+
+    Impacts hide it: with restitution 0 the ball has the gain in one row alone, then it rests.
+    """
     model = mbd.Model("dropped")
     ball = mbd.PointMass("ball", mass=1.0)
     model.connect(mbd.Translation("place", model.ground.origin, ball.origin))
-    model.constrain(mbd.Unilateral("foot", mbd.touchdown(ball.origin), restitution=0.9))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(ball.origin), restitution=restitution))
     start = mbd.assemble(model, position={"place.y": 0.5})
-    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=dt, until=1.0, contact="nonsmooth")
+    run = mbd.simulate(model, start, scheme, dt=dt, until=1.0, contact="nonsmooth")
     notes = [note for note in run.stats["notes"] if note.startswith("numerical energy gain")]
-    assert bool(notes) == told and (not told or "(6.8 %)" in notes[0])
+    gain = np.max(run.energy.numerical)
+    assert (gain > 0.02 * run.energy.total[0]) == bool(notes) == told
+    assert not told or f"gain {gain:.3g} J" in notes[0]
+
+
+def test_losses_of_joints_and_of_feet_that_slide_hide_no_gain_of_non_smooth_steps():
+    """A tray that falls, turns and slides on four feet: the note has what the ledger has, with all losses apart."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        model, tray = mbd.Model("tray"), mbd.RigidBody("tray", rng.uniform(1.0, 5.0), 0.3)
+        model.connect(mbd.Planar("fall", model.ground.origin, tray.origin, loss={"x": mbd.Viscous(0.5)}))
+        for name, side in (("left", -0.4), ("right", 0.4)):
+            foot = mbd.touchdown(tray.point(side, -0.1))
+            model.constrain(mbd.Unilateral(name, foot, friction=0.3, restitution=rng.uniform(0.0, 0.5)))
+        start = mbd.assemble(model, {"fall.y": 0.5, "fall.angle": rng.uniform(-0.3, 0.3)}, {"fall.x": 1.0})
+        run = mbd.simulate(model, start, mbd.HHT(0.05), dt=0.03, until=1.0, contact="nonsmooth")
+        notes = [note for note in run.stats["notes"] if note.startswith("numerical energy gain")]
+        gain = np.max(run.energy.numerical)
+        if gain > 0.04 * run.energy.total[0]:
+            assert notes
+            assert float(notes[0].split("gain ")[1].split(" J")[0]) > 0.5 * gain
+        elif gain < 0.02 * np.min(run.energy.total[0]):
+            assert not notes

@@ -10,7 +10,11 @@ Losses do not enter, so that one that rows integrate roughly cannot pass for a g
 contact that was open at the start, which gives back less than it took, but in an impact of few rows adds up to
 anything. The doubt about the other works is taken off.
 
-A glance at E in some of the rows comes first. Only where that looks strange is the ledger of all rows made.
+In non-smooth steps impacts hide what their steps gain, ``m g`` times the depth out of which a body is lifted: there a
+note tells the largest gain with all losses taken into account, less the doubt about every work.
+
+A glance at E in some of the rows comes first, and at its rise in steps that end with an impact. Only where that looks
+strange is the ledger of all rows made.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
@@ -81,10 +86,13 @@ class Judgement:
         return float(np.copysign(np.inf, self.numerical)) if self.numerical != 0.0 else 0.0
 
 
-def judgement(ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str] = ()) -> Judgement:
+def judgement(
+    ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str] = (), hidden: bool = False
+) -> Judgement:
     """Judge a scheme by the ledger, its doubts (2, R) [J] and the largest way of a coordinate since the start (R,).
 
     lending : names of the parts that only give back what they took
+    hidden : whether losses may hide a gain, which then counts, too, though not as a verdict
 
     A row alone, as next to a singular configuration, is no verdict: of those from the first one on, at least two
     and at least half must say the same, unless its gain is `ABSURD` times all energy until then.
@@ -107,6 +115,8 @@ def judgement(ledger: Ledger, doubt: Matrix, way: Vector, lending: Container[str
     if firm.any():
         row = int(np.argmax(firm))
         return Judgement(row, float(np.max(gain[row:])), float(owned[row]))
+    if hidden:
+        gain = np.maximum(gain, np.where(moves, ledger.numerical - noise - doubt[1], 0.0))
     most, least = float(np.max(gain)), float(np.max(loss))
     return Judgement(-1, most if most >= least else -least, float(owned[-1]))
 
@@ -147,7 +157,8 @@ class EnergyWatch(EnergyFindings):
         columns = ModelColumns(whole_record(run), run.mechanism.equations)
         lending = _lending(run)
         ledger, doubt = doubted_ledger(columns, lending)
-        found = judgement(ledger, doubt, _way(columns.record.q, columns.record.q[0]), lending)
+        way, hidden = _way(columns.record.q, columns.record.q[0]), run.kernel.strategy == 1
+        found = judgement(ledger, doubt, way, lending, hidden)
         self.ledgers += 1
         self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
         if found.row >= 0:
@@ -162,14 +173,29 @@ class EnergyWatch(EnergyFindings):
         first, early = min(self._upto, last), EARLY if self._judgements == 0 else ()
         spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
         chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
+        kinetic, potential = self._energies(run, chosen)
+        places = run.table[chosen, 1 : 1 + run.kernel.n_q]
+        way = _way(places, run.table[0, 1 : 1 + run.kernel.n_q])
+        self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
+        self._upto, self._due, self._judgements = run.stored, 4 * max(self._due, run.stored // 4), self._judgements + 1
+
+    def _lifted(self, run: RunData) -> float:
+        """What non-smooth steps that end with an impact have gained until it, in all [J]."""
+        struck = sorted({event.row for event in run.events if event.kind == "closed" and 2 <= event.row < run.stored})
+        if not struck:
+            return 0.0
+        chosen = np.concatenate([np.array(struck) - 2, np.array(struck) - 1])
+        kinetic, potential = self._energies(run, chosen)
+        before, until = np.split(kinetic + potential, 2)
+        return float(np.sum(np.maximum(until - before, 0.0)))
+
+    def _energies(self, run: RunData, chosen: NDArray[np.intp]) -> tuple[Vector, Vector]:
+        """T and V at stored rows [J]."""
         record = record_of(run, run.table[chosen])
         anchors = np.tile(run.kernel.anchors[: run.kernel.n_anchors], (len(chosen), 1))
         inputs = ModelColumns.inputs(record.rows(anchors))
-        kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
-        way = _way(record.q, run.table[0, 1 : 1 + run.kernel.n_q])
-        self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
         self.rows += len(chosen)
-        self._upto, self._due, self._judgements = run.stored, 4 * max(self._due, run.stored // 4), self._judgements + 1
+        return run.mechanism.energies(inputs, record.parameters_at(chosen))
 
     def _overflow(self, run: RunData) -> None:
         """Energies beyond the largest number: the scheme's own where the run began with less, else not judged."""
@@ -213,6 +239,8 @@ class EnergyWatch(EnergyFindings):
         rise = total - total[0]
         risen = ~(rise <= np.maximum(_telling_gain(run) * owned + noise, 2.0 * self._cleared))  # NaN is strange too
         sunk = rise < -TELLING * owned[-1] - noise
+        if run.kernel.strategy == 1 and self._lifted(run) > TELLING_GAIN * float(np.max(owned)) + noise:
+            return True
         if not (risen.any() or sunk.any()):
             return False
         kinds = kinds_of(run.mechanism)
