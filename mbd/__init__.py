@@ -15,7 +15,12 @@ if TYPE_CHECKING:
     from mbd.analysis.designs import latin_hypercube as latin_hypercube, sobol as sobol
     from mbd.analysis.effects import Effects as Effects, effects as effects
     from mbd.analysis.fitting.fit import Fit as Fit, fit as fit
-    from mbd.analysis.gait_report import GaitReport as GaitReport, gait_report as gait_report
+    from mbd.analysis.gait_report import (
+        GaitReport as GaitReport,
+        NormativeBand as NormativeBand,
+        gait_report as gait_report,
+        read_band as read_band,
+    )
     from mbd.analysis.linearization import Linearization as Linearization
     from mbd.analysis.linearize import linearize as linearize
     from mbd.analysis.numerical import Criteria as Criteria, criteria as criteria
@@ -204,7 +209,7 @@ _HOMES = {
     "mbd.analysis.state_space": "StateSpace",
     "mbd.analysis.accuracy": "Accuracy Known accuracy",
     "mbd.analysis.effects": "Effects effects",
-    "mbd.analysis.gait_report": "GaitReport gait_report",
+    "mbd.analysis.gait_report": "GaitReport NormativeBand gait_report read_band",
     "mbd.assembly.mobility": "Mobility mobility",
     "mbd.analysis.numerical": "Criteria criteria",
     "mbd.analysis.designs": "latin_hypercube sobol",

@@ -25,6 +25,7 @@ from mbd.scripts import (
     find,
     folder,
     import_plotting,
+    is_recording,
     is_run_file,
     name_of_run,
     name_of_script,
@@ -246,18 +247,38 @@ def effects_command(arguments: argparse.Namespace) -> int:
 
 
 def gait_command(arguments: argparse.Namespace) -> int:
-    """``mbd gait``: report how the walkers of scripts or stored runs walk, one beside the other."""
+    """``mbd gait``: report how the walkers of scripts, stored runs or recordings walk, one beside the other."""
     from mbd.analysis.gait_report.command import run
-    from mbd.trajectory import load
 
-    names = [name_of_run(Path(name)) if is_run_file(name) else name_of_script(name) for name in arguments.scripts]
+    names = [_name_of_gait(name) for name in arguments.scripts]
     out = Path(writable(Path("mbd-runs") / names[0] if arguments.out is None else arguments.out))
     changes = {} if arguments.until is None else {"until": arguments.until}
     with progress_bar() as progress:
-        runs = [
-            load(name) if is_run_file(name) else Script.load(name).run(progress, changes) for name in arguments.scripts
-        ]
+        runs = [_walked(name, arguments, progress, changes) for name in arguments.scripts]
     return run(runs, names, out, arguments)
+
+
+def _walked(name: str, arguments: argparse.Namespace, progress: Any, changes: dict[str, Any]) -> Any:
+    """A stored run, a recording with its model, or the run of a script."""
+    from mbd.laboratory.command import measured
+    from mbd.trajectory import load
+
+    if is_run_file(name):
+        return load(name)
+    if not is_recording(name):
+        return Script.load(name).run(progress, changes)
+    if arguments.model is None:
+        return measured(name, None)
+    script = Script.load(arguments.model)
+    script.require("model", "feet")
+    return measured(name, script.names["model"], script.names["feet"])
+
+
+def _name_of_gait(name: str) -> str:
+    """What a gait is called in a report."""
+    if is_recording(name):
+        return Path(name).stem
+    return name_of_run(Path(name)) if is_run_file(name) else name_of_script(name)
 
 
 def info_command(arguments: argparse.Namespace) -> int:

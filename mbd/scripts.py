@@ -169,6 +169,11 @@ def import_plotting() -> None:
         threading.Thread(target=import_module, args=("matplotlib.figure",), daemon=True).start()
 
 
+def is_recording(name: str) -> bool:
+    """Whether a name is that of a laboratory's file."""
+    return name.lower().endswith((".c3d", ".trc", ".mot", ".sto"))
+
+
 def is_run_file(name: str) -> bool:
     """Whether a name is that of a stored run."""
     return name.endswith(SUFFIX)

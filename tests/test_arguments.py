@@ -103,14 +103,15 @@ BESIDE = {
         mbd.LimitCycle, mbd.Linearization, mbd.Mobility, mbd.PenaltyParameters, mbd.Replay, mbd.Sensitivities,
         mbd.State, mbd.StateSpace, mbd.Sweep, mbd.Trajectory, mbd.Branch, mbd.PointCurve, mbd.GaitSearch,
         mbd.Optimum, mbd.InverseDynamics, mbd.PlateRecord, mbd.Recording,
-        mbd.InverseKinematics, mbd.ImportedModel, mbd.ImportReport, mbd.MuscleForces,
+        mbd.InverseKinematics, mbd.ImportedModel, mbd.ImportReport, mbd.MuscleForces, mbd.NormativeBand,
     ),
     "take a model and a run: tests of their own": (
         mbd.accuracy, mbd.assemble, mbd.basin, mbd.batch, mbd.criteria, mbd.effects, mbd.fit, mbd.gait_report,
         mbd.limit_cycle, mbd.linearize,
         mbd.load, mbd.mobility, mbd.project, mbd.replay, mbd.sensitivities, mbd.simulate, mbd.sweep,
         mbd.branch, mbd.find_gait, mbd.optimize, mbd.inverse_dynamics, mbd.read,
-        mbd.inverse_kinematics, mbd.muscle_forces, mbd.assign_plates, mbd.ForcePlate, mbd.scale, mbd.read_model,
+        mbd.inverse_kinematics, mbd.muscle_forces, mbd.read_band,
+        mbd.assign_plates, mbd.ForcePlate, mbd.scale, mbd.read_model,
     ),
     "of numbers and traced values": (
         mbd.acos, mbd.asin, mbd.atan, mbd.atan2, mbd.clip, mbd.cos, mbd.cosh, mbd.exp, mbd.floor, mbd.hypot, mbd.log,

@@ -23,7 +23,8 @@ GROUPS = {
     "Integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta4 RungeKutta853",
     "Analysis": "accuracy Accuracy Known effects Effects linearize Linearization StateSpace mobility "
     "Mobility criteria Criteria sensitivities Sensitivities fit Fit optimize Optimum",
-    "Gaits": "limit_cycle LimitCycle gait_report GaitReport find_gait GaitSearch branch Branch PointCurve basin Basin",
+    "Gaits": "limit_cycle LimitCycle gait_report GaitReport read_band NormativeBand find_gait GaitSearch "
+    "branch Branch PointCurve basin Basin",
     "Laboratory": "read Recording PlateRecord ForcePlate assign_plates scale read_model ImportedModel "
     "ImportReport "
     "inverse_kinematics InverseKinematics inverse_dynamics InverseDynamics "

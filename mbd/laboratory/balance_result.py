@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,8 @@ from mbd.joints.base import Joint
 from mbd.joints.free import Free
 from mbd.joints.planar import Planar
 from mbd.joints.translation import Translation
+from mbd.laboratory.force_plate import ForcePlate
+from mbd.laboratory.measured_gait import MeasuredGait, gait_of_dynamics
 from mbd.results.names import scalars_behind
 from mbd.results.tables import library
 from mbd.trajectory import Trajectory
@@ -41,6 +43,7 @@ class InverseDynamics:
     ----------
     run : the motion as a run, with the multipliers found; ``found.run.page("walk.html")`` shows it
     driven, effort : (n_v,) which velocities are driven, and (R, n_v) what acts along them [N, N m]
+    plates : the force plates that pushed
     notes : what was done where the answer is not unique, and with contacts, a sentence each
     """
 
@@ -52,10 +55,9 @@ class InverseDynamics:
         effort: Matrix,
         residual: Matrix,
         notes: tuple[str, ...] = (),
-        outside: Collection[str] = (),
+        plates: Sequence[ForcePlate] = (),
     ) -> None:
-        self.run, self.notes = run, notes
-        self._outside = outside
+        self.run, self.notes, self.plates = run, notes, tuple(plates)
         self._joints, self.driven = joints, driven
         self.effort, self._residual = effort, residual
 
@@ -91,7 +93,7 @@ class InverseDynamics:
     def _net(self) -> Matrix:
         """(R, n_v) what the model's own springs, losses, motors, stops and loops do along each coordinate."""
         equations: Any = self.run.record.equations
-        ground = {contact.name for contact in equations.contacts} | set(self._outside)
+        ground = {contact.name for contact in equations.contacts} | {plate.name for plate in self.plates}
         nodes = net_moments(equations, ground)
         columns: Any = self.run.columns
         return np.column_stack(columns.evaluate(nodes, columns.rows)) if nodes else np.zeros((len(self.time), 0))
@@ -159,6 +161,10 @@ class InverseDynamics:
 
         table = self.to_dataframe(names)
         return write_storage(path, self.run.name, self.time, {name: table[name].to_numpy() for name in table}, False)
+
+    def measured_gait(self) -> MeasuredGait:
+        """Its strides and curves for `mbd.gait_report`, with the stances of its plates."""
+        return gait_of_dynamics(self)
 
     def __repr__(self) -> str:
         driven = [name for _, name, places in self._joints if self.driven[places[0]]]

@@ -113,7 +113,7 @@ def inverse_dynamics(
         for name, column in wrenches(plates, found.time).items():
             if name in places:  # those that push sideways are in no equation of the plane
                 values[:, places[name]] = column
-    return dynamics_of(loaded, mechanism, found, values, joints, outside=[plate.name for plate in plates])
+    return dynamics_of(loaded, mechanism, found, values, joints, plates=plates)
 
 
 def dynamics_of(
@@ -123,7 +123,7 @@ def dynamics_of(
     parameters: Vector | Matrix,
     joints: Sequence[str] | None,
     notes: Sequence[str] = (),
-    outside: Sequence[str] = (),
+    plates: Sequence[ForcePlate] = (),
 ) -> InverseDynamics:
     """The balance of a motion whose parameters are known at each frame."""
     equations = mechanism.equations
@@ -139,10 +139,8 @@ def dynamics_of(
     noisy = [] if motion.run is not None else noise_remarks(equations, motion, found.effort, driven)
     doubt(*noisy, of=model)
     remarks = [*motion.notes, *noisy, *notes]
-    remarks += _notes(equations, found.free, found.shared, driven, motion, bool(outside))
-    return InverseDynamics(
-        run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), outside
-    )
+    remarks += _notes(equations, found.free, found.shared, driven, motion, bool(plates))
+    return InverseDynamics(run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), plates)
 
 
 def _forces(mechanism: Mechanism, blocks: Matrix, parameters: Vector | Matrix) -> tuple[Matrix, NDArray[np.float64]]:

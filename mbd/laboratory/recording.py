@@ -14,6 +14,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import number
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.smoothing import smoothed
+from mbd.laboratory.measured_gait import MeasuredGait, gait_of_recording
 
 __all__ = ["PlateRecord", "Recording"]
 
@@ -245,6 +246,10 @@ class Recording(Mapping[str, Any]):
         from mbd.laboratory.write import write
 
         return write(self, path)
+
+    def measured_gait(self) -> MeasuredGait:
+        """Its strides and curves for `mbd.gait_report`: by events, with angles and plates that it has."""
+        return gait_of_recording(self)
 
     def __repr__(self) -> str:
         span = f"{len(self.time)} frames from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "no frame"

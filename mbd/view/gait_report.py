@@ -74,6 +74,7 @@ def _draw(axes: Any, report: GaitReport, subject: str, quantity: str) -> bool:
         for curve in walk.curves:
             if (curve.subject, curve.quantity) == (subject, quantity):
                 unit = curve.unit
+                _band(axes, report, curve)
                 _line(axes, curve, _color(curve.side, report), DASHES[number % len(DASHES)])
     axes.set_xlim(0.0, 100.0)
     axes.set_ylabel(f"{quantity} [{unit}]")
@@ -81,6 +82,13 @@ def _draw(axes: Any, report: GaitReport, subject: str, quantity: str) -> bool:
     if max((abs(y) for line in axes.lines for y in line.get_ydata()), default=0.0) < NOTHING:
         axes.set_ylim(-1.0, 1.0)
     return bool(unit)
+
+
+def _band(axes: Any, report: GaitReport, curve: Curve) -> None:
+    """The band of normal gait, once behind all curves of a quantity."""
+    found = report.band.of(curve.subject, curve.quantity, curve.unit) if report.band is not None else None
+    if found is not None and not axes.collections:
+        axes.fill_between(*found, color=tone(NEUTRAL), alpha=0.25, lw=0.0, zorder=0.5)
 
 
 def _line(axes: Any, curve: Curve, color: str, dash: str) -> None:
@@ -122,12 +130,17 @@ def _matters(report: GaitReport, key: tuple[str, str]) -> bool:
 def _legend(figure: Any, report: GaitReport) -> None:
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], color=_color(side.name, report), label=side.name) for side in report.walks[0].sides]
+    sides = report.walks[0].sides
+    handles: list[Any] = [Line2D([], [], color=_color(side.name, report), label=side.name) for side in sides]
     if len(report.walks) > 1:
         handles += [
             Line2D([], [], color=tone(NEUTRAL), ls=DASHES[k % len(DASHES)], label=as_label(walk.name))
             for k, walk in enumerate(report.walks)
         ]
+    if report.band is not None:
+        from matplotlib.patches import Patch
+
+        handles.append(Patch(color=tone(NEUTRAL), alpha=0.25, lw=0.0, label=f"normal: {report.band.source}"))
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
 
 

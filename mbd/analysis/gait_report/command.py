@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from mbd.analysis.gait_report.band import read_band
 from mbd.analysis.gait_report.report import gait_report
 
 __all__ = ["run"]
@@ -20,11 +21,12 @@ def run(runs: Sequence[Any], names: Sequence[str], out: Path, arguments: Namespa
     Parameters
     ----------
     runs, names : trajectories and what to call them; out : folder for ``gait.csv``, ``gait.png`` and ``gait.html``
-    arguments : sides, symmetry, mass, strides, open
+    arguments : sides, symmetry, mass, strides, band, open
     """
+    band = None if arguments.band is None else read_band(arguments.band)
     found = gait_report(
         *runs, names=names, sides=arguments.sides, symmetry=arguments.symmetry, mass=arguments.mass,
-        strides=arguments.strides,
+        strides=arguments.strides, band=band,
     )  # fmt: skip
     print(found)
     written = []

@@ -17,7 +17,7 @@ from mbd.results.interpolation import Side as When
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["PERCENT", "Curve", "curves_of", "forces_at", "grips_of"]
+__all__ = ["PERCENT", "Curve", "angles_of", "curves_of", "forces_at", "grips_of"]
 
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Share of the stride [%]."""
@@ -52,7 +52,7 @@ class Curve:
 
 def curves_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> list[Curve]:
     """All curves of all sides; moments, powers and forces over the mass where it is given."""
-    angles = {side.name: _angles(run, side.name) for side in sides}
+    angles = {side.name: angles_of(run, side.name) for side in sides}
     joints = [angle.coordinate for own in angles.values() for angle in own if angle.coordinate]
     moments = Moments(run, joints)
     per = "" if mass is None else "/kg"
@@ -84,7 +84,7 @@ class _Angle(NamedTuple):
     shown: float = 1.0
 
 
-def _angles(run: Trajectory, side: str) -> list[_Angle]:
+def angles_of(run: Trajectory, side: str) -> list[_Angle]:
     """Angles of the joints of a side, and observed ones; of joints of the body those of ISB that move.
 
     An angle of ISB that is a coordinate, or its opposite, stands for it. The three of a raised arm are left out: their

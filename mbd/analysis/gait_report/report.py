@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from mbd.analysis.gait_report.band import NormativeBand
 from mbd.analysis.gait_report.curves import PERCENT, Curve, curves_of
 from mbd.analysis.gait_report.measures import BOTH, Measure, Spent, energy_of, measures_of
 from mbd.analysis.gait_report.strides import Side, sides_of
@@ -59,11 +60,13 @@ class GaitReport:
     """Numbers by side, symmetry, curves over the stride and energy by cause of one run or several.
 
     walks : one for each run; symmetry : name of the definition; mass : by which loads are divided [kg], or None
+    band : of normal gait, behind the curves
     """
 
     walks: tuple[Walk, ...]
     symmetry: str
     mass: float | None
+    band: NormativeBand | None = None
 
     def __getitem__(self, quantity: str) -> dict[str, float]:
         """A number of the first run by side: ``report["step length"]["left"]``."""
@@ -95,10 +98,10 @@ class GaitReport:
     def rows(self) -> list[tuple[str, ...]]:
         """The table of numbers as texts: means by side and the symmetry of each, for every run."""
         found = []
-        for number_, first in enumerate(self.walks[0].measures):
+        for first in self.walks[0].measures:
             cells = [f"{first.quantity} [{first.unit}]"]
             for walk in self.walks:
-                measure = walk.measures[number_]
+                measure = next(each for each in walk.measures if each.quantity == first.quantity)
                 cells += [_text(measure.mean[side.name]) for side in walk.sides]
                 cells.append(self._asymmetry_text(walk, measure))
             found.append(tuple(cells))
@@ -132,6 +135,8 @@ class GaitReport:
             yield f"{walk.name}: strides {counts}"
         yield from _columns([self.heads, *self.rows()])
         yield ""
+        if self.band is not None:
+            yield f"band of normal gait: {self.band.source}"
         yield from _columns([("energy of a stride [J]", *(walk.name for walk in self.walks)), *self.energy_rows()])
 
     def _repr_html_(self) -> str:
@@ -208,6 +213,7 @@ class GaitReport:
 def gait_report(
     run: Any, *others: Any, names: Sequence[str] | None = None, sides: Sequence[str] = ("left", "right"),
     symmetry: str = "Robinson", mass: float | None = None, strides: int | None = None,
+    band: NormativeBand | None = None,
 ) -> GaitReport:  # fmt: skip
     """How a walker walks: numbers by side, symmetry, curves over the stride, energy by side and cause; runs compared.
 
@@ -223,13 +229,16 @@ def gait_report(
 
     Parameters
     ----------
-    run, others : trajectories of `simulate`, or gaits with a `walk` or a `run`, such as of `limit_cycle`
+    run, others : trajectories of `simulate`; gaits with a `walk` or a `run`, such as of `limit_cycle`; what was
+        measured, so that it stands beside a simulation: the result of `mbd.inverse_dynamics` with plates, or a
+        `Recording` with foot strikes among its events
     names : of the runs in tables, by default those of their models
     sides : words of both sides, the sound one first where one is not
     symmetry : 'Robinson' ``2 |x_s − x_p|/(|x_s| + |x_p|) · 100 %``, 'ratio' ``x_p/x_s`` or 'STA' ``(x_s −
         x_p)/(|x_s| + |x_p|)``, s the first side; a dash where braking and driving cancel
     mass : of the body, by which loads, moments and powers are divided [kg]; None: they are as they are
     strides : how many of each side count, the last ones; None: all that are whole
+    band : of normal gait, drawn behind the curves with its source, see `mbd.read_band`; moments and powers need `mass`
 
     Raises
     ------
@@ -252,18 +261,32 @@ def gait_report(
         raise ModelError(f"mass of gait_report must be positive, got {size:g} kg")
     if strides is not None and (not isinstance(strides, int) or isinstance(strides, bool) or strides < 1):
         raise ModelError(f"strides of gait_report is a number of strides ≥ 1, got {strides!r}")
+    if band is not None and not isinstance(band, NormativeBand):
+        raise ModelError(f"band of gait_report is an mbd.NormativeBand, as mbd.read_band gives it; got {band!r}")
     walks = [_walked(each) for each in (run, *others)]
     titles = _titles([each.name for each in walks] if names is None else _given(names))
     if len(titles) != len(walks):
         raise ModelError(f"names of gait_report are one for each run; got {len(titles)} names and {len(walks)} runs")
     reports = [_walk(each, title, words, size, strides) for each, title in zip(walks, titles, strict=True)]
-    return GaitReport(tuple(reports), symmetry, size)
+    return GaitReport(tuple(reports), symmetry, size, band)
 
 
-def _walked(value: Any) -> Trajectory:
+class Measured(Protocol):
+    """What was measured of a gait, and reports itself."""
+
+    name: str
+
+    def walk(self, title: str, words: Sequence[str], mass: float | None, strides: int | None) -> Walk:
+        """Its strides, numbers and curves."""
+
+
+def _walked(value: Any) -> Trajectory | Measured:
     """The run of what was given; a gait walks some strides."""
     if isinstance(value, Trajectory):
         return value
+    if hasattr(value, "measured_gait"):
+        measured: Measured = value.measured_gait()
+        return measured
     walk = getattr(value, "walk", None)
     run = walk(6) if callable(walk) else getattr(value, "run", None)
     if not isinstance(run, Trajectory):
@@ -281,7 +304,11 @@ def _titles(names: Sequence[str]) -> list[str]:
     return [name if names.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(names, start=1)]
 
 
-def _walk(run: Trajectory, title: str, words: Sequence[str], mass: float | None, strides: int | None) -> Walk:
+def _walk(
+    run: Trajectory | Measured, title: str, words: Sequence[str], mass: float | None, strides: int | None
+) -> Walk:
+    if not isinstance(run, Trajectory):
+        return run.walk(title, words, mass, strides)
     sides = sides_of(run, words, strides)
     return Walk(
         title, tuple(sides), tuple(measures_of(run, sides, mass)), tuple(curves_of(run, sides, mass)),

@@ -15,7 +15,7 @@ from mbd.errors import TrajectoryError
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Side", "Stride", "base_name", "of_side", "sides_of"]
+__all__ = ["Interval", "Side", "Stride", "base_name", "of_side", "sides_of", "strides_between"]
 
 Interval = tuple[float, float]
 
@@ -92,7 +92,7 @@ def sides_of(run: Trajectory, names: Sequence[str], most: int | None = None) -> 
     stances = {side: _stances(run, own) for side, own in contacts.items()}
     strikes = _strikes(run, contacts, stances)
     found = [
-        Side(side, own, stances[side], _strides(side, stances[side], strikes)[-most if most else None :])
+        Side(side, own, stances[side], strides_between(side, stances[side], strikes)[-most if most else None :])
         for side, own in contacts.items()
     ]
     for each in found:
@@ -141,7 +141,7 @@ def _strikes(
     return strikes
 
 
-def _strides(
+def strides_between(
     side: str, stances: Sequence[Interval], strikes: Sequence[tuple[float, str, Matrix]]
 ) -> tuple[Stride, ...]:
     """From strike to strike of a side."""
