@@ -14,7 +14,7 @@ import mbd
 PACKAGE = Path(mbd.__file__).parent
 
 RANKS = [
-    ("errors", "later", "arguments", "arrays", "state", "free_memory", "notebook", "notes", "progress"),
+    ("errors", "equal", "later", "arguments", "arrays", "state", "free_memory", "notebook", "notes", "progress"),
     ("tape", "trees"),
     ("bodies",),
     ("scope",),

@@ -13,14 +13,12 @@ from mbd.analysis.independent import row_sizes
 from mbd.analysis.instant import Instant
 from mbd.analysis.linear_motion import Prescribed, multiplier_map
 from mbd.arrays import ComplexArray, Matrix
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError
 
 __all__ = ["DescriptorForm", "descriptor_form"]
-
-STANDS = 1e-9
-"""Change of a row with time, relative to it, that counts as none [1/s, 1/s²]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def _require_standing(found: Instant, terms: LinearTerms) -> None:
     first = np.where(found.velocity[:, None], 0.0, terms.turning - B @ carried)
     second = np.hstack([terms.change_speed - terms.turning, terms.change_place - terms.turning @ carried])
     size = row_sizes(np.hstack([B, terms.turning]))[:, None]
-    turning = np.max(np.abs(np.hstack([first, second]) / size), axis=1, initial=0.0) > STANDS
+    turning = np.max(np.abs(np.hstack([first, second]) / size), axis=1, initial=0.0) > EQUAL_RTOL
     if np.any(turning):
         titles = ", ".join(title for title, turns in zip(found.titles, turning, strict=True) if turns)
         raise ModelError(

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.analysis.gait import gait
 from mbd.arrays import Vector
+from mbd.equal import EQUAL_RTOL
 from mbd.notebook import Text
 from mbd.results.summary import cost, entries, of_the_swing, strategy
 
@@ -29,9 +30,6 @@ FALLEN = 0.5
 
 STEPS, PROGRESS = 3, 0.5
 """Steps that make a walk at least; distance of the last touchdown from the first over the way from each to the next."""
-
-STILL = 1e-9
-"""Motion of a point over the size of the mechanism below which it is fixed [-]."""
 
 
 class Summary(Text):
@@ -109,7 +107,9 @@ def _fall(run: Trajectory) -> str:
         return ""
     whole = np.stack([run[name] for name in points])
     extent = float(np.max(np.ptp(whole, axis=1), initial=0.0))
-    fixed = [name for name, place in zip(points, whole, strict=True) if np.max(np.ptp(place, axis=0)) <= STILL * extent]
+    fixed = [
+        name for name, place in zip(points, whole, strict=True) if np.max(np.ptp(place, axis=0)) <= EQUAL_RTOL * extent
+    ]
     if any(name not in places for name in fixed):
         return ""
     height = whole @ (-gravity / size)

@@ -17,6 +17,7 @@ from mbd.analysis.amplification import LinearOscillator, oscillated
 from mbd.analysis.closed_forms import ClosedForm, closed_form
 from mbd.analysis.spectrum import Spectrum, argument_faults, spectrum
 from mbd.arrays import Vector
+from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.errors import CapabilityError, ModelError
 from mbd.integrators.base import Integrator
 from mbd.later import later
@@ -30,12 +31,8 @@ GRID = tuple(float(turn) for turn in np.geomspace(1e-2, 1e3, 101))
 """ω dt at which criteria are measured unless others are asked for [rad]."""
 STIFF = (1e3, 1e4, 1e5)
 """ω dt from which the limit at infinity is extrapolated; farther out, round-off grows like ε (ω dt)² [rad]."""
-UNSTABLE = 1e-9
-"""Spectral radius above 1 that counts as growth [-]."""
 SEEN = 2.0
 """ω t at which the error is measured for the order [rad]."""
-ROUND_OFF = 1e-12
-"""Error below which differences are round-off [-]."""
 DAMPED = 0.1
 """Damping ratio of the second oscillator on which the order is measured [-]."""
 
@@ -173,7 +170,7 @@ def _order(integrator: Integrator, damping: float) -> float:
     for steps in (4, 8, 16, 32, 64, 128, 256):
         state, _ = oscillated(integrator, SEEN / steps, damping, np.array([1.0, 0.5]), steps)[-1]
         error = float(np.hypot(state.q[0] - exact[0], state.v[0] * steps / SEEN - exact[1]))
-        if error < ROUND_OFF * steps and len(errors) >= 2:
+        if error < ROUND_OFF_RTOL * steps and len(errors) >= 2:
             break
         errors.append(error)
     rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
@@ -184,7 +181,7 @@ def _leading(integrator: Integrator, damping: float, what: str) -> tuple[int, fl
     """(power, coefficient) of the leading term in ω dt of the damping ratio or of the elongation."""
     turns = 0.4 / 2.0 ** np.arange(6)
     values = np.array([getattr(spectrum(integrator, float(turn), damping), what) for turn in turns])
-    usable = np.abs(values) * turns > 10.0 * ROUND_OFF
+    usable = np.abs(values) * turns > 10.0 * ROUND_OFF_RTOL
     count = int(np.argmin(usable)) if not usable.all() else len(usable)
     if count < 3 or not np.isfinite(values[:count]).all():
         return 0, 0.0
@@ -215,7 +212,7 @@ def _stability_limit(integrator: Integrator, damping: float) -> float:
 
     def grows(turn: float) -> bool:
         try:
-            return spectrum(integrator, turn, damping).radius > 1.0 + UNSTABLE
+            return spectrum(integrator, turn, damping).radius > 1.0 + EQUAL_RTOL
         except CapabilityError:
             return True
 

@@ -13,6 +13,7 @@ from mbd.assembly.trivial_rows import manager_of
 from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.kernel.contact.active_set import ActiveSetManager
@@ -22,9 +23,6 @@ __all__ = ["LARGEST_ANGLE", "GivenState", "beyond_angles", "fits", "given_state"
 
 LARGEST_ANGLE = 1e12
 """Beyond this, neighbouring numbers differ by more than 1e-4 rad: poses, and what depends on them, are round-off."""
-
-ROUND_OFF = 1e-9
-"""Most by which coordinates of a state may be off those of a placement, such as a quaternion's of length 1 [-]."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ def _bad_values(start: State, equations: Equations) -> list[str]:
         else _not_finite(start, equations)
     )
     bad += [f"the start has {fault}; take whole turns away" for fault in beyond_angles(equations, start.q)]
-    return bad or [f"the start has {fault}" for fault in equations.configuration.misplaced(start.q, ROUND_OFF)]
+    return bad or [f"the start has {fault}" for fault in equations.configuration.misplaced(start.q, EQUAL_RTOL)]
 
 
 def _not_finite(start: State, equations: Equations) -> list[str]:

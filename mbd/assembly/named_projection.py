@@ -17,6 +17,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
 from mbd.assembly.posture import TOLERANCE, Posture, close_nearby, close_positions, move
+from mbd.equal import RANK_RTOL
 
 __all__ = ["nearest_positions", "nearest_velocities"]
 
@@ -26,8 +27,6 @@ SMALL = 1e-10
 """Change [m, rad] below which it has arrived."""
 LEAST = 1e-6
 """Weight of changes that no named value asks for, relative to those that one does [-]."""
-RANK = 1e-9
-"""Singular value of B, relative to the largest, below which rows are taken for dependent [-]."""
 
 
 def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, float]) -> bool:
@@ -79,7 +78,7 @@ def nearest_velocities(work: Posture, rows: Sequence[int], named: Mapping[int, f
     off, slopes = _misfits(work, work.rates, named, work.y)
     first, free = _split(B, rate)
     wanted = -(off + slopes @ first)
-    work.y[:n_v] += first + free @ np.linalg.lstsq(slopes @ free, wanted, rcond=RANK)[0]
+    work.y[:n_v] += first + free @ np.linalg.lstsq(slopes @ free, wanted, rcond=RANK_RTOL)[0]
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     speed = 1.0 + float(np.max(np.abs(work.y[:n_v]), initial=0.0))
     return bool(np.max(np.abs(terms.rate[list(rows)]), initial=0.0) <= TOLERANCE * speed)
@@ -97,8 +96,8 @@ def _split(B: Matrix, residual: Vector) -> tuple[Vector, Matrix]:
     if not len(B):
         return np.zeros(n), np.eye(n)
     _, sizes, right = np.linalg.svd(B)
-    rank = int(np.count_nonzero(sizes > RANK * max(float(sizes[0]), 1e-300)))
-    return -np.linalg.pinv(B, rcond=RANK) @ residual, right[rank:].T
+    rank = int(np.count_nonzero(sizes > RANK_RTOL * max(float(sizes[0]), 1e-300)))
+    return -np.linalg.pinv(B, rcond=RANK_RTOL) @ residual, right[rank:].T
 
 
 def _step(B: Matrix, off: Vector, slopes: Matrix, damping: float) -> Vector:

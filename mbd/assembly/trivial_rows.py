@@ -16,6 +16,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.equations.equations import Equations, Row
 from mbd.equations.magnitudes import magnitudes
 from mbd.errors import ModelError
@@ -23,16 +24,12 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 
-__all__ = ["DOUBTFUL", "NEGLIGIBLE", "manager_of", "parts_of_row", "trivial_rows"]
+__all__ = ["DOUBTFUL", "manager_of", "parts_of_row", "trivial_rows"]
 
 POSES = 3
 """Positions at which rows are looked at [-]."""
-NEGLIGIBLE = 1e-12
-"""Derivative relative to the parts that it is made of, below which it is round-off [-]."""
 DOUBTFUL = 1e-6
 """Largest derivative of a row, beside 1 and those of others, above which no closer look is needed [m, rad, -]."""
-FITS = 1e-9
-"""Misfit of a row that no motion changes which counts as none [m, rad]."""
 
 
 def manager_of(mechanism: Mechanism, parameters: Vector) -> ActiveSetManager:
@@ -100,7 +97,7 @@ def _found(mechanism: Mechanism, parameters: Vector) -> tuple[frozenset[int], li
     for block, slopes in zip(blocks, B, strict=True):
         with np.errstate(all="ignore"):
             sizes(block, parameters, out)
-        trivial &= np.all(slopes[doubtful] <= NEGLIGIBLE * out.reshape(len(doubtful), n_v), axis=1)
+        trivial &= np.all(slopes[doubtful] <= ROUND_OFF_RTOL * out.reshape(len(doubtful), n_v), axis=1)
     rows, faults = [k for k, small in zip(doubtful, trivial, strict=True) if small], list[str]()
     for k in rows:
         faults += _misfit(
@@ -148,7 +145,7 @@ def _misfit(row: Row, values: list[float]) -> list[str]:
     if any(each.op == "input" and each.data[0] == "anchor" for each in live([node])):
         return []
     size = max(values, key=abs)
-    if abs(size) <= FITS:
+    if abs(size) <= EQUAL_RTOL:
         return []
     unit = f"{row.unit}/s" if row.is_velocity else row.unit
     return [f"{row.title} is {size:.6g} {unit} whatever the motion, so it can never be 0"]

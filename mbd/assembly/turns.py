@@ -12,6 +12,7 @@ from mbd.arrays import Vector
 from mbd.assembly.pose import Posture
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.equal import EQUAL_RTOL
 from mbd.state import State
 from mbd.tape.derivatives import live
 
@@ -25,13 +26,10 @@ __all__ = [
     "whole_turns",
 ]
 
-EDGE = 1e-9
-"""An angle this near to −π [rad] is called π, so that round-off does not choose between the two."""
-
 
 def whole_turns(angle: float) -> int:
     """How many turns an angle lies away from (−π, π]."""
-    return math.ceil((angle - math.pi - EDGE) / (2.0 * math.pi))
+    return math.ceil((angle - math.pi - EQUAL_RTOL) / (2.0 * math.pi))
 
 
 def _function(mechanism: Mechanism) -> ScalarFunction:

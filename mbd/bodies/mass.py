@@ -11,6 +11,7 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.bodies.algebra import IDENTITY, ZERO, Rotation, Triple
 from mbd.bodies.values import number, numbers
+from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError
 from mbd.tape.node import Scalar
 
@@ -19,8 +20,6 @@ __all__ = ["Inertia", "MassProperties", "inertia_faults", "inertia_fields", "ine
 Inertia: TypeAlias = float | tuple[float, ...]
 """About the center of mass in body axes [kg m²]: a number (about z), (Ixx, Iyy, Izz), or these and (Ixy, Ixz, Iyz)."""
 
-SKEW = 1e-9
-"""Difference of elements of a matrix across its diagonal, over the largest, above which it is not symmetric [-]."""
 
 _ELEMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -71,7 +70,7 @@ def _of_matrix(rows: list[tuple[float, ...]], what: str) -> Inertia:
     if matrix.shape != (3, 3):
         shape = " and ".join(str(len(row)) for row in rows)
         raise ModelError(f"{what}: a matrix of 3 rows of 3 numbers is expected, got rows of {shape}")
-    if np.abs(matrix - matrix.T).max() > SKEW * np.abs(matrix).max():
+    if np.abs(matrix - matrix.T).max() > EQUAL_RTOL * np.abs(matrix).max():
         raise ModelError(f"{what}: the matrix is not symmetric; Ixy, Ixz and Iyz stand on both sides of its diagonal")
     moments, products = matrix.diagonal(), matrix[[0, 0, 1], [1, 2, 2]]
     return tuple(float(each) for each in ((*moments, *products) if products.any() else moments))

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
+from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError
 from mbd.tape.interpolation import Pieces, joined
 from mbd.tape.node import Tape
@@ -20,8 +21,6 @@ __all__ = ["Sole", "sole_of"]
 FINENESS = math.radians(3.0)
 """Largest distance of tangents at which the support function is known [rad]."""
 
-ROUND_OFF = 1e-9
-"""Share of the sole's size by which its radius of curvature may be negative and counts as 0 [-]."""
 
 Point = tuple[float, float]
 Support = tuple[float, float, float]
@@ -165,7 +164,7 @@ def _of_function(function: Callable[[Any], Any], what: str) -> list[Support]:
             raise ModelError(f"{what}: h(ψ) must be a finite number [m], got {value!r} at ψ = {psi:.6g} rad")
         known.append((psi, h, rise))
     size = max(abs(h) for _, h, _ in known) or 1.0
-    if abs(known[0][1] - known[-1][1]) > ROUND_OFF * size:
+    if abs(known[0][1] - known[-1][1]) > EQUAL_RTOL * size:
         raise ModelError(
             f"{what}: h(−π) = {known[0][1]:.6g} m and h(π) = {known[-1][1]:.6g} m must be equal, a turn apart"
         )

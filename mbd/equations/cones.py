@@ -15,13 +15,12 @@ s = (1, 1)         w = γ: opposite to the velocity as it changes within a step,
 from __future__ import annotations
 
 from mbd.equations.equations import Equations
+from mbd.joints.losses.isotropic import LEAST_SQUARE
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["LEAST_SQUARE", "cosine", "sliding_force"]
+__all__ = ["cosine", "sliding_force"]
 
-LEAST_SQUARE = 1e-60
-"""‖w‖² that is none [m²/s²]."""
 NO_SLIP = 1e-100
 """‖s‖² that is none [-]."""
 

@@ -12,6 +12,7 @@ from mbd.constraints.event import Event
 from mbd.constraints.law import Closing, Equation, Law
 from mbd.constraints.machine import state_of
 from mbd.constraints.measure import Measure, gap_of
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.effects import drag_effect, penalty_effect
@@ -28,9 +29,6 @@ from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
 
 __all__ = ["anchors_held", "laws"]
-
-FITS = 1e-9
-"""Misfit of unmoving parts that counts as none [m, rad]: above the round-off of users' sums, far below a tolerance."""
 
 
 def laws(
@@ -156,7 +154,7 @@ def _idle(scope: DerivationScope, node: Node, title: str, kinds: set[str], unit:
         ("p", k): parameter.value for k, parameter in enumerate(scope.parameters.found)
     }
     (size,) = evaluate([node], given)
-    if abs(size) > FITS:
+    if abs(size) > EQUAL_RTOL:
         return [f"{title} is {size:.6g} {unit} whatever the motion, so it can never be 0"]
     return [] if may_fold else [f"{title} is 0 whatever the motion, so it constrains nothing; remove it"]
 

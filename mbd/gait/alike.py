@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import MbdError, ModelError
 from mbd.gait.machines import in_state
@@ -36,8 +37,6 @@ POSES = (0.4, 0.4, 2.5)
 
 The wide one reaches stops and branches of laws that small motions do not.
 """
-ALIKE = 1e-9
-"""Difference, relative to the largest of its kind, below which two sides are alike [-]."""
 EFFECT = 1e-6
 """Change relative to the largest of its kind from which on a parameter is seen to change something [-]."""
 SHARE = 1e-2
@@ -66,7 +65,7 @@ def require_alike(
     different = np.inf
     for choice in choices or [mirror]:
         found = _difference(mechanism, choice, parameters)
-        if found <= ALIKE:
+        if found <= EQUAL_RTOL:
             return choice
         different = min(different, found)
     raise ModelError(_sentence(mechanism, mirror, values, different))
@@ -75,7 +74,7 @@ def require_alike(
 def sides_faults(mechanism: Mechanism, mirror: Mirror, parameters: Vector, values: Mapping[str, float]) -> list[str]:
     """One sentence where the sides are not alike with these values of parameters; none where they are."""
     found = _difference(mechanism, mirror, parameters)
-    return [] if found <= ALIKE else [_sentence(mechanism, mirror, values, found)]
+    return [] if found <= EQUAL_RTOL else [_sentence(mechanism, mirror, values, found)]
 
 
 def moves_sides_alike(

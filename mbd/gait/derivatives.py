@@ -16,6 +16,7 @@ import numpy as np
 from scipy.linalg import eig
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import RANK_RTOL
 from mbd.errors import GaitError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.map_derivative import MapDerivative, Measured, extrapolated, map_derivative, measured
@@ -35,8 +36,6 @@ none [-]."""
 MEETING = 1e-7
 """``|wᴴ u|`` of left and right eigenvectors of length 1, or difference of two moduli relative to them, below which two
 multipliers meet and their largest has no derivative [-]."""
-FLAT = 1e-9
-"""Singular value of 1 − P relative to its largest below which a gait is at a fold, or has neighbours [-]."""
 
 
 class Derivatives(Mapping[tuple[str, str], float]):
@@ -148,7 +147,7 @@ def motion_of(gait: Any, name: str) -> tuple[Vector, Vector]:
         else:
             by_name = member.by(gait.map, gait.chart, here, along, name, values)
         fixed, change = np.vstack([fixed, row]), np.append(change, -by_name)
-    c = np.asarray(np.linalg.lstsq(fixed, change, rcond=FLAT)[0], dtype=float)
+    c = np.asarray(np.linalg.lstsq(fixed, change, rcond=RANK_RTOL)[0], dtype=float)
     left = float(np.max(np.abs(fixed @ c - change), initial=0.0))
     if left > DOUBTFUL * float(np.max(np.abs(change), initial=0.0)):
         raise GaitError(f"no derivative by {name!r}: the branch of gaits has a fold here, where it turns back", gait)

@@ -22,6 +22,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import EQUAL_RTOL
 from mbd.gait.heading_parts import Part, parts_of
 from mbd.gait.reflection import in_space
 
@@ -29,8 +30,6 @@ __all__ = ["Heading", "heading_of"]
 
 STATES = 4
 """States at which a mechanism is compared with itself after a turn [-]."""
-SAME = 1e-9
-"""Difference, relative to 1 or the largest of its kind, up to which it is the same [-]."""
 ROUNDS, FINE = 12, 1e-15
 """Newton steps by which a state is turned as another, and the last of them [rad]."""
 
@@ -123,7 +122,7 @@ def _is_the_same(heading: Heading, parameters: Vector) -> bool:
         there = _numbers(mechanism, parameters, (begun, image, np.append(rates, y[layout.n_v :])), turn)
         for mine, its in zip(here, there, strict=True):
             size = max(1.0, float(np.max(np.abs(mine), initial=0.0)))
-            if not float(np.max(np.abs(mine - its), initial=0.0)) <= SAME * size:
+            if not float(np.max(np.abs(mine - its), initial=0.0)) <= EQUAL_RTOL * size:
                 return False
     return True
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected, way_of
 from mbd.gait.outcome import Outcome
@@ -21,8 +22,6 @@ __all__ = ["changed_events", "limit_between", "limit_beyond"]
 
 HALVINGS = 60
 """Halvings of a bracket at most."""
-LOCATED = 1e-12
-"""Width of a bracket, over the range of the parameter, at which a point counts as located [-]."""
 NEAREST, FURTHEST = 1e-6, 2e-2
 """Distances along the tangent at which a limit is looked for ahead of the last gait [-]."""
 EARLY = 0.999
@@ -65,7 +64,7 @@ def _bracket(
         else:
             high = middle
             beyond = corrected.found.arrival if isinstance(corrected, Corrected) else beyond
-        if high - low <= LOCATED:
+        if high - low <= BRACKET_RTOL:
             break
     return low, high, good, beyond
 

@@ -15,20 +15,17 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.return_map import ReturnMap, Values
-from mbd.gait.special_points import SpecialPoint
+from mbd.gait.special_points import ITERATIONS, SpecialPoint
 from mbd.state import State
 
 __all__ = ["Margin", "Margins", "least_margins", "margin_points", "watched_feet"]
 
 NEIGHBOURS = 3
 """Rows on each side of the smallest one through which a polynomial goes."""
-ITERATIONS = 40
-"""Evaluations of a margin between two points at most."""
-LOCATED = 1e-12
-"""Width of the parameter, over that of its range, at which a point counts as located [-]."""
 
 Margins = Mapping[tuple[str, str], float]
 """Least values [N] by kind ('pull' or 'slip') and foot, in the names of a walk without exchange of sides."""
@@ -160,7 +157,7 @@ def _located(
         values = given.with_value(corrected.value)
         now = least_margins(given.map, watched, corrected.state, values, exact=True).get(key, np.nan)
         width = abs(middle - (b if now * fb > 0.0 else a))
-        if now == 0.0 or width <= LOCATED or not np.isfinite(now):
+        if now == 0.0 or width <= BRACKET_RTOL or not np.isfinite(now):
             break
         if now * fb > 0.0:
             b, fb, fa, side = middle, now, fa * (0.5 if side == 1 else 1.0), 1

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import RANK_RTOL
 from mbd.errors import SimulationError
 from mbd.gait.family import Member
 from mbd.gait.map_derivative import Measured, map_derivative, measured, numbers_of
@@ -32,8 +33,6 @@ FAST = 0.2
 """Factor by which a step with a derivative of before must shrink the residual, else it is made again [-]."""
 FINE = 0.01
 """Residual over `tol` above which one more step is made at the end [-]."""
-FLAT = 1e-9
-"""Singular value of 1 − P relative to its largest below which a direction is left where it is [-]."""
 FAMILY = 1e-3
 """Singular value of 1 − P relative to its largest below which gaits near may form a family [-]."""
 REST = 1e3
@@ -220,7 +219,7 @@ def _damped(
     needed : what the residual of a whole step may be at most, over that before
     """
     assert point.slope is not None
-    step = np.asarray(np.linalg.lstsq(point.slope, gap, rcond=FLAT)[0])
+    step = np.asarray(np.linalg.lstsq(point.slope, gap, rcond=RANK_RTOL)[0])
     before, part = float(np.max(np.abs(gap))), 1.0
     while part >= shortest:
         c = part * step

@@ -14,16 +14,13 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.assembly.trivial_rows import POSES
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import EQUAL_RTOL
 from mbd.joints.reflected import ACROSS, mirrored_signs
 from mbd.topology.plan import plan
 
 __all__ = ["Reflection", "in_space", "reflections"]
-
-ALONG = 1e-9
-"""Difference of what is stored and of its mirror image, relative, up to which they are the same [-]."""
-POSES = 3
-"""States at which what is stored is compared with its mirror image [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +78,7 @@ def _of_anchors(mechanism: Mechanism, partners: Any, signs: tuple[Vector, Vector
     while True:
         mine, its = _stored(mechanism, partners, signs, found, parameters)
         size = max(1.0, float(np.max(np.abs(mine))))
-        same, opposite = (np.all(np.abs(its - sign * mine) <= ALONG * size, axis=0) for sign in (1.0, -1.0))
+        same, opposite = (np.all(np.abs(its - sign * mine) <= EQUAL_RTOL * size, axis=0) for sign in (1.0, -1.0))
         if not np.all(same | opposite):
             return None
         now = np.where(same & opposite, 0.0, np.where(same, 1.0, -1.0))

@@ -17,6 +17,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.constraints.base import Constraint
 from mbd.constraints.rolling_touchdown import RollingSole
+from mbd.equal import INSTANT_RTOL
 from mbd.errors import MbdError, ModelError
 from mbd.gait.alike import moves_sides_alike, sides_faults
 from mbd.gait.heading import Heading
@@ -34,9 +35,6 @@ __all__ = ["Arrival", "ReturnMap", "Values"]
 
 Values = Mapping[str, float]
 """Parameters and values of functions of parameters, by name."""
-
-AT_ONCE = 1e-9
-"""Share of the latest time before which a section counts as reached at once [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,7 +343,7 @@ class ReturnMap:
             if end.stopped_by:
                 return Outcome("other event", f"ends by {end.stopped_by!r} at {end.time:.3g} s", end.time)
             return Outcome("misses", f"{self.section!r} does not happen within {self.longest:.3g} s", end.time)
-        if end.time <= AT_ONCE * self.longest:
+        if end.time <= INSTANT_RTOL * self.longest:
             return Outcome("scuffs", f"scuffs at {end.time:.3g} s: {self.section!r} happens at once", end.time)
         if self._scuffs(start, end, was, now):
             text = f"scuffs at {end.time:.3g} s: {self.section!r} closes before its foot has passed the other"

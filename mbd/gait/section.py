@@ -25,6 +25,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.pose import Posture
 from mbd.assembly.posture import position_rows
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import RANK_RTOL, REST_SPEED
 from mbd.errors import SimulationError
 from mbd.gait.heading import Heading
 from mbd.gait.machines import remembered, state_anchors
@@ -37,10 +38,6 @@ __all__ = ["Chart", "Section", "section_of"]
 
 CLOSED = 1e-7
 """Gap of the section's event [m, rad] after a reset up to which it still holds."""
-STILL = 1e-9
-"""Sliding velocity of a foot with friction, relative to 1 or the speed, below which it sticks [m/s]."""
-DEPENDENT = 1e-9
-"""Singular value of rows relative to the largest below which one depends on others [-]."""
 SMALL = 1e-6
 """Difference of velocities, relative to 1 or them, from which the gradient of what an event watches follows [-]."""
 CORRECTIONS, FINE = 12, 1e-14
@@ -259,7 +256,7 @@ def section_of(
     rates += [
         friction.row for friction in manager.frictions
         if friction.contact >= 0 and manager.contacts[friction.contact].name in after
-        and abs(terms.rate[friction.row]) <= STILL * speed
+        and abs(terms.rate[friction.row]) <= REST_SPEED * speed
     ]  # fmt: skip
     places = sorted({*position_rows(posture(after)), *position_rows(posture(before | after))})
     out = np.zeros(max(mechanism.sizes["guards"], 1))
@@ -315,13 +312,13 @@ def _carried(
 def _row_space(rows: Matrix) -> Matrix:
     """An orthonormal basis (n, r) of the row space."""
     _, sizes, V = np.linalg.svd(rows, full_matrices=False)
-    return np.asarray(V[sizes > DEPENDENT * max(float(np.max(sizes, initial=0.0)), 1e-300)].T)
+    return np.asarray(V[sizes > RANK_RTOL * max(float(np.max(sizes, initial=0.0)), 1e-300)].T)
 
 
 def _null_space(rows: Matrix) -> Matrix:
     """An orthonormal basis (n, n − r) of the null space."""
     _, sizes, V = np.linalg.svd(rows, full_matrices=True)
-    rank = int(np.sum(sizes > DEPENDENT * max(float(np.max(sizes, initial=0.0)), 1e-300)))
+    rank = int(np.sum(sizes > RANK_RTOL * max(float(np.max(sizes, initial=0.0)), 1e-300)))
     return np.asarray(V[rank:].T)
 
 

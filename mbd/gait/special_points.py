@@ -15,15 +15,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 
 __all__ = ["KINDS", "TESTS", "SpecialPoint", "polished", "special_points"]
 
 ITERATIONS = 40
-"""Evaluations of a test function between two points at most."""
-LOCATED = 1e-12
-"""Width of the parameter, over that of its range, at which a point counts as located [-]."""
+"""Evaluations of a margin between two points at most."""
+
 CLOSE, SECANTS = 1e-3, 8
 """Change of the parameter, over its range, from which on derivatives are found with least errors [-], and how often."""
 FINER = 1e-3
@@ -151,7 +151,7 @@ def polished(
             break
         along, last = abs(step), (place, now)
         best = point, float(rate * along + abs(rate * point.multipliers.error / (slope or 1.0)) + left), place, rate
-        if rate * along <= LOCATED * given.width:
+        if rate * along <= BRACKET_RTOL * given.width:
             break
         place += step
     if best is None:

@@ -11,14 +11,13 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import EQUAL_RTOL
 from mbd.gait.unmoved import reset_names
 
 __all__ = ["angles", "unwound", "whole_turn_changes_nothing"]
 
 STATES = 3
 """States at which a mechanism is compared with itself after a whole turn of an angle [-]."""
-SAME = 1e-9
-"""Difference, relative to 1 or the largest of its kind, up to which it is the same [-]."""
 
 
 def angles(mechanism: Mechanism) -> list[int]:
@@ -61,7 +60,7 @@ def _is_the_same(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
         turned = configuration.compose(q, move)
         for mine, its in zip(*(_numbers(mechanism, parameters, touched, at, y) for at in (q, turned)), strict=True):
             size = max(1.0, float(np.max(np.abs(mine), initial=0.0)))
-            if not float(np.max(np.abs(mine - its), initial=0.0)) <= SAME * size:
+            if not float(np.max(np.abs(mine - its), initial=0.0)) <= EQUAL_RTOL * size:
                 return False
     return True
 

@@ -10,19 +10,15 @@ import numpy as np
 
 import mbd
 from mbd.constraints import height
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import halved
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
+from mbd.simulation.simulate import REST_SPEED
 
 __all__ = ["CASES"]
-
-REST_SPEED = 1e-6
-"""Below this approach speed a ball may rest: what `simulate` does unless told otherwise [m/s]."""
-
-ROUND_OFF = 1e-12
-"""Relative error of speeds and energies after many impacts [-]."""
 
 
 @cache
@@ -91,16 +87,16 @@ def bouncing(id: str, scheme: Any) -> Outcome:
     late = published(id, "Zeno time") + tail
     figures = [
         Figure("error of impact times [s]", size(off), accuracy(id, "impact times") + 1e-12),
-        Figure("error of apex heights [m]", size(tops - apexes[1:]), accuracy(id, "apex heights") + ROUND_OFF * h),
+        Figure("error of apex heights [m]", size(tops - apexes[1:]), accuracy(id, "apex heights") + ROUND_OFF_RTOL * h),
         Figure(
             "error of the first impulse, relative [-]",
-            abs(events[0].impulse[0] / published(id, "total impulse") - 1.0), ROUND_OFF,
+            abs(events[0].impulse[0] / published(id, "total impulse") - 1.0), ROUND_OFF_RTOL,
         ),
         Figure("error of the Zeno time [s]", abs(found[-1] - published(id, "Zeno time")), tail + 1e-11),
         Figure("events [-]", len(run.events), limit),
         Figure("events with one step beyond the end [-]", len(coarse.events), limit),
         Figure("penetration [m]", deepest(run), 1e-10),
-        Figure("energy gained, relative [-]", float(np.max(np.diff(total))) / total[0], ROUND_OFF),
+        Figure("energy gained, relative [-]", float(np.max(np.diff(total))) / total[0], ROUND_OFF_RTOL),
         Figure("error of the contact force at rest [N]",
                abs(run["floor.force"][-1] - published(id, "contact force")), 1e-10 * m * g),
         *rest_figures(run, m, g, late, "after the Zeno time"),
@@ -198,16 +194,17 @@ def cornered(id: str, scheme: Any) -> Outcome:
     found = [run["flight.x.rate"][-1], run["flight.y.rate"][-1]]
     speed = math.hypot(vx, vy)
     times = [event.time for event in run.events]
+    limit = accuracy(id, "velocity") + ROUND_OFF_RTOL * speed
     figures = [
-        Figure("error of the velocity after [m/s]", size(found - wanted), accuracy(id, "velocity") + ROUND_OFF * speed),
+        Figure("error of the velocity after [m/s]", size(found - wanted), limit),
         Figure("impacts more or less than two [-]", abs(len(run.events) - 2), 0.0),
         Figure("time between the two impacts [s]", max(times) - min(times) if times else math.nan, 0.0),
         Figure("error of the impact time [s]", size(np.array(times) - wait), 1e-12),
-        Figure("change with the order of the walls, relative [-]", difference(run, other), ROUND_OFF),
+        Figure("change with the order of the walls, relative [-]", difference(run, other), ROUND_OFF_RTOL),
         Figure("penetration [m]", deepest(run), 1e-10),
         *impact_figures(corner(m, e1, e2, False), run),
         Figure("non-smooth steps: error of the velocity after [m/s]", size(stepped.record.v[-1] - wanted),
-               accuracy(id, "velocity") + ROUND_OFF * speed),
+               accuracy(id, "velocity") + ROUND_OFF_RTOL * speed),
         *within_steps("the impact times [s]", [0.03 * wait], [[event.time - wait for event in stepped.events]], 1.0),
         *stepped_figures(corner(m, e1, e2, False), stepped),
     ]  # fmt: skip

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import mbd
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, halved, second_order
 from mbd.hardcases.impacts import deepest, difference, impact_figures
@@ -19,7 +20,6 @@ from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 
 __all__ = ["CASES"]
 
-ROUND_OFF = 1e-12
 BESIDE = 1e-6
 """How far beside the angle of toppling a block is let go, relative [-]."""
 
@@ -222,7 +222,7 @@ def rest_figures(run: Any, block: Block, count: int) -> list[Figure]:
         Figure("force on a corner / (m g / 2) − 1 [-]",
                size([run[f"{name}.force"][-1] / half - 1.0 for name in ("left", "right")]), 1e-10),
         Figure("penetration [m]", deepest(run), 1e-10),
-        Figure("energy gained at impacts, relative [-]", float(np.max(impacts)) / begun, ROUND_OFF),
+        Figure("energy gained at impacts, relative [-]", float(np.max(impacts)) / begun, ROUND_OFF_RTOL),
     ]  # fmt: skip
 
 
@@ -247,18 +247,19 @@ def landing(id: str, scheme: Any) -> Outcome:
     wanted, impulses = published(id, "velocity after"), published(id, "corner impulses")
     by_corner = {event.name: event.impulse[0] for event in strikes(run)}
     times = [event.time for event in run.events]
+    limit = accuracy(id, "velocity after") + ROUND_OFF_RTOL
     figures = [
-        Figure("error of the velocity after [m/s]", size(found - wanted), accuracy(id, "velocity after") + ROUND_OFF),
-        Figure("rotation created [rad/s]", abs(found[2] - given["omega"]), ROUND_OFF),
+        Figure("error of the velocity after [m/s]", size(found - wanted), limit),
+        Figure("rotation created [rad/s]", abs(found[2] - given["omega"]), ROUND_OFF_RTOL),
         Figure("error of the impulses [N s]",
                size([by_corner.get(name, math.nan) for name in ("left", "right")] - impulses), accuracy(id, "corner")),
         Figure("events more or less than two [-]", abs(len(run.events) - 2), 0.0),
         Figure("time between the two impacts [s]", max(times) - min(times) if times else math.nan, 0.0),
-        Figure("change with the order of the corners, relative [-]", difference(run, other), ROUND_OFF),
+        Figure("change with the order of the corners, relative [-]", difference(run, other), ROUND_OFF_RTOL),
         Figure("penetration [m]", deepest(run), 1e-10),
         *impact_figures(model_of(block), run),
         Figure("non-smooth steps: error of the velocity after [m/s]", size(stepped.record.v[-1] - wanted),
-               accuracy(id, "velocity after") + ROUND_OFF),
+               accuracy(id, "velocity after") + ROUND_OFF_RTOL),
         *stepped_figures(model_of(block), stepped),
     ]  # fmt: skip
     return Outcome(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import mbd
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
@@ -17,7 +18,6 @@ from mbd.simulation.arguments import CHOICES
 
 __all__ = ["CASES"]
 
-ROUND_OFF = 1e-12
 LAWS = {
     "newton": "velocities, simultaneous Newton (Moreau) law",
     "sequential": "velocities, sequential (pairwise, repeated) law",
@@ -78,17 +78,17 @@ def law_figures(id: str, law: str, scheme: Any) -> tuple[list[Figure], Any]:
             "error of them where touching balls are not named as closed [m/s]",
             size(unnamed - reference), accuracy(id, LAWS[law]),
         ),
-        Figure("change of momentum, relative [-]", size(momentum / scale - 1.0), ROUND_OFF),
+        Figure("change of momentum, relative [-]", size(momentum / scale - 1.0), ROUND_OFF_RTOL),
         Figure(
             "error of the energy before, relative [-]",
-            abs(kinetic[0] / published(id, "kinetic energy before") - 1.0), ROUND_OFF,
+            abs(kinetic[0] / published(id, "kinetic energy before") - 1.0), ROUND_OFF_RTOL,
         ),
-        Figure("kinetic energy gained, relative [-]", float(np.max(np.diff(kinetic))) / kinetic[0], ROUND_OFF),
+        Figure("kinetic energy gained, relative [-]", float(np.max(np.diff(kinetic))) / kinetic[0], ROUND_OFF_RTOL),
         Figure("penetration [m]", deepest(run), 1e-10),
     ]  # fmt: skip
     if law == "newton":
         figures += [
-            Figure("change with the order of the contacts, relative [-]", difference(run, other), ROUND_OFF),
+            Figure("change with the order of the contacts, relative [-]", difference(run, other), ROUND_OFF_RTOL),
             *impact_figures(model, run),
         ]
     else:

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 
 from mbd.compile.mechanisms import mechanism_of
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.hardcases.case import Figure
 from mbd.hardcases.references import size
 from mbd.results.record import EventRecord
 
 __all__ = ["deepest", "difference", "impact_figures"]
-
-RELATIVE = 1e-12
-"""What a balance may miss of the size of its terms: some thousand units of round-off."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +38,16 @@ def impact_figures(model: Any, run: Any) -> list[Figure]:
     if not found:
         return [Figure("impacts that did not happen [-]", 1.0, 0.0)]
     return [
-        Figure("momentum balance at impacts, relative [-]", size([each.momentum for each in found]), RELATIVE),
-        Figure("complementarity at impacts, relative [-]", size([each.complementarity for each in found]), RELATIVE),
+        Figure("momentum balance at impacts, relative [-]", size([each.momentum for each in found]), ROUND_OFF_RTOL),
         Figure(
-            "kinetic energy gained at an impact, relative [-]", float(np.max([each.gain for each in found])), RELATIVE
+            "complementarity at impacts, relative [-]", size([each.complementarity for each in found]), ROUND_OFF_RTOL
         ),
-        Figure("rates of held rows after impacts, relative [-]", size([each.held for each in found]), RELATIVE),
+        Figure(
+            "kinetic energy gained at an impact, relative [-]",
+            float(np.max([each.gain for each in found])),
+            ROUND_OFF_RTOL,
+        ),
+        Figure("rates of held rows after impacts, relative [-]", size([each.held for each in found]), ROUND_OFF_RTOL),
     ]
 
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 import mbd
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 
 __all__ = ["CASES"]
 
-ROUND_OFF = 1e-12
 KINDS = ("frictionless", "sticking")
 """The two laws at the end that strikes, in the order of the reference energies."""
 
@@ -67,17 +67,17 @@ def law_figures(id: str, kind: str, scheme: Any) -> list[Figure]:
         Figure(f"{kind}: failures that do not name the end [-]", float(not is_named), 0.0),
         Figure(
             f"{kind}: error of the impact time [s]",
-            abs(event.time - time), accuracy(id, "impact time") + ROUND_OFF * time,
+            abs(event.time - time), accuracy(id, "impact time") + ROUND_OFF_RTOL * time,
         ),
         Figure(
             f"{kind}: error of the velocity after [m/s, rad/s]",
-            size(final - published(id, name)), accuracy(id, name) + ROUND_OFF * scale,
+            size(final - published(id, name)), accuracy(id, name) + ROUND_OFF_RTOL * scale,
         ),
     ]  # fmt: skip
     if kind == "sticking":
         along, up = published(id, "sticking impulse")
         off = [event.impulse[0] - up, event.impulse[1] - along]
-        limit = accuracy(id, "sticking impulse") + ROUND_OFF * up
+        limit = accuracy(id, "sticking impulse") + ROUND_OFF_RTOL * up
         figures.append(Figure(f"{kind}: error of the impulse [N s]", size(off), limit))
     return figures
 

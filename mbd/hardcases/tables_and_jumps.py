@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 import mbd
+from mbd.equal import EQUAL_RTOL
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome
 from mbd.hardcases.references import numbers, published, quantity, size
 from mbd.hardcases.schemes import EVERY, holds_positions_only
@@ -14,8 +15,6 @@ from mbd.hardcases.schemes import EVERY, holds_positions_only
 __all__ = ["CASES", "followed", "switched"]
 
 LEG, ROD = "j19-leg-driven-by-a-table", "j20-torque-that-jumps"
-EXACT = 1e-9
-"""Largest error of torques over the largest torque, where accelerations follow from the spline alone [-]."""
 INDEX_3 = 1e-2
 """The same of schemes that hold positions only, whose multipliers have an error of dt² [-]."""
 
@@ -38,7 +37,7 @@ def judge_followed(integrator: Any) -> Outcome:
     given = numbers(LEG)
     model = followed(given)
     run = mbd.simulate(model, mbd.assemble(model), integrator, dt=given["dt"], until=given["until"])
-    allowed = INDEX_3 if holds_positions_only(integrator) else EXACT
+    allowed = INDEX_3 if holds_positions_only(integrator) else EQUAL_RTOL
     figures, curves = [], []
     for joint in ("hip", "knee"):
         reference, found = quantity(LEG, f"{joint} torque"), run[f"{joint} drive.torque"]

@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import EQUAL_RTOL
 from mbd.joints.base import Joint
 
 __all__ = ["ACROSS", "AsWritten", "exchanged", "mirrored_signs", "signs_in_a_mirror"]
 
-ALONG = 1e-9
-"""Difference of a twist and its partner's [-, m] up to which they are the same."""
 
 ACROSS = {axis: np.where(np.arange(3) == "xyz".index(axis), -1.0, 1.0) for axis in "zyx"}
 """Reflections σ across axes, in the order in which they are tried: to the side first."""
@@ -41,7 +40,7 @@ def mirrored_signs(joint: Joint, partner: Joint | None, sigma: Vector) -> tuple[
     mirrored = np.hstack([-sigma * mine[:, :3], sigma * mine[:, 3:]])
     v = np.zeros(len(mine))
     for sign in (1.0, -1.0):
-        v[np.all(np.abs(sign * its - mirrored) <= ALONG, axis=1)] = sign
+        v[np.all(np.abs(sign * its - mirrored) <= EQUAL_RTOL, axis=1)] = sign
     if not np.all(v):
         return None
     if joint.is_vector:

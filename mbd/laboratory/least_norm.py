@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import RANK_RTOL
 
 __all__ = ["Balanced", "balanced"]
-
-RANK = 1e-9
-"""Singular values of some rows below this part of the largest of all count as zero [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +58,12 @@ def balanced(g: Matrix, R: NDArray[np.float64], driven: NDArray[np.bool_]) -> Ba
 
 
 def _inverse(matrices: NDArray[np.float64], scale: Vector) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Pseudo-inverse and rank of each matrix; what is below `RANK` of a scale counts as zero."""
+    """Pseudo-inverse and rank of each matrix; what is below `RANK_RTOL` of a scale counts as zero."""
     count, n, m = matrices.shape
     if not matrices.size:
         return np.zeros((count, m, n)), np.zeros(count, dtype=np.intp)
     U, sizes, V = np.linalg.svd(matrices, full_matrices=False)
-    kept = sizes > RANK * scale[:, np.newaxis]
+    kept = sizes > RANK_RTOL * scale[:, np.newaxis]
     inverse = np.where(kept, 1.0 / np.where(kept, sizes, 1.0), 0.0)
     return np.einsum("kji,kj,klj->kil", V, inverse, U), kept.sum(axis=1)
 

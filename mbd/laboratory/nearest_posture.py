@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.compile.many import at_blocks, blocks_of
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import RANK_RTOL
 from mbd.errors import ModelError
 from mbd.laboratory.marker_program import MarkerProgram
 
@@ -23,8 +24,6 @@ MAX_TURN = 0.5
 """Largest turn of one step, so that no angle winds up by a whole turn [rad]."""
 DAMPING = 1e-12
 """What is added to the diagonal of JᵀWJ, over its largest entry: directions that nothing measures stay [-]."""
-UNSEEN = 1e-9
-"""Least part of the largest eigenvalue of JᵀWJ that tells of a direction that markers determine [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,6 +236,6 @@ class _Step:
         for k in patterns:
             A = np.concatenate([problem.weight[k][:, np.newaxis] * J[k, :n], J[k, n : n + problem.rows]])
             sizes, V = np.linalg.eigh(A.T @ A)
-            null = V[:, sizes <= UNSEEN * max(sizes[-1], 1e-300)]
+            null = V[:, sizes <= RANK_RTOL * max(sizes[-1], 1e-300)]
             found |= np.linalg.norm(null, axis=1) > 1e-3
         return found

@@ -16,11 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.trivial_rows import DOUBTFUL, NEGLIGIBLE, parts_of_row
+from mbd.assembly.trivial_rows import DOUBTFUL, parts_of_row
 from mbd.compile.python import ArrayFunction, array_function
+from mbd.equal import REST_SPEED, ROUND_OFF_RTOL
 from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.equations.magnitudes import magnitudes
+from mbd.kernel.algebra.redundancy import LEAST_SHARE
+from mbd.kernel.stepping.restart import MOST_LOADS
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
@@ -40,14 +43,8 @@ SAMPLES = 16
 """Stored states at which the dependence of rows is judged, at most [-]."""
 LEAST_SIZE = -1e6
 """Log |det| that stands for that of a singular matrix [-]."""
-MOST_LOADS = 30
-"""How often multipliers that friction follows are solved for again [-]."""
-LEAST_SHARE = 1e-4
-"""Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
 SETTLED = 1e-13
 """Relative change of multipliers at which that ends [-]."""
-AT_REST = 1e-9
-"""Speed of sliding that is none [m/s]."""
 STICKS = 2
 """Phase of a friction that sticks."""
 
@@ -157,7 +154,7 @@ class Balance:
         other = self.equations.frictions[own.partner]
         x, y = rates[:, own.row], rates[:, other.row]
         pull, beside = rows.lam[:, own.row], rows.lam[:, other.row]
-        resting = np.hypot(x, y) < AT_REST  # γ has no direction yet
+        resting = np.hypot(x, y) < REST_SPEED  # γ has no direction yet
         x, y = np.where(resting, pull, x), np.where(resting, beside, y)
         size = np.hypot(x, y)
         return np.divide(x, size, out=np.zeros_like(x), where=size > 0.0)
@@ -220,7 +217,9 @@ class Balance:
         sizes = np.array(self.states.evaluate(parts, rows)).reshape(len(doubtful), -1, len(rows))
         n_v = self.equations.n_v
         trivial = {
-            k for k, size in zip(doubtful, sizes, strict=True) if np.all(np.abs(B[:, k, :n_v]) <= NEGLIGIBLE * size.T)
+            k
+            for k, size in zip(doubtful, sizes, strict=True)
+            if np.all(np.abs(B[:, k, :n_v]) <= ROUND_OFF_RTOL * size.T)
         }
         return [k for k in every if k not in trivial]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.dense import NEAR_POSE, Restepping
-from mbd.results.polynomials import Places, hermite, quintic
+from mbd.results.polynomials import AT_ONCE, Places, hermite, quintic
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 
@@ -27,8 +27,6 @@ __all__ = ["LedSteps"]
 Index = NDArray[np.intp]
 
 NAMES = ("q", "v", "z", "a", "s", "lam")
-AT_ONCE = 1024
-"""Places that are stepped to together."""
 SHORT = 1e-9
 """Difference of a cubic and a quintic over the way in an interval below which its step is short: ω h = 0.025 [-]."""
 

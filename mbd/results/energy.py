@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.results.columns import ModelColumns
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.powers import Lost, Power, moving_share, powers
@@ -35,11 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
 
-ROUND_OFF = 1e-12
-"""A part that no element of the model names is not listed below this share of the largest energy [-].
-
-Nor are works integrated again whose error in one interval is below it.
-"""
 ALIKE = 1e-14
 """Difference of two works of an interval, over the largest, that is round-off [-]."""
 RESOLVED = 0.05
@@ -82,7 +78,7 @@ def doubted_ledger(columns: ModelColumns, lending: Container[str] = ()) -> tuple
         Part(effect.name, effect.column if effect.power is None else "potential", energy)
         for (effect, _), energy in pairs
     )
-    least = ROUND_OFF * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
+    least = ROUND_OFF_RTOL * float(np.max(np.abs(kinetic) + np.abs(potential), initial=0.0))
     named, moved, doubt = _works(columns, found, moving, least, lending)
     driven = any(power.kind == "constraint" for power in found)
     unnamed = [*moved, *_jumps(columns, kinetic + potential, driven)]
@@ -156,7 +152,7 @@ def _trapezoid(time: Vector, power: Vector) -> Vector:
 
 def never_giving(work: Vector, power: Vector, trapezoid: Vector) -> Vector:
     """A work whose power is nowhere positive, with the trapezoid where a polynomial through it overshoots."""
-    if np.max(power, initial=0.0) > ROUND_OFF * np.max(np.abs(power), initial=0.0):
+    if np.max(power, initial=0.0) > ROUND_OFF_RTOL * np.max(np.abs(power), initial=0.0):
         return work
     steps = np.diff(work)
     return np.concatenate([[0.0], np.cumsum(np.where(steps > 0.0, np.minimum(trapezoid, 0.0), steps))])
@@ -200,7 +196,7 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     np.maximum.at(size, episode, np.abs(since))
     np.maximum.at(gain, episode, since)
     np.add.at(doubt, episode[1:], unsure)
-    allowed = ROUND_OFF * size
+    allowed = ROUND_OFF_RTOL * size
     allowed[0] += held[0]
     is_known = (doubt <= RESOLVED * size) & (gain <= allowed)
     return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]], np.diff(direct), steps))])
@@ -293,7 +289,7 @@ def _losses(struck: list[EventRecord]) -> dict[str, float]:
     where impacts follow each other, as through a row of balls, that of the second has none before.
     """
     total = sum(event.energy_loss for event in struck)
-    least = ROUND_OFF * sum(abs(event.energy_loss) for event in struck)
+    least = ROUND_OFF_RTOL * sum(abs(event.energy_loss) for event in struck)
     if len(struck) < 2 or min(event.energy_loss for event in struck) >= -least:
         return {event.name: event.energy_loss for event in struck}
     return {" and ".join(event.name for event in struck): total}

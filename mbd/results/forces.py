@@ -21,20 +21,17 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import EQUAL_RTOL
 from mbd.results.balance import Balance, Flags, put
-from mbd.results.polynomials import Places
+from mbd.results.polynomials import AT_ONCE, Places
 from mbd.results.record import Rows
 
 __all__ = ["Forces"]
 
 POINTS = np.array([0.2, 0.5, 0.8])
 """Where in an interval both are compared [-]."""
-AT_ONCE = 1024
-"""Intervals that are compared together."""
 UNKNOWN = -1
 """Of an interval that was not asked for yet."""
-NEGLIGIBLE = 1e-9
-"""Change of forces, over the forces, that decides nothing [-]."""
 
 
 States = Callable[[Places], tuple[Rows, Rows]]
@@ -90,7 +87,7 @@ class Forces:
         moved = _largest(np.einsum("kij,kj->ki", here.inertia, here.rate - there.rate))
         bent = _largest(np.einsum("kij,kj->ki", here.inertia, rate - rough_rate))
         pushed, bowed = _largest(here.lam - there.lam), _largest(found.lam - rougher.lam)
-        least = NEGLIGIBLE * (_largest(here.load) + _largest(here.lam))
+        least = EQUAL_RTOL * (_largest(here.load) + _largest(here.lam))
         sound = (here.sound & there.sound).reshape(-1, len(POINTS)).all(axis=1)
         steady = moved + pushed <= bent + bowed + least
         return np.asarray(sound & steady)

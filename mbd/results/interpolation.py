@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.errors import TrajectoryError
 from mbd.results.charts import Charts
 from mbd.results.osculating import osculating
@@ -20,9 +21,6 @@ __all__ = ["Grid", "OneSide", "Side"]
 
 Side = Literal["left", "right", "before", "after"]
 OneSide = Literal["after", "before"]
-
-TOUCH = 1e-12
-"""Times this close to the ends of a run, relative to its largest time, count as the ends [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +41,7 @@ class Grid:
             raise TrajectoryError(f"side is 'left' or 'before', 'right' or 'after' (a switch), got {side!r}")
         wanted = np.atleast_1d(np.asarray(times, dtype=np.float64)).ravel()
         first, last = float(self.time[0]), float(self.time[-1])
-        slack = TOUCH * max(abs(first), abs(last))
+        slack = ROUND_OFF_RTOL * max(abs(first), abs(last))
         outside = ~((wanted >= first - slack) & (wanted <= last + slack))
         if outside.any():
             bad = wanted[outside][0]

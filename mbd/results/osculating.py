@@ -19,7 +19,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.results.polynomials import Index, Places
-from mbd.results.quadrature import stretches
+from mbd.results.quadrature import AT_ONCE, stretches
 
 __all__ = ["DOUBT", "Osculation", "osculating"]
 
@@ -27,8 +27,6 @@ AGREE = 0.25
 """Difference of the two sides, over that from the quintic, below which they see the same motion [-]."""
 DOUBT = 0.05
 """Error of a polynomial over its difference from the one below, up to ω h = 2 [-]."""
-AT_ONCE = 4096
-"""Intervals whose polynomials are found together."""
 SHORT = 120.0
 """Difference of C and Q over that of Q and P, times (ω h)² [-]."""
 

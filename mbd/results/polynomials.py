@@ -14,9 +14,12 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 
-__all__ = ["Index", "Places", "hermite", "hermite_rate", "parabola", "quintic", "quintics", "theta_and_step"]
+__all__ = ["AT_ONCE", "Index", "Places", "hermite", "hermite_rate", "parabola", "quintic", "quintics", "theta_and_step"]
 
 Index = NDArray[np.intp]
+
+AT_ONCE = 1024
+"""Intervals of a run whose states, forces and steps are found together."""
 
 
 @dataclass(frozen=True, eq=False)

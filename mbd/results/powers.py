@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from mbd.equations.cones import NO_SLIP
 from mbd.tape.derivatives import gradient, jvp, live, substitute
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Effect, Equations
     from mbd.tape.node import Node, Scalar
 
-NO_SLIP = 1e-100
-"""Square of slips that is none, as in `mbd.equations.cones` [-]."""
 
 __all__ = ["Lost", "Power", "moving_share", "powers"]
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import EQUAL_RTOL
 
 __all__ = ["cumulative", "cumulative_of_many", "stretches"]
 
@@ -21,8 +22,6 @@ ROWS_WITH_RATES, ROWS_WITHOUT = 4, 8
 """Rows that the polynomial goes through: eight conditions either way."""
 EVEN = 8.0
 """Neighbouring intervals whose lengths differ by more than this factor lie on no common polynomial [-]."""
-UNIFORM = 1e-9
-"""Rows whose distances differ by less, relative, share the weights of evenly spaced ones [-]."""
 AT_ONCE = 4096
 """Intervals whose weights are solved for together."""
 
@@ -114,7 +113,7 @@ def _weights(time: Vector, begin: Index, rows: NDArray[np.intp], with_rates: boo
     length = time[begin + 1] - time[begin]
     place = (time[rows] - time[begin, None]) / length[:, None]
     offset = begin - rows[:, 0]
-    even = np.all(np.abs(np.diff(place, axis=1) - 1.0) < UNIFORM, axis=1)
+    even = np.all(np.abs(np.diff(place, axis=1) - 1.0) < EQUAL_RTOL, axis=1)
     found = np.empty((len(begin), rows.shape[1] * (2 if with_rates else 1)))
     for k in np.unique(offset[even]):
         found[even & (offset == k)] = _solved((np.arange(rows.shape[1]) - k)[None, :].astype(float), with_rates)

@@ -17,7 +17,7 @@ from mbd.arrays import Vector
 from mbd.results.charts import Charts
 from mbd.results.columns import asks_for_forces
 from mbd.results.dense import Restepping
-from mbd.results.polynomials import Places
+from mbd.results.polynomials import AT_ONCE, Places
 from mbd.results.stored_states import is_smooth
 
 if TYPE_CHECKING:
@@ -28,8 +28,6 @@ __all__ = ["readable", "within"]
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 POINTS, WEIGHTS = 0.5 * (POINTS + 1.0), 0.5 * WEIGHTS
-AT_ONCE = 1024
-"""Intervals whose states are found together."""
 
 Index = NDArray[np.intp]
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mbd.bodies.values import is_number, shown
+from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError
 from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
@@ -13,9 +14,6 @@ from mbd.tape.node import Tape
 from mbd.tape.tracing import traced_scalar
 
 __all__ = ["rates_of_parameters"]
-
-AGREES = 1e-9
-"""Difference of what a function gives from the parameter of the run, over its size, that is none [-]."""
 
 
 def rates_of_parameters(
@@ -48,7 +46,7 @@ def rates_of_parameters(
         node = traced_scalar(function, [(name, place)], f"{parameter!r} as a function of {name!r}", tape)
         value, rate = evaluate([node, *jvp([node], {place: 1.0})], {("p", 0): at[name]})
         present = known.get(parameter)
-        if present is not None and not abs(value - present) <= AGREES * max(abs(present), abs(value), 1e-3):
+        if present is not None and not abs(value - present) <= EQUAL_RTOL * max(abs(present), abs(value), 1e-3):
             raise ModelError(
                 f"wrt: {parameter!r} is {value:.9g} at {name} = {at[name]:.9g}, but {present:.9g} in the run; give the "
                 "run these parameters, or at= the value that it has"

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.equal import REST_SPEED
 from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError
 from mbd.results.record import EventRecord
@@ -25,10 +26,6 @@ __all__ = ["GRAZE", "Trigger", "refused_graze", "shift_of_end", "trigger"]
 
 Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped", "watched"]
 
-STILL = 1e-9
-"""Approach speed [m/s, rad/s] below which a contact does not close on its own."""
-TOUCHING = 1e-9
-"""Gap [m, rad] of an open contact that closes as well."""
 GRAZE = 1e-7
 """Rate of a guard over the sum of its terms below which it has no derivative [-]."""
 
@@ -60,7 +57,7 @@ def trigger(
     found = [Trigger("event", e, equations.guards[e].name) for e in crossed if _fires(equations, e)]
     for name in sorted(closed):
         c = numbers[name]
-        if equations.contacts[c].kind == "penalty" or gap_rates[c] < -STILL:
+        if equations.contacts[c].kind == "penalty" or gap_rates[c] < -REST_SPEED:
             pressed = equations.contacts[c].kind == "penalty" and abs(gaps[c]) > 1e-8
             found.append(Trigger("press" if pressed else "closed", c, name))
     others: list[Trigger] = []

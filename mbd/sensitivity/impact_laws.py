@@ -12,18 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.equal import EQUAL_RTOL
+from mbd.kernel.contact.impact import APPROACH, MOST_BLOWS
 from mbd.sensitivity.motion import Mode, Motion
 from mbd.sensitivity.phases import EDGE, MOVES, Law, OneSided, Unknown, chosen, speeds, undecided
 from mbd.sensitivity.programs import Programs
 
 __all__ = ["Struck", "poisson", "sequential"]
-
-MOST_BLOWS = 1000
-"""Impacts at one instant [-]."""
-APPROACH = 1e-11
-"""Approach speed, relative to the fastest, that counts as none [-]."""
-EQUAL = 1e-9
-"""Relative difference of approach speeds that are equal [-]."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +96,7 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
             if edges:
                 raise OneSided(undecided([contacts[c].name for c in edges]))
             return motion
-        first = [c for c in normal if approach[c] >= (1.0 - EQUAL) * most]
+        first = [c for c in normal if approach[c] >= (1.0 - EQUAL_RTOL) * most]
         if not held.issuperset(first):
             changes = [(1.0 if c in held and speed[normal[c]] > 0.0 else -1.0) * of_speed[normal[c]] for c in first]
             _refuse_ties([contacts[c].name for c in first], changes, size)

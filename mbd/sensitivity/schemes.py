@@ -9,14 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import EQUAL_RTOL
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, unknown
 
 __all__ = ["Memory", "SchemeSteps", "is_at"]
-
-SAME = 1e-9
-"""Distance of a row from where the pass says that it is, over the size of the state, that is round-off [-]."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ class SchemeSteps(ABC):
         )
 
 
-def is_at(rows: RunRows, motion: Motion, row: int, share: float = SAME) -> bool:
+def is_at(rows: RunRows, motion: Motion, row: int, share: float = EQUAL_RTOL) -> bool:
     """Whether a row is where the pass is."""
     q, y = rows.record.q[row], rows.y[row]
     size = np.max(np.abs(np.concatenate([q, y])), initial=1e-3)

@@ -7,14 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.results.record import EventRecord
 from mbd.sensitivity.motion import Mode, Motion
 from mbd.sensitivity.programs import Programs
 
 __all__ = ["stored_at_start", "with_transitions"]
-
-ROUND_OFF = 1e-12
-"""Difference of what a start holds from what it stores, relative, which two programs may make of one expression [-]."""
 
 
 def with_transitions(programs: Programs, motion: Motion, mode: Mode, events: Sequence[EventRecord]) -> Motion:
@@ -54,6 +52,6 @@ def stored_at_start(programs: Programs, motion: Motion, mode: Mode) -> Motion:
     values, slopes = programs.stored(replace(motion, anchors=before).at(mode, *zero))
     of_anchors = motion.tangent.anchors.copy()
     apart = np.abs(values[first] - motion.anchors[first])
-    fresh = np.array(first, dtype=int)[apart <= ROUND_OFF * np.maximum(1.0, np.abs(values[first]))]
+    fresh = np.array(first, dtype=int)[apart <= ROUND_OFF_RTOL * np.maximum(1.0, np.abs(values[first]))]
     of_anchors[fresh] = slopes[fresh] @ motion.tangent.stacked(programs.columns)
     return motion.with_tangent(anchors=of_anchors)

@@ -6,10 +6,9 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 
-__all__ = ["Table"]
+from mbd.equal import ROUND_OFF_RTOL
 
-ROUND_OFF = 1e-12
-"""Jump of a derivative beside the terms of the pieces below which their coefficients have rounded it there [-]."""
+__all__ = ["Table"]
 
 
 class Table:
@@ -56,7 +55,7 @@ class Table:
         sizes = [max(abs(row[k]) for row in self.coefficients[piece - 1 : piece + 1]) * width**k for k in range(4)]
         for order in range(4):
             left = sum(math.comb(k, order) * before[k] * width ** (k - order) for k in range(order, 4))
-            if abs(left - after[order]) * width**order > ROUND_OFF * sum(sizes):
+            if abs(left - after[order]) * width**order > ROUND_OFF_RTOL * sum(sizes):
                 return order
         return 4
 

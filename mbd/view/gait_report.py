@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mbd.equal import EQUAL_RTOL
 from mbd.notebook import table
 from mbd.view.plots import drawing
 from mbd.view.report import made_with
@@ -24,8 +25,6 @@ __all__ = ["html", "picture", "write"]
 ROWS = ("angle", "moment", "power")
 """Quantities of a joint, one below the other."""
 
-NOTHING = 1e-9
-"""Size below which a curve is drawn as zero."""
 
 SIZE = re.compile(r'width="[\d.]+pt" height="[\d.]+pt"')
 """Of the picture as it is written; on the page it is as wide as there is room."""
@@ -79,7 +78,7 @@ def _draw(axes: Any, report: GaitReport, subject: str, quantity: str) -> bool:
     axes.set_xlim(0.0, 100.0)
     axes.set_ylabel(f"{quantity} [{unit}]")
     axes.axhline(0.0, color=tone(NEUTRAL), lw=0.6)
-    if max((abs(y) for line in axes.lines for y in line.get_ydata()), default=0.0) < NOTHING:
+    if max((abs(y) for line in axes.lines for y in line.get_ydata()), default=0.0) < EQUAL_RTOL:
         axes.set_ylim(-1.0, 1.0)
     return bool(unit)
 

@@ -9,18 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.equal import INSTANT_RTOL, ROUND_OFF_RTOL
 from mbd.results.matching import Matches, aligned, apart, matched
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
 __all__ = ["Difference", "Matches", "aligned", "apart", "differences", "gaps", "matched", "ranges"]
-
-BESIDE = 1e-9
-"""Instants this close to an event are left out too, relative to the length of the run [-]."""
-
-HELD = 1e-12
-"""Coordinate or rate over the largest one of the run below which it is round-off [-]."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +55,8 @@ def ranges(run: Trajectory, names: Sequence[str], instants: Vector) -> dict[str,
     for name, values in run.at(instants).read(*names).items():
         known, largest = values[np.isfinite(values)], whole.get(name, 0.0)
         swing, size = float(np.ptp(known)) if known.size else 0.0, float(np.max(np.abs(known), initial=0.0))
-        rests = not swing > max(1e-9 * size, HELD * largest)
-        found[name] = (size if size > HELD * largest else largest) or 1.0 if rests else swing
+        rests = not swing > max(1e-9 * size, ROUND_OFF_RTOL * largest)
+        found[name] = (size if size > ROUND_OFF_RTOL * largest else largest) or 1.0 if rests else swing
     return found
 
 
@@ -76,7 +71,7 @@ def differences(run: Trajectory, reference: Trajectory, scales: Mapping[str, flo
     found = matched(run.events, reference.events, begin, end)
     pairs = found.pairs + found.late
     inside = instants[instants <= end]
-    keep = apart(inside, pairs, BESIDE * (end - begin))
+    keep = apart(inside, pairs, INSTANT_RTOL * (end - begin))
     compared = gaps(run, reference, scales, inside[keep], inside[keep]) if keep.any() else {}
     ends = {} if found.late else gaps(run, reference, scales, run.time[-1:], reference.time[-1:])
     return Difference(

@@ -10,6 +10,7 @@ import numpy as np
 from mbd.analysis.accuracy.compare import apart, gaps
 from mbd.analysis.effects.contribution import Change
 from mbd.arrays import Vector
+from mbd.equal import INSTANT_RTOL
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
@@ -21,8 +22,6 @@ ALIKE = 4
 """Events among which the next one is looked for: those of about one instant may come in any order."""
 FARTHER = 2.0
 """How much farther one of two events that come in the other order may be shifted than the other or earlier ones [-]."""
-BESIDE = 1e-9
-"""Instants this close to an event are left out too, relative to the length of the run [-]."""
 
 
 def change(run: Trajectory, whole: Trajectory, scales: Mapping[str, float], instants: Vector) -> Change:
@@ -45,7 +44,7 @@ def change(run: Trajectory, whole: Trajectory, scales: Mapping[str, float], inst
         pairs, differs = [*pairs, (differs, end)], None
     until = end if differs is None else min(end, differs)
     inside = instants[instants <= until]
-    keep = apart(inside, pairs, BESIDE * max(end - begin, 1e-300))
+    keep = apart(inside, pairs, INSTANT_RTOL * max(end - begin, 1e-300))
     kept = inside[keep]
     outputs = {}
     if len(kept) > 1:
@@ -98,7 +97,7 @@ def _like(event: EventRecord, others: Sequence[EventRecord]) -> int | None:
 def _about_one_instant(pair: tuple[float, float], other: tuple[float, float], shift: float) -> bool:
     """Whether two events that come in the other order are shifted alike, and not one by much more than all the rest."""
     less, more = sorted(abs(a - b) for a, b in (pair, other))
-    return more <= FARTHER * max(less, shift) + BESIDE * max(map(abs, (*pair, *other)))
+    return more <= FARTHER * max(less, shift) + INSTANT_RTOL * max(map(abs, (*pair, *other)))
 
 
 def _ends(run: Trajectory, whole: Trajectory) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from mbd.analysis.gait_report.moments import Moments
 from mbd.analysis.gait_report.strides import Side, Stride, base_name, of_side
 from mbd.arrays import Matrix, Vector
+from mbd.equal import EQUAL_RTOL
 from mbd.results.interpolation import Side as When
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ __all__ = ["PERCENT", "Curve", "angles_of", "curves_of", "forces_at", "grips_of"
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Share of the stride [%]."""
 
-SAME = 1e-9
-"""Angles that differ less are one [rad]."""
 
 KNEE = re.compile(r"\bknee\b(?!.*\b(?:rotation|abduction|adduction)\b)", re.IGNORECASE)
 """Subjects whose angle is flexion, which clinicians show as positive."""
@@ -94,12 +93,12 @@ def angles_of(run: Trajectory, side: str) -> list[_Angle]:
     known = [name for name, unit in facts.coordinates[: facts.coordinate_count] if unit == "rad"]
     found = {name: _Angle(name, base_name(name.removesuffix(".angle"), side), name) for name in known}
     for name, angle in facts.angles.items():
-        if angle.sequence != "zxy" or not of_side(name, side) or float(np.ptp(run[name])) < SAME:
+        if angle.sequence != "zxy" or not of_side(name, side) or float(np.ptp(run[name])) < EQUAL_RTOL:
             continue
         joint, _, last = name.rpartition(".")
         subject = f"{base_name(joint, side)} {last.replace('_', ' ')}"
         own = [(each, sign) for each in known if each.rpartition(".")[0] == joint for sign in (1.0, -1.0)]
-        match = next(((c, s) for c, s in own if np.max(np.abs(run[name] - s * run[c])) < SAME), None)
+        match = next(((c, s) for c, s in own if np.max(np.abs(run[name] - s * run[c])) < EQUAL_RTOL), None)
         if match is not None:
             found.pop(match[0], None)
         found[name] = _Angle(name, subject, *(match or ()))
@@ -111,7 +110,7 @@ def angles_of(run: Trajectory, side: str) -> list[_Angle]:
 def _as_in_the_clinic(run: Trajectory, angle: _Angle) -> _Angle:
     """A knee bends one way only: where the angle of one is farthest from straight below zero, its opposite is shown."""
     values = run[angle.name]
-    bends = KNEE.search(angle.subject) is not None and -float(np.min(values)) > max(float(np.max(values)), SAME)
+    bends = KNEE.search(angle.subject) is not None and -float(np.min(values)) > max(float(np.max(values)), EQUAL_RTOL)
     return angle._replace(shown=-1.0) if bends else angle
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.python import array_function
+from mbd.equal import EQUAL_RTOL
 from mbd.gait.section import Section
 from mbd.tape.derivatives import gradient
 from mbd.tape.node import Node
@@ -24,8 +25,6 @@ CORRECTIONS = 20
 """Of positions, at most [-]."""
 FINE = 1e-14
 """Residual below which nothing is corrected, so that states on the section stay as they are, to the bit [m, rad]."""
-HELD = 1e-9
-"""Residual up to which a state is on the section [m, rad, m/s, rad/s]."""
 DEPENDENT = 1e-13
 """Share of the trace of G Gᵀ that is added to its diagonal, lest rows that depend on others divide by zero [-]."""
 
@@ -82,7 +81,7 @@ class OntoSection:
                 if np.max(np.abs(step)) < FINE:
                     break
             h, _ = self._rows(self._positions, self._held[0], inputs, parameters)
-            good &= np.max(np.abs(h), axis=1) <= HELD
+            good &= np.max(np.abs(h), axis=1) <= EQUAL_RTOL
         if self._captured is not None:
             anchors[:, self._anchors] = np.column_stack(self._captured(inputs, parameters))
         if self._held[1]:
@@ -92,7 +91,7 @@ class OntoSection:
             if len(self.free_rates) and moving.any():
                 v[np.ix_(moving, self.free_rates)] -= _shortest(B[moving][:, :, self.free_rates], h[moving])
                 h, _ = self._rows(self._velocities, self._held[1], inputs, parameters)
-            good &= np.max(np.abs(h), axis=1) <= HELD * fast
+            good &= np.max(np.abs(h), axis=1) <= EQUAL_RTOL * fast
         return np.asarray(good)
 
     def _rows(self, function: object, count: int, inputs: dict[str, Matrix], parameters: Vector | Matrix) -> tuple[

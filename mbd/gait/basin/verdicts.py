@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from mbd.analysis.ending import FALLEN
 from mbd.arrays import Matrix, Vector
 from mbd.compile.python import array_function
+from mbd.equal import INSTANT_RTOL
 from mbd.gait.basin.kinds import NUMBER
-from mbd.gait.return_map import AT_ONCE, ReturnMap
+from mbd.gait.return_map import ReturnMap
 from mbd.kernel import codes
 from mbd.results.facts import Facts
 from mbd.simulation.batch.changes import Changes
@@ -58,7 +59,7 @@ class Verdicts:
         here = event & (ends.stopped_by == self.section)
         found[event & ~here] = NUMBER["other event"]
         found[here] = ARRIVES
-        at_once = here & (ends.time <= AT_ONCE * self.map.longest)
+        at_once = here & (ends.time <= INSTANT_RTOL * self.map.longest)
         found[at_once | (here & self._scuffs(lines, ends, changes))] = NUMBER["scuffs"]
         self._contacts(found, lines, ends)
         self._stands(found, lines, ends)

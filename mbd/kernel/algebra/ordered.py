@@ -19,12 +19,8 @@ __all__ = [
 
 HEAD = 3
 """Numbers before the lists of an order."""
-OF_TANGENT = 0
-"""Values come from the matrix of a step, row-major."""
-OF_ACCELERATIONS = 1
-"""Values come from the program `accelerations`."""
-SYMMETRIC = 2
-"""The same with Bᵀ in the place of R."""
+OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)
+"""Where values come from: the matrix of a step, row-major; the program `accelerations`; that with Bᵀ in place of R."""
 LOSS_OF_STEP = 1e-8
 """Part of its terms that a pivot must keep where Newton's method goes on with what is left [-]."""
 LOSS_AT_ONCE = 1e-4

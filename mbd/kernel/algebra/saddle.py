@@ -28,12 +28,8 @@ INCOMPATIBLE = 1e-6
 """Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
 ROUND_OFF = 64.0 * EPS
 """Round-off of a row on positions, relative to its terms [-]."""
-OWN_TERMS = 0
-"""What changes in a solution: accelerations, whose rows are measured by their own terms."""
-VELOCITIES = 1
-"""Velocities."""
-POSITIONS = 2
-"""Positions."""
+OWN_TERMS, VELOCITIES, POSITIONS = range(3)
+"""What changes in a solution: accelerations, whose rows are measured by their own terms, velocities or positions."""
 
 
 def solve_rows(K: Balance, m: int, dropping: bool) -> int:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.equal import EQUAL_RTOL
 
 __all__ = ["possible_inertia"]
-
-TRIANGLE = 1e-9
-"""By how much principal moments may break the triangle inequality, over the largest [-]."""
 
 
 def possible_inertia(tensor: Matrix) -> Matrix:
@@ -19,7 +17,7 @@ def possible_inertia(tensor: Matrix) -> Matrix:
     """
     moments, axes = np.linalg.eigh(tensor)
     second = 0.5 * moments.sum() - moments
-    if second.min() >= -TRIANGLE * max(np.abs(moments).max(), 1e-300):
+    if second.min() >= -EQUAL_RTOL * max(np.abs(moments).max(), 1e-300):
         return tensor
     second = np.maximum(second, 0.0)
     return np.asarray(axes @ np.diag(second.sum() - second) @ axes.T)

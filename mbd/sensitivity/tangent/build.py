@@ -11,6 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from mbd.compile.llvm import LEVEL
 from mbd.kernel import build
 from mbd.kernel.schemes import contract
 from mbd.kernel.translation.translate import Source, functions_of, translate
@@ -20,7 +21,6 @@ from mbd.sensitivity.tangent.printer import tangent_text
 __all__ = ["entry", "own_rules"]
 
 ENTRY = "mbd_tangent_kernel"
-LEVEL = 2
 HELD = (
     "events.locate.locate", "events.locate.find_jump", "hooks.scheme_error", "stepping.restart.refresh_scales",
     "stepping.restart.weigh", "schemes.iteration.residual_size", "schemes.iteration.is_below_floors",

@@ -36,6 +36,7 @@ from mbd.simulation.run.stored import record_of, whole_record
 if TYPE_CHECKING:
     from mbd.results.ledger import Ledger
 
+from mbd.equal import EQUAL_RTOL
 from mbd.simulation.run.data import EnergyFindings, RunData
 
 __all__ = ["EnergyWatch", "Judgement", "judgement", "kinds_of"]
@@ -54,8 +55,6 @@ ABSURD = 1e6
 """Gain of energy over all that there was before, above which a single row is a verdict [-]."""
 LEAP = 100.0
 """Rise of energy over all earlier swings that looks strange where something is driven [-]."""
-ROUND_OFF = 1e-9
-"""Share of the largest energies below which changes mean nothing [-]."""
 MOVED = 1e-6
 """Way of the fastest coordinate [m, rad] below which a mechanism is at rest, and its energy round-off."""
 UNDRIVEN = frozenset({"joint loss", "damper", "friction", "penalty"})
@@ -101,7 +100,7 @@ def judgement(
     given = sum((np.maximum.accumulate(np.maximum(energy, 0.0)) for energy in givers), np.zeros(len(way)))
     fallen = np.maximum.accumulate(ledger.potential[0] - ledger.potential)
     owned = ledger.kinetic[0] + fallen + given
-    noise = ROUND_OFF * np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
+    noise = EQUAL_RTOL * np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
     moves = np.maximum.accumulate(way) > MOVED
     gain = np.where(moves, np.maximum(ledger.total - ledger.total[0] - given - noise - doubt[0], 0.0), 0.0)
     loss = np.where(moves, np.maximum(-ledger.numerical - noise - doubt[1], 0.0), 0.0)
@@ -234,7 +233,7 @@ class EnergyWatch(EnergyFindings):
             return False
         total = kinetic + potential
         fallen = np.maximum.accumulate(potential[0] - potential)
-        noise = ROUND_OFF * np.max(np.abs(self._seen[:, :2]))
+        noise = EQUAL_RTOL * np.max(np.abs(self._seen[:, :2]))
         owned = kinetic[0] + fallen
         rise = total - total[0]
         risen = ~(rise <= np.maximum(_telling_gain(run) * owned + noise, 2.0 * self._cleared))  # NaN is strange too

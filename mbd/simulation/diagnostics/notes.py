@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.assembly.doubtful import WIDE, degrees
 from mbd.equations.equations import Contact
+from mbd.kernel.codes import PULL
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
 from mbd.simulation.diagnostics.coarse import coarse_steps
@@ -40,8 +41,6 @@ TAKEN = 0.5
 OVERSHOT = 1e-8
 """Depth at which a contact may close that is no more than round-off of large coordinates [m, rad]."""
 
-PULL = 1e-9
-"""Pull of a contact over all multipliers that is more than round-off [-]."""
 
 LOOKED_AT = 8
 """Impacts of a contact from which the step that resolves them is found."""

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from mbd.assembly.given_state import ROUND_OFF
 from mbd.bodies.values import is_finite_number
 from mbd.compile.mechanism import rate_names
 from mbd.compile.python import scalar_function
 from mbd.constraints.expressions import evaluated, is_expression
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
@@ -82,7 +82,7 @@ def apply_reset(run: RunData, guard: Guard) -> None:
             v.q[positions[name]] = number
         else:
             v.y[places[name]] = number
-    if misplaced := equations.configuration.misplaced(v.q, ROUND_OFF):
+    if misplaced := equations.configuration.misplaced(v.q, EQUAL_RTOL):
         raise SimulationError(f"{what} gives {'; '.join(misplaced)}")
     off = violations_now(run, residuals_now(run), usual)
     if off:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import INSTANT_RTOL
 from mbd.results.dense import Restepping
 from mbd.results.matching import Matches, apart, matched
 from mbd.results.osculating import DOUBT, osculating
@@ -38,8 +39,6 @@ Steps that are taken again err most near their ends; few long ones may hold a je
 """
 MAX_PLACES = 512
 """Places between rows at which they are compared, about [-]."""
-BESIDE = 1e-9
-"""Instants this close to an event are not compared, relative to the length of the run [-]."""
 TRUSTED = 0.02
 """Doubt of an interpolated coordinate, over the accuracy that is asked for, from which steps are taken again [-]."""
 DOUBTFUL = 16
@@ -79,7 +78,7 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[
     pairs = matched(run.events, other.events, begin, end)
     shifted = pairs.pairs + pairs.late
     difference = np.zeros(run.record.q.shape[1])
-    beside = BESIDE * (end - begin)
+    beside = INSTANT_RTOL * (end - begin)
     if names:
         return _named(run, other, names, pairs, end)
     rows, middles = _rows(run, end), _middles(run, end, accuracy)
@@ -107,7 +106,7 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[
 
 def _named(run: Trajectory, other: Trajectory, names: tuple[str, ...], pairs: Matches, end: float) -> Gap:
     """The same of named results, each read as a user reads it."""
-    shifted, beside = pairs.pairs + pairs.late, BESIDE * (end - float(run.time[0]))
+    shifted, beside = pairs.pairs + pairs.late, INSTANT_RTOL * (end - float(run.time[0]))
     times = np.concatenate([_rows(run, end)[:-1], _some_middles(run, end)])
     times = times[apart(times, shifted, beside)]
     ours, theirs = run.at(times).read(*names), other.at(times).read(*names)
