@@ -6,6 +6,7 @@ import ast
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.cli import Script, examples
+from mbd.view.camera import camera
+from mbd.view.first_view import first_view
 from mbd.view.page import html
-from mbd.view.scene import Instants, scene
+from mbd.view.plots import drawing
+from mbd.view.posture_in_space import draw_in_space
+from mbd.view.scene import Instants, Scene, scene
 
 __all__ = ["Example", "index", "read"]
 
@@ -24,6 +29,9 @@ SIZE, MARGIN = (320.0, 200.0), 14.0
 SHOWN, POSES, CURVE = 1.6, 9, 240
 """Longest stretch of a run that a picture shows [s], poses of a mechanism, points of a curve."""
 
+
+FIGURES = {"steeper-slope": "branch.svg"}
+"""Figures of docs/pictures that show what a study finds."""
 
 TOPICS = {
     "Walkers and prostheses": "prosthetic-leg kneed-walker amputee-in-space compass-gait walker-in-space "
@@ -81,9 +89,38 @@ class Example:
             f"{rest}\n\n```\nmbd run {self.name}\n```\n\n## The whole script\n\n```python\n{self.text}```\n"
         )
 
+    @cached_property
+    def solids(self) -> bytes | None:
+        """Its solids halfway, seen as its page first sees them (PNG); None in the plane."""
+        half = 0.5 * float(self.run.time[0] + self.run.time[-1])
+        picture = scene(self.run, Instants(np.array([half]), np.ones(1, dtype=bool)))
+        if not picture.spatial:
+            return None
+        paper = BytesIO()
+        with drawing(None, 3.2, 2.0) as figure:
+            axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+            corners = draw_in_space(axes, picture, camera(*first_view(picture)))
+            middle, size = (corners.min(axis=0) + corners.max(axis=0)) / 2.0, np.ptp(corners, axis=0)
+            reach = 0.58 * max(size[1], size[0] / 1.6)
+            axes.set(
+                aspect="equal", xlim=(middle[0] - 1.6 * reach, middle[0] + 1.6 * reach),
+                ylim=(middle[1] - reach, middle[1] + reach),
+            )  # fmt: skip
+            axes.set_axis_off()
+            figure.set_layout_engine("none")
+            figure.savefig(paper, format="png", dpi=200, transparent=True)
+        return paper.getvalue()
+
     @property
     def picture(self) -> str:
-        """A drawing of the first moments of the run: poses of the mechanism, or curves of its coordinates (SVG)."""
+        """A drawing of the first moments of the run: poses of the mechanism, or curves of its coordinates (SVG).
+
+        Of a spatial mechanism a picture of its solids halfway, and of a study its figure in docs.
+        """
+        if self.name in FIGURES:
+            return f'<img class="thumbnail" src="../pictures/{FIGURES[self.name]}" alt="">'
+        if self.solids is not None:
+            return f'<img class="thumbnail" src="{self.name}.png" alt="">'
         run = self.run
         end = min(float(run.time[-1]), float(run.time[0]) + SHOWN)
         drawn = _poses(run, end) or _curves(run, end)
@@ -129,6 +166,21 @@ def _fitted(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return (points - (low + high) / 2) * (scale, -scale) + np.array(SIZE) / 2
 
 
+def _soil(picture: Scene, points: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """The grounds under the points of a planar mechanism, on the paper."""
+    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
+    found = []
+    for ground in picture.grounds:
+        normal = ground.normal[:2]
+        if abs(normal[1]) < 0.5:
+            continue
+        x = np.array([low[0], high[0]])
+        line = np.column_stack([x, (ground.offset - normal[0] * x) / normal[1]])
+        if np.all(np.abs(line[:, 1] - low[1]) < 0.2 * (high[1] - low[1])):
+            found.append(_fitted(np.vstack([points.reshape(-1, 2), line]))[-2:])
+    return found
+
+
 def _poses(run: Any, end: float) -> list[str]:
     """The mechanism at equal intervals of time, the last one in full color."""
     whole = scene(run, 2)
@@ -144,7 +196,7 @@ def _poses(run: Any, end: float) -> list[str]:
     used = sorted({point for _, members in lines for point in members})
     paper = np.zeros_like(poses)
     paper[:, used] = _fitted(poses[:, used])
-    drawn = []
+    drawn = [f'<polyline class="soil" points="{_points(line)}"/>' for line in _soil(whole, poses[:, used])]
     for number, pose in enumerate(paper):
         kind = "" if number == len(paper) - 1 else " faint"
         for body, members in lines:

@@ -23,7 +23,8 @@ def on_files(files: Any, config: Any) -> Any:
     made |= {"gallery/index.md": gallery.index(known), **reference.pages()}
     for one in known:
         made |= {f"gallery/{one.name}.md": one.page, f"gallery/{one.name}-run.html": one.player}
-    for place, text in made.items():
+    pictures = {f"gallery/{one.name}.png": one.solids for one in known if one.solids is not None}
+    for place, text in (made | pictures).items():
         files.append(File.generated(config, place, content=text))
     return files
 
