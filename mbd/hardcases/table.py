@@ -143,7 +143,7 @@ def as_markdown(verdicts: Sequence[Verdict]) -> str:
     """The table for a page of the docs."""
     lines = ["| " + " | ".join(HEADS) + " |", "|---|---|---|---|---|"]
     for verdict in verdicts:
-        worst = "<br>".join(worst_by_scheme(verdict))
+        worst = worst_text(verdict)
         verdict_cell = ": ".join([verdict.word, *verdict.reasons])
         cells = (short(verdict.case), verdict.case.must, worst, verdict_cell, f"{verdict.seconds:.1f}")
         lines.append("| " + " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in cells) + " |")
