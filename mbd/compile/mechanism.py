@@ -24,7 +24,7 @@ from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.equations import Equations
 from mbd.equations.sizes import require_room_for_tangent, tangent_refused
-from mbd.errors import MemoryLimitError, UnknownNameError, nearest
+from mbd.errors import MemoryLimitError, ModelError, UnknownNameError, nearest
 from mbd.tape.node import Node
 
 __all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
@@ -346,6 +346,11 @@ class Mechanism:
         for name, value in (values or {}).items():
             if name in self.without_effect or (name not in names and (folded or {}).get(name) == value):
                 continue
+            if name not in names and name in (folded or {}):
+                raise ModelError(
+                    f"{name!r} is an exact 0 or ±1 of the model, which is part of its equations; name it in "
+                    "tunable=[…] of the model"
+                )
             if name not in names:
                 raise UnknownNameError(nearest(name, {*names, *(folded or {})}, "parameter", "There are"))
             p[names.index(name)] = float(value)

@@ -45,7 +45,7 @@ class SampledLaw(Machine):
         parameter has its own value, an output of its own is 0
     resolution : steps to which values are rounded, of outputs and of arguments by their names: {'knee.angle': 1e-3}
     restart_on : names of contacts, events or states of modes: a sample is taken as they happen, and the next one a
-        period later. A gait needs this, so that its samples are the same in each step
+        period later, so that the samples of each step are the same. A gait without it lasts a whole number of samples
 
     Raises
     ------

@@ -10,7 +10,6 @@ import numpy as np
 
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
-from mbd.constraints.sampled_law import SampledLaw
 from mbd.errors import GaitError, ModelError
 from mbd.gait.alike import require_alike
 from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
@@ -158,12 +157,6 @@ def _require_the_same_later(mechanism: Mechanism, model: Any) -> None:
         "the next, which a return begins without; give the parameters as parameters= without it, or simulate until "
         "the walk settles"
         for controller in getattr(model, "controllers", ())
-    ]
-    faults += [
-        f"samples of {law.name!r} continue from one step to the next at instants of their own, so that no step is as "
-        "the one before; give restart_on=, the event with which they begin again"
-        for law in getattr(model, "machines", ())
-        if isinstance(law, SampledLaw) and not law.restart_on
     ]
     if faults:
         raise ModelError(faults)

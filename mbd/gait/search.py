@@ -18,6 +18,7 @@ from mbd.gait.newton import FixedPoint, fixed_point
 from mbd.gait.outcome import Outcome
 from mbd.gait.reflection import in_space
 from mbd.gait.return_map import Arrival, ReturnMap, Values
+from mbd.gait.samples import told_of_samples
 from mbd.gait.section import Chart, Section, section_of
 from mbd.state import State
 
@@ -143,8 +144,12 @@ def first_found(given: Search, states: Sequence[State], values: Values, dt: floa
 
 def fallen_first(found: LimitCycle, start: State, values: Values) -> LimitCycle:
     """A search that failed, as a fall if the walker fell from its start before it came to the section otherwise."""
-    fall = None if found.success else found.map.fall(start, values)
-    return found if fall is None else replace(found, outcome=fall, attempts=(fall, *found.attempts))
+    if found.success:
+        return found
+    fall = found.map.fall(start, values)
+    if fall is None:
+        return replace(found, outcome=told_of_samples(found.outcome, found.map, found.state, values))
+    return replace(found, outcome=fall, attempts=(fall, *found.attempts))
 
 
 def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:

@@ -127,6 +127,8 @@ def test_what_a_family_keeps_must_be_told() -> None:
     ):
         with pytest.raises(mbd.ModelError, match="is one of a family, since nothing takes energy"):
             asked()
+    with pytest.raises(mbd.ModelError, match="'gravity.x' is an exact 0 or ±1 of the model"):
+        gait.at({"gravity.x": 0.1})
     with pytest.raises(mbd.ModelError, match="energy and speed each pick one gait"):
         mbd.limit_cycle(model, start, section="apex", energy=1850.0, speed=5.0)
     with pytest.raises(mbd.ModelError, match="energy must be a finite number, got nan"):

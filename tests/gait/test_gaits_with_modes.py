@@ -149,9 +149,9 @@ def test_a_gait_of_one_foot_has_derivatives_though_its_steps_have_no_length() ->
     np.testing.assert_allclose(later.period, gait.period, rtol=1e-11)
 
 
-@pytest.mark.slow
-def test_a_sampled_law_whose_samples_restart_at_strikes_has_a_gait_and_its_derivatives() -> None:
-    plain, _ = walker()
+def sampled_walker(period: float, restart_on: Any = ()) -> tuple[mbd.Model, mbd.State]:
+    """The torso is held by a sampled law, 4 ms after each sample."""
+    plain, start = walker()
     model = plain.without("left hold", "right hold", "left back", "right back")
     joints = {joint.name: joint for joint in model.joints}
 
@@ -159,17 +159,37 @@ def test_a_sampled_law_whose_samples_restart_at_strikes_has_a_gait_and_its_deriv
         return 100.0 * (q - math.pi) + 20.0 * v
 
     model.apply(
-        mbd.SampledLaw("PD", 0.02, {"u": hold}, arguments=("waist.angle", "waist.rate"), delay=0.004,
-                       restart_on=("left foot", "right foot")),
+        mbd.SampledLaw("PD", period, {"u": hold}, arguments=("waist.angle", "waist.rate"), delay=0.004,
+                       restart_on=restart_on),
         mbd.Motor("hold", joints["waist"], torque=lambda u: -u, arguments=["PD.u"]),
         *(mbd.Motor(f"{side} back", joints[f"{side} hip"], torque={side: lambda u: u}, by="stance", arguments=["PD.u"])
           for side in ("left", "right")),
     )  # fmt: skip
-    _, start = walker()
     start = mbd.assemble(
         model, {name: start[name] for name in ("left hip.angle", "right hip.angle", "waist.angle")},
         {name: start[name] for name in ("left hip.rate", "right hip.rate", "waist.rate")}, closed=["left foot"],
     )  # fmt: skip
+    return model, start
+
+
+def test_a_walk_falls_in_with_samples_of_nearly_a_whole_part_of_its_period() -> None:
+    """Of 37 samples a step a gait lasts 37 sample periods, and so does its derivative by the period."""
+    how: Any = {"section": "right foot", "mirror": ("left", "right")}
+    model, start = sampled_walker(0.7468 / 37.0)
+    gait = mbd.limit_cycle(model, start, **how)
+    np.testing.assert_allclose(gait.period, 0.7468, atol=1e-10)
+    np.testing.assert_allclose(gait.derivatives["period", "PD.period"], 37.0, rtol=1e-8)
+    model, start = sampled_walker(0.02)
+    told = r"samples of 'PD' come every 0.02 s, 37\.3\d+ of them in a return of 0\.746\d+ s, where a gait needs a whole"
+    with pytest.raises(
+        mbd.GaitError, match=told + r" number; try 'PD.period' = 0\.0201\d+ s or strides=3, or restart_on="
+    ):
+        mbd.limit_cycle(model, start, **how)
+
+
+@pytest.mark.slow
+def test_a_sampled_law_whose_samples_restart_at_strikes_has_a_gait_and_its_derivatives() -> None:
+    model, start = sampled_walker(0.02, ("left foot", "right foot"))
     gait = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
     np.testing.assert_allclose(gait.period, 0.74694, atol=1e-5)  # continuous feedback: 0.746772 s
 
