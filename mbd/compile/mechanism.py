@@ -23,6 +23,7 @@ from mbd.compile.remembered import Facts, Remembered
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.equations import Equations
+from mbd.equations.explicit_solution import explicit_solution
 from mbd.equations.sizes import require_room_for_tangent, tangent_refused
 from mbd.errors import MemoryLimitError, ModelError, UnknownNameError, nearest
 from mbd.tape.node import Node
@@ -37,6 +38,7 @@ class ModeCode:
     correction, solution : the tangent with its factors and what solves with these (see `programs.correction`), or None
     given_rows : rows that depend on `rows`; their multipliers are given and act
     order : in which the matrices of many unknowns are eliminated (see `orders`), or None
+    rates, returns : accelerations, and corrections onto the rows (see `mbd.equations.explicit_solution`), or None
     """
 
     rows: tuple[int, ...]
@@ -48,6 +50,8 @@ class ModeCode:
     solution: Any = None
     given_rows: tuple[int, ...] = ()
     order: Any = None
+    rates: Any = None
+    returns: Any = None
 
 
 @dataclass(frozen=True)
@@ -227,10 +231,18 @@ class Mechanism:
                     pays = may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows))
                     if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
                         order = self._order(self._of(mode, programs.newton), rows)
-                    return {}, {"order": order}
+                    found = None
+                    if order is None and not given_rows:
+                        found = explicit_solution(self.equations, self._accelerations, sorted(rows))
+                    made = {} if found is None else {"rates": found.rates, "returns": found.returns}
+                    return made, {"order": order}
 
-                order = _numbers(self._add("explicit", mode, (), make)[0]["order"])
-                self._modes[key] = ModeCode(*mode[:3], tangent, residual, given_rows=mode[3], order=order)
+                facts, made = self._add("explicit", mode, ("rates", "returns"), make)
+                rates, returns = made or (None, None)
+                self._modes[key] = ModeCode(
+                    *mode[:3], tangent, residual, given_rows=mode[3], order=_numbers(facts["order"]), rates=rates,
+                    returns=returns,
+                )  # fmt: skip
             return self._modes[key]
 
     def _straight(self, mode: Any) -> ModeCode | None:

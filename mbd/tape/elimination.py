@@ -46,7 +46,7 @@ class Factors:
     """An eliminated matrix.
 
     pivots : in turn
-    sound : 1.0 where every pivot keeps more than `LOSS` of its terms, which ±∞ and NaN do not; else 0.0
+    sound : 1.0 where every pivot keeps more than the part `loss` of its terms, which ±∞ and NaN do not; else 0.0
     weakest : largest inverse pivot of multipliers, 0 where all of theirs are numbers; grows towards a
         singular configuration
     """
@@ -97,19 +97,20 @@ def _parts(pivot: Pivot) -> Iterator[Node]:
 
 
 def factors(
-    matrix: Sequence[Sequence[Node]], coordinates: int, most: float = inf, massless: Collection[int] = ()
-) -> Factors | None:
+    matrix: Sequence[Sequence[Node]], coordinates: int, most: float = inf, massless: Collection[int] = (),
+    loss: float | None = None,
+) -> Factors | None:  # fmt: skip
     """Eliminate a matrix whose first rows and columns belong to coordinates, the others to rows and multipliers.
 
     None where the pivots named above do not suffice, a pivot being an exact zero, or where factors and one solution
-    take more than about so many operations.
+    take more than about so many operations. `loss` is the part of its terms that a pivot keeps, `LOSS` by default [-].
     """
     kinds = [[_kind(entry) for entry in line] for line in matrix]
     tries = (_order(kinds, coordinates, first, massless) for first in (False, True))
     found = [order for order in tries if order is not None]
     if not found or min(found)[0] > most:
         return None
-    work = _Elimination(matrix, coordinates)
+    work = _Elimination(matrix, coordinates, LOSS if loss is None else loss)
     for row, column in min(found)[1]:
         if work.A[row][column].is_zero:
             return None
@@ -200,8 +201,8 @@ class _Pattern:
 class _Elimination:
     """A matrix under elimination: what is left of it, and of how much each pivot of a multiplier was made."""
 
-    def __init__(self, matrix: Sequence[Sequence[Node]], coordinates: int) -> None:
-        self.A = [list(line) for line in matrix]
+    def __init__(self, matrix: Sequence[Sequence[Node]], coordinates: int, loss: float) -> None:
+        self.A, self.loss = [list(line) for line in matrix], loss
         self.first = [line[k] for k, line in enumerate(matrix)]
         self.n = coordinates
         self.tape: Tape = matrix[0][0].tape
@@ -238,12 +239,12 @@ class _Elimination:
         """
         size, tape = abs(pivot), self.tape
         if k >= self.n:
-            holds = (LOSS * self.terms.get(k, size) < size) & (size < 1e300)
+            holds = (self.loss * self.terms.get(k, size) < size) & (size < 1e300)
         elif pivot is self.first[k]:
             holds = (size > 1e-300) & (size < 1e300)
         else:
             before = abs(self.first[k])
-            holds = (LOSS * before < size) & (LOSS * size < before)
+            holds = (self.loss * before < size) & (self.loss * size < before)
         self.sound = tape.binary("and", self.sound, holds)
 
     def result(self) -> Factors:

@@ -6,14 +6,17 @@ import ctypes
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.postponed import Postponed
-from mbd.equations import programs
+from mbd.equations import explicit_solution, programs
 from mbd.equations.derivation import derive
 from mbd.tape import elimination
+from tests.comparisons import at_least, compared
+from tests.equations.mechanisms import furnished, random_tree
 from tests.simulation.mechanisms import box, kneed_walker, kneed_walker_start, run
 from tests.simulation.singular_linkages import slider_crank
 from tests.tape.counts import total
@@ -66,6 +69,65 @@ def test_both_ways_of_factoring_take_the_same_steps(motion, scheme, monkeypatch)
         straight.stats["iterations"], rel=0.05
     )  # round-off decides some
     assert_same(straight, searched)
+
+
+@pytest.mark.parametrize(
+    ("motion", "how"), [(walk, "no pivot large enough"), (tumble, "too many unknowns"), (turn, "no pivot large enough")]
+)
+def test_explicit_steps_with_rows_are_those_with_a_search_for_pivots(motion, how, monkeypatch):
+    scheme = mbd.RungeKutta853()
+    straight = motion(scheme)
+    assert straight.stats["compiled"]
+    assert any(code.rates is not None for code in modes_of(straight))
+    name, value = {"too many unknowns": ("LARGEST", 0), "no pivot large enough": ("KEPT", 1e300)}[how]
+    monkeypatch.setattr(explicit_solution, name, value)
+    searched = motion(scheme)
+    assert all(code.rates is None for code in modes_of(searched)) == (how == "too many unknowns")
+    assert searched.stats["steps"] == straight.stats["steps"]
+    assert_same(straight, searched)
+
+
+def modes_of(run):
+    """Code of the modes of a run."""
+    mechanism = run.record.equations.memory["mechanism"]()
+    return list(mechanism._modes.values())
+
+
+@at_least(4)
+@settings(max_examples=8)
+@given(seed=st.integers(0, 200), spatial=st.booleans())
+def test_straight_line_code_solves_the_equations_of_accelerations_and_rows(seed, spatial):
+    """M v̇ + R λ = −f with B v̇ = −γ; M δ is a combination of rows, with B δ = −h, and −ḣ for velocities."""
+    mechanism = Mechanism(derive(furnished(random_tree(seed, 3, spatial, most=4), seed)))
+    equations, layout, rng = mechanism.equations, mechanism.layout, np.random.default_rng(seed)
+    rows = tuple(k for k, row in enumerate(equations.rows) if row.contact < 0)
+    code = mechanism.explicit(rows, (), False)
+    if code.rates is None:
+        return
+    n, m, parameters = layout.n, len(rows), mechanism.parameters()
+    q = equations.configuration.normalise(
+        np.array(equations.configuration.defaults) + 0.3 * rng.normal(size=layout.n_q)
+    )
+    block = mechanism.block(0.1, q, rng.normal(size=n), np.zeros(layout.n_anchors))
+    terms, out = mechanism.terms_of(block, parameters), np.zeros(mechanism.sizes["accelerations"])
+    mechanism.common["accelerations"](block, parameters, out)
+    given_numbers = np.concatenate([out, np.zeros(layout.size)])
+    rates, returns = np.zeros(1 + n + m), np.zeros(1 + 2 * n)
+    code.rates(given_numbers, parameters, rates)
+    code.returns(given_numbers, parameters, returns)
+    if rates[0] != 1.0 or returns[0] != 1.0:
+        return
+    compared()
+    B, R, picked = terms.B[list(rows)], terms.R[:, list(rows)], list(rows)
+    at_level = np.array([equations.rows[k].is_velocity for k in rows])
+    for matrix, right, found in (
+        (R, np.concatenate([-terms.f, -terms.bias[picked]]), rates[1:]),
+        (B.T, np.concatenate([np.zeros(n), np.where(at_level, 0.0, -terms.h[picked])]), returns[1 : n + 1]),
+        (B.T, np.concatenate([np.zeros(n), -terms.rate[picked]]), returns[n + 1 :]),
+    ):
+        whole = np.block([[terms.M, matrix], [B, np.zeros((m, m))]])
+        known = np.linalg.solve(whole, right)[: len(found)]
+        np.testing.assert_allclose(found, known, rtol=0, atol=1e-9 * max(1.0, np.abs(known).max()))
 
 
 @pytest.mark.parametrize("form", ["index3", "ggl"])

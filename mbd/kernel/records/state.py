@@ -10,7 +10,7 @@ from mbd.kernel.records.settings import SchemeAbilities
 
 __all__ = ["Memory", "Model", "Motion", "State"]
 
-PROGRAMS = 4
+PROGRAMS = 6
 """Programs of a mode: tangent, residual, correction and solution; 0 stands for the last two where there are none."""
 MODE_CAPACITY = 16
 """Modes for which a table is laid out at the start; it doubles as it fills."""
@@ -56,10 +56,12 @@ class Model(SchemeAbilities):
     scales_of_start: int = place("state")  # 1: magnitudes are those of a start, which no step has confirmed
     uneven_masses: int = place("state")  # 1: they differ so much that small residuals do not tell small errors
 
-    tangent_program: int = formula(lambda s: s.mode_code[4 * s.mode_id])  # its number in `code`, of the present mode
-    residual_program: int = formula(lambda s: s.mode_code[4 * s.mode_id + 1])
-    correction_program: int = formula(lambda s: s.mode_code[4 * s.mode_id + 2])  # the first one, in straight-line code
-    solution_program: int = formula(lambda s: s.mode_code[4 * s.mode_id + 3])  # with the factors of that
+    tangent_program: int = formula(lambda s: s.mode_code[6 * s.mode_id])  # its number in `code`, of the present mode
+    residual_program: int = formula(lambda s: s.mode_code[6 * s.mode_id + 1])
+    correction_program: int = formula(lambda s: s.mode_code[6 * s.mode_id + 2])  # the first one, in straight-line code
+    solution_program: int = formula(lambda s: s.mode_code[6 * s.mode_id + 3])  # with the factors of that
+    rates_program: int = formula(lambda s: s.mode_code[6 * s.mode_id + 4])  # accelerations and multipliers from K.acc
+    returns_program: int = formula(lambda s: s.mode_code[6 * s.mode_id + 5])  # corrections onto the rows from K.acc
 
 
 class State(SchemeAbilities):

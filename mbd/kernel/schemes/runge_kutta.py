@@ -11,13 +11,13 @@ that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.linear import solve_definite, solve_from_tips
+from mbd.kernel.algebra.linear import solve_definite, solve_from_tips, sum_of_sizes
 from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
-from mbd.kernel.hooks import call
+from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import Balance, DependentRows, Equations, Kernel, Memory, SingularSteps, Steps
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
@@ -110,7 +110,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         status = explicit_rates(K, t1)
         K.impulse[: K.n_rows] = 0.0
     else:
-        status = consistent(K, t1, K.q1, K.y1)
+        status = rates_at_end(K, t1)
         note_uneven(K)
         if status == 0 and K.uneven_masses == 1 and factor_saddle(K, K.n_active, False, LOSS_AT_ONCE):
             polish_with_rows(K, K.n_active)
@@ -231,6 +231,8 @@ def explicit_rates(K: Balance, t: float) -> int:
         if kept < LOSS:
             polish_rates(K, kept)
         return 0
+    if K.uneven_masses == 0 and solve_straight(K, m):
+        return 0
     if not factor_saddle(K, m, False, LOSS_AT_ONCE):
         return SINGULAR
     for i in range(n):
@@ -245,6 +247,30 @@ def explicit_rates(K: Balance, t: float) -> int:
             K.impulse[K.rows[k]] = K.rhs[n + k]
         polish_with_rows(K, m)
     return 0
+
+
+def solve_straight(K: Balance, m: int) -> bool:
+    """Rates in K.jump, multipliers in K.impulse, from K.acc by code of the mode; false where it has none for them."""
+    if K.rates_program == 0:
+        return False
+    call_on(K, K.rates_program, K.acc, K.spare)
+    if K.spare[0] != 1.0:
+        return False
+    n = K.n
+    K.jump[:n] = K.spare[1 : n + 1]
+    K.impulse[: K.n_rows] = 0.0
+    for k in range(m):
+        K.impulse[K.rows[k]] = K.spare[n + 1 + k]
+    return True
+
+
+def rates_at_end(K: Balance, t1: float) -> int:
+    """Rates and multipliers at the candidate, in K.jump and K.impulse, as `consistent` finds them."""
+    if K.n_frictions == 0 and K.n_dropped == 0 and K.loaded == 0 and K.rates_program > 0:
+        evaluate(K, t1, K.q1, K.y1)
+        if solve_straight(K, K.n_active) and sum_of_sizes(K.jump, K.n) < 1e300:
+            return 0
+    return int(consistent(K, t1, K.q1, K.y1))
 
 
 def note_pull(K: Balance) -> None:
@@ -262,6 +288,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
     o_h = K.acc_h
     before = 1e300
     size = 0.0
+    straight = False
     for _ in range(MOST_RETURNS):
         evaluate(K, t1, K.q1, K.y1)
         K.n_residuals += 1
@@ -274,12 +301,16 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
             if not abs(h) < 1e300:
                 return NOT_FINITE
             size = max(size, abs(h) / (16.0 * EPS * K.scale[n + row]))
-        if not factor_saddle(K, m, True, LOSS_AT_ONCE):
+        straight = return_straight(K)
+        if not straight and not factor_saddle(K, m, True, LOSS_AT_ONCE):
             return SINGULAR
         if size <= 1.0 or size >= before:
             break
         before = size
-        solve_kkt(K, n + m, K.rhs)
+        if straight:
+            K.rhs[:n] = K.spare[1 : n + 1]
+        else:
+            solve_kkt(K, n + m, K.rhs)
         displace(K, K.q1, K.rhs)
     if size > 1e3:  # coordinates may have grown since their sizes were noted
         raise_scales(K, True)
@@ -289,10 +320,13 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
     if size > 1e3:
         K.failure_size = size
         return NOT_CONVERGED
-    K.rhs[:n] = 0.0
-    for k in range(m):
-        K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
-    solve_kkt(K, n + m, K.rhs)
+    if straight:  # of the last turn, at whose positions K.acc is
+        K.rhs[:n] = K.spare[n + 1 : 2 * n + 1]
+    else:
+        K.rhs[:n] = 0.0
+        for k in range(m):
+            K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
+        solve_kkt(K, n + m, K.rhs)
     fastest = 0.0
     change = 0.0
     for i in range(n):
@@ -306,6 +340,14 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
         K.failure_size = 0.0
         return NOT_CONVERGED
     return 0
+
+
+def return_straight(K: Equations) -> bool:
+    """Corrections of positions and velocities by code of the mode, in K.spare; false where pivots are searched for."""
+    if K.returns_program == 0:
+        return False
+    call_on(K, K.returns_program, K.acc, K.spare)
+    return bool(K.spare[0] == 1.0)
 
 
 def explicit_error(K: Memory, h: float) -> None:

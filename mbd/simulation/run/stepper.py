@@ -234,9 +234,13 @@ class Stepper:
             v.mode_code = np.concatenate([v.mode_code, np.zeros_like(v.mode_code)])
             v.mode_order = np.concatenate([v.mode_order, np.zeros_like(v.mode_order)])
         v.mode_key[count * width : (count + 1) * width] = np.concatenate([flags, dropped, phases])
-        known = [code.tangent, code.residual] + ([] if code.correction is None else [code.correction, code.solution])
-        places = [*range(len(self.functions), len(self.functions) + len(known)), 0, 0]
-        v.mode_code[PROGRAMS * count : PROGRAMS * (count + 1)] = places[:PROGRAMS]
+        offered = [code.tangent, code.residual, code.correction, code.solution]
+        offered += [code.rates, code.returns] if self.straight else [None, None]
+        known = [function for function in offered if function is not None]
+        numbers = iter(range(len(self.functions), len(self.functions) + len(known)))
+        v.mode_code[PROGRAMS * count : PROGRAMS * (count + 1)] = [
+            0 if each is None else next(numbers) for each in offered
+        ]
         if code.order is not None:
             v.mode_order[count] = len(v.orders)
             v.orders = np.concatenate([v.orders, code.order])
