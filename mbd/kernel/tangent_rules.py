@@ -7,7 +7,27 @@ from __future__ import annotations
 
 from mbd.kernel.records import Kernel, Steps
 
-__all__ = ["follow_event", "follow_matrix", "further_corrections", "note_matrix", "takes_part"]
+__all__ = [
+    "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_stages", "further_corrections",
+    "is_differentiated", "note_matrix", "note_solution", "note_step", "takes_part",
+]  # fmt: skip
+
+NOT_FOLLOWED = -3
+"""Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
+
+
+def is_differentiated() -> bool:
+    """Whether this code carries derivatives."""
+    return False
+
+
+def note_step(K: Kernel) -> None:
+    """A step begins: what `follow_candidate` needs to take it once more."""
+
+
+def follow_candidate(K: Kernel, h: float, t1: float) -> int:
+    """Take the candidate that is about to be accepted once more, for its derivatives; 0, or a status."""
+    return 0
 
 
 def follow_event(K: Kernel) -> int:
@@ -17,6 +37,20 @@ def follow_event(K: Kernel) -> int:
 
 def note_matrix(K: Steps) -> None:
     """Newton's matrix has been made from what is in the block."""
+
+
+def note_solution(K: Steps) -> None:
+    """The block holds the solution of a step."""
+
+
+def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int:
+    """The solution of a step with its derivatives, from the prediction in the block; 0, or `NOT_FOLLOWED`."""
+    return NOT_FOLLOWED
+
+
+def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
+    """The same for a step of several stages."""
+    return NOT_FOLLOWED
 
 
 def follow_matrix(K: Steps, m: int, whole: bool) -> None:

@@ -33,7 +33,15 @@ from mbd.kernel.stepping.restart import (
     retain_scales,
     share_loads,
 )
-from mbd.kernel.tangent_rules import follow_matrix, further_corrections, note_matrix
+from mbd.kernel.tangent_rules import (
+    NOT_FOLLOWED,
+    follow_matrix,
+    follow_newton,
+    further_corrections,
+    is_differentiated,
+    note_matrix,
+    note_solution,
+)
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]
 
@@ -57,6 +65,10 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     than `MOST_STRAIGHT` `tangents` were counted; a pivot of round-off passes for one of its own size, so it is the
     residual that judges them.
     """
+    if is_differentiated():
+        status = follow_newton(K, h, t1, c_C, c_K)
+        if status != NOT_FOLLOWED:
+            return status
     m = K.n_active
     tolerance = min(4.0 * EPS, K.tolerance) if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
@@ -150,6 +162,7 @@ def no_candidate(K: Report, h: float, t1: float, status: int) -> int:
 
 def conclude_step(K: Kernel, h: float, t1: float) -> int:
     """The iterate becomes the candidate, unless the step is far too long for it."""
+    note_solution(K)
     if finish(K, h):
         K.changes_little = 1.0
     elif overturns(K, h):
@@ -211,7 +224,7 @@ def renew(K: Equations, m: int, tangents: int) -> bool:
     """
     K.n_tangents += 1
     first = K.correction_program
-    if first > 0:
+    if first > 0 and not is_differentiated():
         if tangents < MOST_STRAIGHT:
             call(K, first, K.out)
             if K.out[soundness_at(K, m)] == 1.0:

@@ -57,7 +57,7 @@ from mbd.kernel.stepping.restart import (
     retain_scales,
 )
 from mbd.kernel.stepping.scales import ROUGH, add_force_floors
-from mbd.kernel.tangent_rules import further_corrections
+from mbd.kernel.tangent_rules import NOT_FOLLOWED, follow_stages, further_corrections, is_differentiated
 
 __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 
@@ -136,6 +136,10 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
 
 def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
     """The same with one pair of matrices for all stages, from a prediction or from the stages that are there."""
+    if is_differentiated():
+        status = follow_stages(K, h, t1, m)
+        if status != NOT_FOLLOWED:
+            return status
     c = K.stages[MU_REAL] * h
     hold_block(K)
     if predicts:

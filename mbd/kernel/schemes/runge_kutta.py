@@ -36,6 +36,7 @@ from mbd.kernel.stepping.restart import (
     measure_accepted,
     raise_scales,
 )
+from mbd.kernel.tangent_rules import is_differentiated
 
 __all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -84,7 +85,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         K.stages[n_v + i] = K.rate[i]
         if i < n_v:
             K.stages[i] = K.y[i]
-    free = K.treelike == 1 and K.n_active == 0 and K.n_frictions == 0
+    free = K.treelike == 1 and K.n_active == 0 and K.n_frictions == 0 and not is_differentiated()
     if free:
         fill_block(K, K.time, K.q, K.y)
     for s in range(1, stages):

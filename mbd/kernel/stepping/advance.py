@@ -53,7 +53,7 @@ from mbd.kernel.stepping.restart import active_rows, consistent, largest_force, 
 from mbd.kernel.stepping.starting import find_mode, restart, still_dependent
 from mbd.kernel.stepping.step_retry import is_shortened, part_end, step_end, tried_step
 from mbd.kernel.stepping.trial_step import try_step
-from mbd.kernel.tangent_rules import follow_event
+from mbd.kernel.tangent_rules import follow_candidate, follow_event, note_step
 
 __all__ = ["advance"]
 
@@ -355,6 +355,7 @@ def take_step(K: Kernel) -> int:
             t1 = K.due_time
             within = True
             cut = False
+    note_step(K)
     h = t1 - t
     if K.halvings > 0:
         h *= 0.5**K.halvings
@@ -399,6 +400,11 @@ def take_step(K: Kernel) -> int:
     return judge_step(K, h, full, t1, cut, within)
 
 
+def tried_part(K: Kernel, h: float, t1: float) -> int:
+    """The candidate at the end of a part of a step."""
+    return try_step(K, h, t1)
+
+
 def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: bool) -> int:
     """Take the candidate, or the event that it holds; −1 where the run goes on. The arguments are those of `conclude`.
 
@@ -414,7 +420,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         cut = False
         h = abs(parts) * h / K.n_substeps
         t1 = K.time + h
-        status = try_step(K, h, t1)
+        status = tried_part(K, h, t1)
         if is_shortened(K, status):
             status = tried_step(K, SHORTER * h, K.time + SHORTER * h)
             h = K.step_taken
@@ -448,6 +454,10 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
                 return status
         elif event > 0:
             return event
+    if event == 0:
+        status = follow_candidate(K, h, t1)
+        if status != 0:
+            return status
     ends = K.n_machines > 0 and event == 0 and is_due(K, t1)
     pulls = K.n_judged > 0 and not ends and event == 0 and not quiet and has_spurious_reaction(K)
     if pulls and K.n_active > 0 and calm(K):

@@ -7,6 +7,7 @@ from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance
 from mbd.kernel.stepping.mass_ratios import LOSS
 from mbd.kernel.stepping.restart import fill_block
+from mbd.kernel.tangent_rules import is_differentiated
 
 __all__ = ["NOT_CLEAR", "free_rates", "rates_in_block"]
 
@@ -16,7 +17,7 @@ NOT_CLEAR = -1.0
 
 def free_rates(K: Balance, t: float) -> float:
     """The same as `rates_in_block` at (q1, y1)."""
-    if K.treelike == 0:
+    if K.treelike == 0 or is_differentiated():
         return NOT_CLEAR
     fill_block(K, t, K.q1, K.y1)
     return rates_in_block(K)
@@ -27,7 +28,7 @@ def rates_in_block(K: Balance) -> float:
 
     v̇ is in K.jump, ẋ in K.spare. K.acc is left as it is.
     """
-    if K.treelike == 0:
+    if K.treelike == 0 or is_differentiated():
         return NOT_CLEAR
     n = K.n
     call(K, FREE_RATES, K.spare)

@@ -22,12 +22,21 @@ __all__ = ["entry", "own_rules"]
 
 ENTRY = "mbd_tangent_kernel"
 HELD = (
-    "events.locate.locate", "events.locate.find_jump", "hooks.scheme_error", "stepping.restart.refresh_scales",
-    "stepping.restart.weigh", "schemes.iteration.residual_size", "schemes.iteration.is_below_floors",
-    "events.guards.judge", "events.guards.is_quiet", "events.guard_substeps.parts_to_take",
-    "stepping.resolution.judge_change",
+    "stepping.step_retry.tried_step", "stepping.advance.tried_part", "stepping.advance.find_event",
+    "stepping.advance.begin_substeps", "stepping.advance.passes_events", "stepping.advance.has_spurious_reaction",
+    "stepping.starting.still_dependent", "contact.cone_steps.slides_on", "contact.cone_steps.shorter_turn",
+    "contact.cone_steps.slides_at_first", "events.locate.jumps_over_stop", "singular.events.refuses",
+    "events.locate.find_jump", "hooks.scheme_error", "stepping.restart.refresh_scales", "stepping.restart.weigh",
+    "schemes.iteration.residual_size", "schemes.iteration.is_below_floors", "events.guards.is_quiet",
+    "schemes.runge_kutta.explicit_error", "schemes.radau_end.estimate_error", "singular.step_size.note_row_norms",
+    "stepping.conditioning.known_error", "stepping.contact_step.find_pace", "stepping.control.first_step",
+    "events.guard_round_off.guard_round_off", "singular.newmark_step.steps_to_singularity",
+    "schemes.iteration.overturns", "schemes.iteration.is_small", "rules.note_step", "rules.keep_candidate", "rules.restore_candidate", "rules.take_again", "rules.keep_stages", "rules.restore_stages",
+    "rules.prepare_metric", "rules.prepare_corrections", "rules.prepare_newton", "rules.prepare_stages",
 )  # fmt: skip
-"""Functions without derivatives: instants are found by values, sizes of forces and of errors judge only."""
+"""Functions without derivatives: steps are tried and judged, and instants found, by values alone.
+
+What is accepted is taken once more, with derivatives (`rules.follow_candidate`)."""
 
 
 def entry() -> Callable[[int, int], int]:
@@ -40,8 +49,8 @@ def _loaded(schemes: tuple[str, ...]) -> Callable[[int, int], int]:
     from mbd.compile.llvm import Machine, cached_object
 
     digest = hashlib.sha256(build.source_digest().encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
+    for name in ("build", "printer", "rules"):
+        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
     code = cached_object(f"tangent kernel {LEVEL} {digest.hexdigest()}", _object, lasting=True)
     _machines.append(Machine())
     address = _machines[-1].load(code, [ENTRY])[0]

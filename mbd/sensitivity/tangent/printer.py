@@ -21,9 +21,11 @@ from mbd.trees import tree
 
 __all__ = ["LANES", "tangent_text"]
 
-LANES = 8
+LANES = 24
 """Derivatives of a real; the last is kept for that by the size of a step, which an event needs."""
 VECTOR = f"<{LANES} x double>"
+ROOM = f"[{LANES} x double]"
+"""The same in memory, without gaps between one and the next."""
 WITH_TANGENT = {"real": VECTOR, "reals": "ptr", "kernel": "ptr"}
 ZERO = "zeroinitializer"
 HELD_ARRAYS = frozenset(
@@ -34,8 +36,12 @@ HELD_ARRAYS = frozenset(
     )
 )  # fmt: skip
 """Arrays whose numbers have no derivatives: what only decides, and sizes of steps by their error."""
-HELD_PLACES = frozenset(TABLE.places[name] for name in ("step", "next_step", "substep", "turning_step", "begun_step"))
+HELD_PLACES = frozenset(
+    TABLE.places[name] for name in ("step", "next_step", "substep", "turning_step", "begun_step", "step_taken")
+)
 """The same of single numbers: steps that follow an error are held as they were."""
+PLAIN = "plain_"
+"""What names of arrays begin with that are given without derivatives."""
 BUNDLES = {kind: f"{{ {LLVM[kind]}, {more} }}" for kind, more in WITH_TANGENT.items()}
 """What functions return that return reals, or the address of an array."""
 
@@ -44,38 +50,35 @@ define internal void @product(ptr %program, ptr %block, ptr %params, ptr %of.blo
 entry:
   %code = load ptr, ptr %program
   %p1 = getelementptr i64, ptr %program, i64 1
-  %entries = load i64, ptr %p1
+  %size = load i64, ptr %p1
   %p2 = getelementptr i64, ptr %program, i64 2
-  %size = load i64, ptr %p2
+  %ends = load ptr, ptr %p2
   %p3 = getelementptr i64, ptr %program, i64 3
-  %lines = load ptr, ptr %p3
+  %columns = load ptr, ptr %p3
   %p4 = getelementptr i64, ptr %program, i64 4
-  %columns = load ptr, ptr %p4
+  %numbers = load ptr, ptr %p4
   %p5 = getelementptr i64, ptr %program, i64 5
-  %numbers = load ptr, ptr %p5
-  %p6 = getelementptr i64, ptr %program, i64 6
-  %found = load ptr, ptr %p6
+  %found = load ptr, ptr %p5
   %there = icmp ne ptr %code, null
-  br i1 %there, label %evaluate, label %clear
+  br i1 %there, label %evaluate, label %lines
 evaluate:
   call void %code(ptr %block, ptr %params, ptr %numbers)
-  br label %clear
-clear:
-  %k = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %k.next, %clear.one ]
+  br label %lines
+lines:
+  %k = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %k.next, %store ]
+  %first = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %last, %store ]
   %more = icmp slt i64 %k, %size
-  br i1 %more, label %clear.one, label %add
-clear.one:
-  %place = getelementptr {VECTOR}, ptr %found, i64 %k
-  store {VECTOR} zeroinitializer, ptr %place, align 8
-  %k.next = add i64 %k, 1
-  br label %clear
+  br i1 %more, label %line, label %copy
+line:
+  %end.at = getelementptr i64, ptr %ends, i64 %k
+  %last = load i64, ptr %end.at
+  br label %entries
+entries:
+  %e = phi i64 [ %first, %line ], [ %e.next, %add ]
+  %sum = phi {VECTOR} [ zeroinitializer, %line ], [ %total, %add ]
+  %left = icmp slt i64 %e, %last
+  br i1 %left, label %add, label %store
 add:
-  %e = phi i64 [ 0, %clear ], [ %e.next, %add.one ]
-  %left = icmp slt i64 %e, %entries
-  br i1 %left, label %add.from, label %copy
-add.from:
-  %line.at = getelementptr i64, ptr %lines, i64 %e
-  %line = load i64, ptr %line.at
   %column.at = getelementptr i64, ptr %columns, i64 %e
   %column = load i64, ptr %column.at
   %entry.at = getelementptr double, ptr %numbers, i64 %e
@@ -84,27 +87,27 @@ add.from:
   %other = sub i64 -1, %column
   %index = select i1 %of.state, i64 %column, i64 %other
   %array = select i1 %of.state, ptr %of.block, ptr %of.params
-  br label %add.one
-add.one:
-  %source = getelementptr {VECTOR}, ptr %array, i64 %index
+  %source = getelementptr {ROOM}, ptr %array, i64 %index
   %input = load {VECTOR}, ptr %source, align 8
-  %first = insertelement {VECTOR} poison, double %number, i64 0
-  %factor = shufflevector {VECTOR} %first, {VECTOR} poison, <{LANES} x i32> zeroinitializer
+  %only = insertelement {VECTOR} poison, double %number, i64 0
+  %factor = shufflevector {VECTOR} %only, {VECTOR} poison, <{LANES} x i32> zeroinitializer
   %part = fmul {VECTOR} %factor, %input
-  %target = getelementptr {VECTOR}, ptr %found, i64 %line
-  %sum = load {VECTOR}, ptr %target, align 8
   %total = fadd {VECTOR} %sum, %part
-  store {VECTOR} %total, ptr %target, align 8
   %e.next = add i64 %e, 1
-  br label %add
+  br label %entries
+store:
+  %place = getelementptr {ROOM}, ptr %found, i64 %k
+  store {VECTOR} %sum, ptr %place, align 8
+  %k.next = add i64 %k, 1
+  br label %lines
 copy:
-  %c = phi i64 [ 0, %add ], [ %c.next, %copy.one ]
+  %c = phi i64 [ 0, %lines ], [ %c.next, %copy.one ]
   %rest = icmp slt i64 %c, %size
   br i1 %rest, label %copy.one, label %end
 copy.one:
-  %from = getelementptr {VECTOR}, ptr %found, i64 %c
+  %from = getelementptr {ROOM}, ptr %found, i64 %c
   %moved = load {VECTOR}, ptr %from, align 8
-  %to = getelementptr {VECTOR}, ptr %of.out, i64 %c
+  %to = getelementptr {ROOM}, ptr %of.out, i64 %c
   store {VECTOR} %moved, ptr %to, align 8
   %c.next = add i64 %c, 1
   br label %copy
@@ -142,6 +145,8 @@ def tangent_text(functions: Sequence[tree.Function], entry: str, held: Collectio
     needed = _reached(functions[-1].symbol, {_name(each): each.called for each in (*bodies, *plain)})
     texts = [body.text(calls[_name(body)] == 1) for body in (*plain, *bodies) if _name(body) in needed]
     head = HEAD + "declare double @log(double) nounwind nobuiltin willreturn memory(none)\n"
+    head += f"declare {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR})\n"
+    head += f"declare double @llvm.vector.reduce.fmax.v{LANES}f64({VECTOR})\n"
     whole = "\n".join([head, tags(), PRODUCT, *texts])
     return whole.replace(f"internal i64 @{functions[-1].symbol}.d(", f"i64 @{entry}(")
 
@@ -256,6 +261,8 @@ class TangentBody(Body):
     @staticmethod
     def is_held(node: tree.Element) -> bool:
         """Whether an element has no derivatives, or is no real."""
+        if isinstance(node.array, tree.Local) and node.array.name.startswith(PLAIN):
+            return True
         if node.kind != "real" or not isinstance(node.array, tree.Field):
             return node.kind != "real"
         index = node.index.value if isinstance(node.index, tree.Number) else -1
@@ -266,7 +273,7 @@ class TangentBody(Body):
         place = self.emit(f"getelementptr inbounds {LLVM[node.kind]}, ptr {array}, i64 {index}")
         if self.is_held(node):
             return place
-        return Dual(place, self.emit(f"getelementptr inbounds {VECTOR}, ptr {of(array)}, i64 {index}"))
+        return Dual(place, self.emit(f"getelementptr inbounds {ROOM}, ptr {of(array)}, i64 {index}"))
 
     def load(self, node: tree.Element, place: str) -> str:
         value = super().load(node, place)
@@ -360,6 +367,10 @@ class TangentBody(Body):
             return str(operands[0])
         if name.startswith("rules.takes_part."):
             return self.takes_part(operands[0])
+        if name.startswith("rules.is_differentiated"):
+            return "true"
+        if name.startswith("rules.largest_derivative."):
+            return self.largest(operands[0])
         given = [f"{LLVM[kind]} {operand}" for kind, operand in zip(kinds, operands, strict=True)]
         given += [f"{WITH_TANGENT[k]} {of(each)}" for k, each in zip(kinds, operands, strict=True) if k in WITH_TANGENT]
         self.called.append(f"{name}.d")
@@ -388,6 +399,13 @@ class TangentBody(Body):
         bits = self.emit(f"fcmp une {VECTOR} {of(value)}, {ZERO}")
         word = self.emit(f"bitcast <{LANES} x i1> {bits} to i{LANES}")
         return self.emit(f"or i1 {own}, {self.emit(f'icmp ne i{LANES} {word}, 0')}")
+
+    def largest(self, value: str) -> str:
+        """The largest size of the derivatives."""
+        if of(value) == ZERO:
+            return "0.0"
+        sizes = self.emit(f"call {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR} {of(value)})")
+        return self.emit(f"call double @llvm.vector.reduce.fmax.v{LANES}f64({VECTOR} {sizes})")
 
     def _Evaluate(self, node: tree.Evaluate) -> str:
         table, number = self.value(node.kernel)[0], self.as_kind(node.number, "int")

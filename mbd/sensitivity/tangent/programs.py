@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,19 +25,20 @@ class Derivative:
 
     Parameters
     ----------
-    mechanism, name, outputs : the program; outputs without derivatives are None
+    mechanism, name : of the program
+    outputs : gives its outputs where its derivatives are not known yet
     places : of parameters that are differentiated by
 
     Attributes
     ----------
-    address : of ``[code, entries, outputs, lines, columns, numbers, room]``, as `printer.PRODUCT` reads it
+    address : of ``[code, outputs, ends of their lines, columns, numbers, room]``, as `printer.PRODUCT` reads it
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
         name: str,
-        outputs: Sequence[Node],
+        outputs: Callable[[], Sequence[Node]],
         places: Sequence[int],
         first: int = 0,
         without: Sequence[str] = WITHOUT,
@@ -46,20 +47,16 @@ class Derivative:
         known = mechanism.named.get(symbol)
         if known is None:
             with mechanism.equations.tape.lock:
-                known = mechanism.named[symbol] = _made(
-                    mechanism, f"tangent_{len(mechanism.common)}", outputs, places, without
-                )
-        function, lines, columns = known
-        self._lines, self._columns = lines + first, columns
-        self._numbers = np.zeros(max(len(lines), 1))
-        size = first + len(outputs)
-        self._room = np.zeros((max(size, 1), LANES))
-        self._keep = function
-        self._words = np.array(
-            [0 if function is None else function.address, len(lines), size, self._lines.ctypes.data,
-             self._columns.ctypes.data, self._numbers.ctypes.data, self._room.ctypes.data],
-            dtype=np.int64,
-        )  # fmt: skip
+                nodes = outputs()
+                made = _made(mechanism, f"tangent_{len(mechanism.common)}", nodes, places, without)
+                known = mechanism.named[symbol] = *made, len(nodes)
+        function, lines, columns, count = known
+        size = first + count
+        ends = np.searchsorted(lines + first, np.arange(size), side="right")
+        room, numbers = np.zeros((max(size, 1), LANES)), np.zeros(max(len(lines), 1))
+        self._keep = function, ends, columns, numbers, room
+        places = [each.ctypes.data for each in (ends, columns, numbers, room)]
+        self._words = np.array([0 if function is None else function.address, size, *places], dtype=np.int64)
         self.address = int(self._words.ctypes.data)
 
 
@@ -73,15 +70,15 @@ def _made(
         each for each in inputs if each.data[0] not in without and (each.data[0] != "p" or each.data[1] in wanted)
     ]
     found = jvps(outputs, [{node: 1.0} for node in inputs]) if inputs else []
-    lines, columns, entries = list[int](), list[int](), list[Node]()
+    made = list[tuple[int, int, Node]]()
     for node, column in zip(inputs, found, strict=True):
         kind, index = node.data
         place = -1 - index if kind == "p" else layout.place(kind, index)
         for line, entry in enumerate(column):
             if not entry.is_zero:
-                lines.append(line)
-                columns.append(place)
-                entries.append(entry)
+                made.append((line, place, entry))
+    made.sort(key=lambda each: each[0])
+    lines, columns, entries = ([each[k] for each in made] for k in range(3))
     if entries:
         mechanism.common.add({symbol: entries}, True)
     function = mechanism.common[symbol] if entries else None
@@ -90,39 +87,43 @@ def _made(
 
 def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list[Derivative]:
     """Of the programs that every mode has, in the order of the kernel's code."""
-    equations = mechanism.equations
-    with equations.tape.lock:
-        named: dict[str, Sequence[Node]] = {
-            "accelerations": mechanism._accelerations, "guards": programs.guards(equations), "scales": (),
-            "compose": (), "terms": (), "increment_rates": (), "chart_end": (), "chart_motion": (), "free_rates": (),
-        }  # fmt: skip
-        if not mechanism.vector:
-            named |= {
-                "compose": programs.compose(equations) or (), "increment_rates": programs.increment_rates(equations),
-                "chart_end": chart_end(equations), "chart_motion": chart_motion(equations),
-            }  # fmt: skip
+    equations, vector = mechanism.equations, mechanism.vector
+
+    def none() -> Sequence[Node]:
+        return ()
+
+    named: dict[str, Callable[[], Sequence[Node]]] = {
+        "accelerations": lambda: mechanism._accelerations, "guards": lambda: programs.guards(equations),
+        "scales": none, "compose": none if vector else lambda: programs.compose(equations) or (), "terms": none,
+        "increment_rates": none if vector else lambda: programs.increment_rates(equations),
+        "chart_end": none if vector else lambda: chart_end(equations),
+        "chart_motion": none if vector else lambda: chart_motion(equations), "free_rates": none,
+    }  # fmt: skip
     return [Derivative(mechanism, name, outputs, places) for name, outputs in named.items()]
 
 
 def derivatives_of_modes(mechanism: Mechanism, code: Any, stabilized: bool, places: Sequence[int]) -> list[Derivative]:
     """Of the tangent and the residual of a mode, and of the matrix times a correction W of positions.
 
-    The matrix by itself is held, as Newton's method may take any; where it is a metric, `rules.follow_matrix` asks for
-    ``K W`` with W held, which stands behind the block, and of rows the part that is a change.
+    The matrix by itself is held, as Newton's method may take any; where it is a metric, `rules.begin_corrections` asks
+    for ``K W`` with W held, which stands behind the block, and of rows the part that is a change.
     """
     key = (code.rows, code.penalties, code.sliding, code.given_rows, stabilized)
     n, m, layout, tape = mechanism.layout.n, len(code.rows), mechanism.layout, mechanism.equations.tape
-    with tape.lock:
-        outputs = mechanism._of(key, programs.residual)
     name, size = f"residual_{key}", (n + m) ** 2
-    found = [Derivative(mechanism, name, outputs, places, first) for first in (size, 0)]
-    if not stabilized or not m:
-        return [*found, found[-1]]
-    with tape.lock:
+
+    def residual() -> Sequence[Node]:
+        return mechanism._of(key, programs.residual)
+
+    def turned() -> Sequence[Node]:
         entries = mechanism._of(key, programs.newton)
         whole = [tape.input("held", layout.size + k) for k in range(n + m)]
         parts = [tape.input("held", layout.size + n + m + k) for k in range(layout.n_v)]
-        turned = [_dot(entries[k * (n + m) : (k + 1) * (n + m)], whole if k < n else parts) for k in range(n + m)]
+        return [_dot(entries[k * (n + m) : (k + 1) * (n + m)], whole if k < n else parts) for k in range(n + m)]
+
+    found = [Derivative(mechanism, name, residual, places, first) for first in (size, 0)]
+    if not stabilized or not m:
+        return [*found, found[-1]]
     return [*found, Derivative(mechanism, f"turned_{key}", turned, places, without=("switch", "held", "shift"))]
 
 

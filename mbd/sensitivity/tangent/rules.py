@@ -1,25 +1,65 @@
-"""Rules of the tangent pass that are more than arithmetic, in place of `mbd.kernel.tangent_rules`."""
+"""Rules of the tangent pass that are more than arithmetic, in place of `mbd.kernel.tangent_rules`.
+
+Steps are tried, judged and located by values alone. The candidate that is accepted, or that an event takes over, is
+taken once more for its derivatives, at values that are known: explicit formulas operation by operation, implicit ones
+by the implicit function theorem, ``J δz = −δr`` at the solution z of ``r(z) = 0`` with one factorization of J (Griewank
+& Walther 2008, Evaluating Derivatives, ch. 15). Values stay those of the run to the bit.
+"""
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.ordered import solve_kkt
+from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK
 from mbd.kernel.events.guards import guard_value, watch
-from mbd.kernel.hooks import call_on
-from mbd.kernel.records import Kernel
+from mbd.kernel.hooks import call, call_on
+from mbd.kernel.records import Integers, Kernel, Reals
+from mbd.kernel.schemes.iteration import finish
+from mbd.kernel.schemes.radau_end import complete
+from mbd.kernel.schemes.stage_layout import (
+    CHANGES,
+    HELD,
+    MU_REAL,
+    STAGE_BEND,
+    STAGE_RATES,
+    STAGE_SHIFT,
+    stage_place,
+)
+from mbd.kernel.schemes.stage_masses import exchange_masses
+from mbd.kernel.schemes.stage_matrices import factor_stages, matrices
+from mbd.kernel.schemes.stages import (
+    correct_positions_of_stages,
+    correct_rates,
+    evaluate_stages,
+    hold_block,
+    load_stage,
+    predict_stages,
+)
 from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate
+from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.restart import compose, consistent, fill_block
+from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = [
-    "at_root",
-    "follow_event",
-    "follow_matrix",
-    "further_corrections",
-    "note_matrix",
-    "seeded",
-    "takes_part",
+    "at_root", "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_stages",
+    "further_corrections", "is_differentiated", "note_matrix", "note_solution", "note_step", "seeded", "takes_part",
     "without_tangent",
-]
+]  # fmt: skip
+
+NOT_FOLLOWED = -3
+"""Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
+FOLLOWED = 1e-12
+"""Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
+ROUND_OFF = 0.1
+"""Part of the last correction of derivatives above which the next one is round-off [-]."""
+MOST_CORRECTIONS = 12
+"""Corrections of derivatives with matrices that are not quite those of the solution [-]."""
+
+
+def is_differentiated() -> bool:
+    """Whether this code carries derivatives (see `printer`)."""
+    return False
 
 
 def seeded(h: float) -> float:
@@ -37,9 +77,82 @@ def without_tangent(value: float) -> float:
     return value
 
 
+def largest_derivative(value: float) -> float:
+    """The largest size of the derivatives of a value (see `printer`)."""
+    return 0.0
+
+
 def takes_part(value: float) -> bool:
     """Whether a value or one of its derivatives is not 0: a matrix passes through entries of 0 (see `printer`)."""
     return value != 0.0
+
+
+# where numbers lie in K.starts: inputs of the last of Newton's matrices | W | the block of the solution | what is noted
+# of a step (2) | the candidate | columns of K₀⁻¹ or stages
+
+
+def n_inputs(K: Kernel) -> int:
+    """How many numbers the inputs of Newton's matrix are."""
+    return int(K.o_slip + K.n_frictions + K.n_v)
+
+
+def solution_place(K: Kernel) -> int:
+    """Where the block of the solution begins in K.starts."""
+    return int(n_inputs(K) + K.n + K.n_rows + K.n_v)
+
+
+def step_place(K: Kernel) -> int:
+    """Where what is noted of a step begins in K.starts."""
+    return int(solution_place(K) + n_inputs(K))
+
+
+def note_step(K: Kernel) -> None:
+    """Whether a singular configuration is near as the step begins."""
+    K.starts[step_place(K)] = float(K.near_singular)
+
+
+def keep_candidate(K: Kernel) -> None:
+    """The values of the candidate into K.starts."""
+    K.starts[step_place(K) + 1] = float(K.near_singular)
+    carry_candidate(K, True)
+
+
+def restore_candidate(K: Kernel) -> None:
+    """The values that the candidate had, which those of `follow_candidate` differ from by round-off."""
+    K.near_singular = int(K.starts[step_place(K) + 1])
+    carry_candidate(K, False)
+
+
+def carry_candidate(K: Kernel, out: bool) -> None:
+    """The values of the candidate there or back."""
+    o = carry(K.q1, K.starts, step_place(K) + 2, K.n_q, out)
+    o = carry(K.y1, K.starts, o, K.n, out)
+    o = carry(K.rate1, K.starts, o, K.n, out)
+    o = carry(K.aux1, K.starts, o, K.n, out)
+    o = carry(K.lam1, K.starts, o, K.n_rows, out)
+    o = carry(K.shift1, K.starts, o, K.n_v, out)
+    o = carry(K.guards1, K.starts, o, K.n_watched, out)
+    carry(K.limit, K.starts, o, K.n_frictions, out)
+
+
+def metric_place(K: Kernel) -> int:
+    """Where columns of K₀⁻¹, or stages, begin in K.starts."""
+    kept = K.n_q + 3 * K.n + K.n_rows + K.n_v + K.n_watched + K.n_frictions
+    return int(step_place(K) + 2 + kept)
+
+
+def follow_candidate(K: Kernel, h: float, t1: float) -> int:
+    """The candidate once more, with its derivatives."""
+    keep_candidate(K)
+    K.near_singular = int(without_tangent(K.starts[step_place(K)]))
+    status = try_step(K, h, t1)
+    restore_candidate(K)
+    return status
+
+
+def take_again(K: Kernel, h: float) -> int:
+    """The candidate of an event by values: the solution of its step is known then."""
+    return event_candidate(K, h, K.time + h)
 
 
 def follow_event(K: Kernel) -> int:
@@ -52,11 +165,18 @@ def follow_event(K: Kernel) -> int:
     if h <= 0.0 and kind != CLOSE and kind != CROSS and kind != CROSS_BACK:
         K.event_after = h
         return 0
+    keep_candidate(K)
+    if h > 0.0:
+        status = take_again(K, h)
+        if status != 0:
+            return status
     status = candidate_after(K, seeded(h))
     if status != 0:
         return status
     K.event_after = at_root(h, guard_value(K, kind, K.event_index, K.time + seeded(h)))
-    return candidate_after(K, K.event_after)
+    status = candidate_after(K, K.event_after)
+    restore_candidate(K)
+    return status
 
 
 def candidate_after(K: Kernel, h: float) -> int:
@@ -79,10 +199,248 @@ def candidate_after(K: Kernel, h: float) -> int:
     return 0
 
 
+# one implicit step at a time ------------------------------------------------------------------------------------------
 def note_matrix(K: Kernel) -> None:
-    """The inputs that Newton's matrix is made from, for `follow_matrix`, into K.starts."""
-    size = K.o_slip + K.n_frictions + K.n_v
+    """The inputs that Newton's matrix is made from, into K.starts."""
+    size = n_inputs(K)
     K.starts[:size] = K.block[:size]
+
+
+def note_solution(K: Kernel) -> None:
+    """The block of a solution, into K.starts."""
+    size = n_inputs(K)
+    o = solution_place(K)
+    K.starts[o : o + size] = K.block[:size]
+
+
+def turned_program(K: Kernel) -> int:
+    """The number of the program whose derivative is that of Newton's matrix times a given W (see `programs`)."""
+    return int(K.residual_program + (3 if K.correction_program > 0 else 1))
+
+
+def moved(value: float, goal: float) -> float:
+    """A value brought to another one, with the derivatives that it has."""
+    return value + (without_tangent(goal) - without_tangent(value))
+
+
+def derivative_of(value: float) -> float:
+    """0 with the derivatives of a value."""
+    return value - without_tangent(value)
+
+
+def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
+    """b ← A⁻¹ b with the factors of `mbd.kernel.algebra.linear.factor`, which have no derivatives here."""
+    for k in range(n):
+        p = pivots[k]
+        if p != k:
+            swap = b[k]
+            b[k] = b[p]
+            b[p] = swap
+    for k in range(n):
+        left = b[k]
+        for i in range(k + 1, n):
+            b[i] -= plain_A[i * n + k] * left
+    for c in range(n):
+        k = n - 1 - c
+        left = b[k] * plain_A[k * n + k]
+        b[k] = left
+        for i in range(k):
+            b[i] -= plain_A[i * n + k] * left
+
+
+def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int:
+    """The derivatives of the solution noted last, from those of the prediction in the block.
+
+    With the position correction W in the metric of Newton's matrix K₀ at the noted inputs, ``K₀ W = (0, g)``, with K
+    at the solution, and with r, h, ḣ as the prediction and ``−K₀⁻¹ δK₀ W`` change them,
+
+        K (δv̇, δλ) = −(δr + r_x Z δg, (δḣ + ḣ_x Z δg)/c_C)   δh + B (c_K δv̇ + Z δg) = 0   Z = K₀⁻¹ (0, 1)
+
+    solved exactly: δg by the Schur complement of `prepare_corrections`.
+    """
+    if sharing(K):
+        return NOT_FOLLOWED
+    n = K.n
+    m = K.n_active
+    o = solution_place(K)
+    at = n_inputs(K)
+    # is the position correction another one than was predicted?
+    corrects = False
+    if m > 0 and K.stabilized == 1:
+        for i in range(K.n_v):
+            corrects = corrects or K.starts[o + at - K.n_v + i] != K.shift1[i]
+    if corrects:
+        corrects = begin_corrections(K, m)
+    # values of the solution, derivatives of the prediction
+    for i in range(n):
+        change = without_tangent(K.starts[o + K.o_a + i]) - without_tangent(K.block[K.o_a + i])
+        K.block[K.o_a + i] += change
+        K.block[K.o_v + i] += c_C * change
+        if i < K.n_v:
+            K.block[K.o_x + i] += c_K * change
+    for k in range(m):
+        place = K.o_lam + K.rows[k]
+        K.block[place] = moved(K.block[place], K.starts[o + place])
+    if prepare_newton(K, n + m) != 0:
+        return NOT_FOLLOWED
+    by_v = without_tangent(c_C)
+    by_x = without_tangent(c_K)
+    if corrects and prepare_corrections(K, m, by_v, by_x) != 0:
+        return NOT_FOLLOWED
+    # rates and multipliers, then what they change where positions are corrected
+    call(K, K.residual_program, K.out)
+    for i in range(n):
+        K.rhs[i] = -derivative_of(K.out[i])
+    for k in range(m):
+        K.rhs[n + k] = right_hand_side(K, k, m, by_v, by_x)
+    solve_plain(K.kkt, n + m, K.pivots, K.rhs)
+    if corrects:
+        correct_positions(K, m, by_x)
+    for i in range(n):
+        K.block[K.o_a + i] += K.rhs[i]
+        K.block[K.o_v + i] += by_v * K.rhs[i]
+        if i < K.n_v:
+            K.block[K.o_x + i] += by_x * K.rhs[i]
+    for k in range(m):
+        K.block[K.o_lam + K.rows[k]] += K.rhs[n + k]
+    finish(K, h)
+    return 0
+
+
+def right_hand_side(K: Kernel, k: int, m: int, c_C: float, c_K: float) -> float:
+    """Of active row k in the equations of rates and multipliers, as `schemes.newton.right_hand_sides` has it."""
+    if K.stabilized == 1:
+        return -derivative_of(K.out[K.n + m + k]) / c_C
+    return -derivative_of(K.out[K.n + k]) / (c_C if K.row_level[K.rows[k]] == 1 else c_K)
+
+
+def prepare_newton(K: Kernel, size: int) -> int:
+    """Factors of Newton's matrix at the block, whose entries stay in K.out; 0, or that it is singular."""
+    call(K, K.tangent_program, K.out)
+    K.kkt[: size * size] = K.out[: size * size]
+    K.order_start = 0
+    return factor(K.kkt, size, K.pivots)
+
+
+# behind the candidate in K.starts: Z (m, n_v) | Q = K⁻¹ (r_x, ḣ_x/c_C) Z (m, n + m) | B (m, n_v)
+def prepare_metric(K: Kernel, m: int) -> int:
+    """W and Z of `follow_newton`, and factors of K₀."""
+    n = K.n
+    size = n + m
+    at = n_inputs(K)
+    call_on(K, K.tangent_program, K.starts, K.out)
+    K.kkt[: size * size] = K.out[: size * size]
+    K.order_start = 0
+    if factor(K.kkt, size, K.pivots) != 0:
+        return 1
+    shift = solution_place(K) + at - K.n_v
+    for k in range(m):
+        total = 0.0
+        for j in range(K.n_v):
+            total += K.out[(n + k) * size + j] * K.starts[shift + j]
+        K.work[n + k] = total
+    K.work[:n] = 0.0
+    solve(K.kkt, size, K.pivots, K.work)
+    K.starts[at : at + size] = K.work[:size]
+    K.starts[at + size : at + size + K.n_v] = 0.0  # what rows make of W is left to g
+    o_Z = metric_place(K)
+    for k in range(m):
+        K.work[:size] = 0.0
+        K.work[n + k] = 0.0 if K.row_level[K.rows[k]] == 1 else 1.0  # those on velocities correct no positions
+        solve(K.kkt, size, K.pivots, K.work)
+        K.starts[o_Z + k * K.n_v : o_Z + k * K.n_v + K.n_v] = K.work[: K.n_v]
+    return 0
+
+
+def begin_corrections(K: Kernel, m: int) -> bool:
+    """The position correction of the solution in the block, with the derivatives −K₀⁻¹ δK₀ W; whether K₀ is regular."""
+    size = K.n + m
+    at = n_inputs(K)
+    shift = solution_place(K) + at - K.n_v
+    for i in range(at):
+        K.starts[i] = moved(K.block[i], K.starts[i])
+    if prepare_metric(K, m) != 0:
+        return False
+    for i in range(size + K.n_v):
+        K.starts[at + i] = without_tangent(K.starts[at + i])
+    call_on(K, turned_program(K), K.starts, K.spare)
+    for i in range(size):
+        K.work[i] = -derivative_of(K.spare[i])
+    solve_plain(K.kkt, size, K.pivots, K.work)
+    for i in range(K.n_v):
+        found = without_tangent(K.starts[shift + i]) + derivative_of(K.work[i])
+        K.block[K.o_x + i] += found - K.shift1[i]
+        K.shift1[i] = found
+    return True
+
+
+def prepare_corrections(K: Kernel, m: int, c_C: float, c_K: float) -> int:
+    """Q, B and factors of the Schur complement ``S = B (Z − c_K Q)`` of `follow_newton`, in K.spare; 0, or that S is singular.
+
+    Newton's matrix is in K.out; what it is less with c_K = 0 is the part of it that positions make.
+    """
+    n = K.n
+    n_v = K.n_v
+    size = n + m
+    o_Z = metric_place(K)
+    o_Q = o_Z + m * n_v
+    o_B = o_Q + m * size
+    K.spare[: size * size] = K.out[: size * size]
+    K.block_c_K = 0.0
+    call(K, K.tangent_program, K.out)
+    K.block_c_K = c_K
+    for k in range(m):
+        for j in range(n_v):
+            K.starts[o_B + k * n_v + j] = K.out[(n + k) * size + j]
+        for i in range(size):
+            total = 0.0
+            for j in range(n_v):
+                part = K.spare[i * size + j] - K.out[i * size + j]
+                total += part / c_K * K.starts[o_Z + k * n_v + j]
+            K.work[i] = total
+        solve(K.kkt, size, K.pivots, K.work)
+        K.starts[o_Q + k * size : o_Q + k * size + size] = K.work[:size]
+    for i in range(m):
+        for k in range(m):
+            total = 0.0
+            for j in range(n_v):
+                column = K.starts[o_Z + k * n_v + j] - c_K * K.starts[o_Q + k * size + j]
+                total += K.starts[o_B + i * n_v + j] * column
+            if K.row_level[K.rows[i]] == 1:
+                total = 1.0 if i == k else 0.0
+            K.spare[i * m + k] = total
+    return factor(K.spare, m, K.columns)
+
+
+def correct_positions(K: Kernel, m: int, c_K: float) -> None:
+    """δW of ``δh = 0`` into the block, with what it changes of the rates and multipliers in the right-hand side."""
+    n = K.n
+    n_v = K.n_v
+    size = n + m
+    o_Z = metric_place(K)
+    o_Q = o_Z + m * n_v
+    o_B = o_Q + m * size
+    for k in range(m):
+        K.work[k] = 0.0
+        if K.row_level[K.rows[k]] == 0:
+            K.work[k] = -derivative_of(K.out[n + k])
+            for j in range(n_v):
+                K.work[k] -= c_K * without_tangent(K.starts[o_B + k * n_v + j]) * K.rhs[j]
+    solve_plain(K.spare, m, K.columns, K.work)
+    for i in range(n_v):
+        total = 0.0
+        for k in range(m):
+            total += without_tangent(K.starts[o_Z + k * n_v + i]) * K.work[k]
+        K.shift1[i] += total
+        K.block[K.o_x + i] += total
+    for k in range(m):
+        for i in range(size):
+            K.rhs[i] -= without_tangent(K.starts[o_Q + k * size + i]) * K.work[k]
+
+
+def further_corrections() -> int:
+    """Those that derivatives need to follow the solution where `NOT_FOLLOWED`, as they lag behind it by one."""
+    return 3 if is_differentiated() else 0
 
 
 def follow_matrix(K: Kernel, m: int, whole: bool) -> None:
@@ -91,14 +449,14 @@ def follow_matrix(K: Kernel, m: int, whole: bool) -> None:
     ``δK W`` is the derivative of a program of the mode (see `programs`) that reads W behind the inputs of the matrix.
     """
     size = K.n + m
-    o = K.o_slip + K.n_frictions + K.n_v
+    o = n_inputs(K)
     for i in range(size):
         K.starts[o + i] = without_tangent(K.work[i])
     for i in range(K.n_v):
         K.starts[o + size + i] = without_tangent(K.work[i])
         if whole:
             K.starts[o + size + i] -= without_tangent(K.shift1[i])
-    call_on(K, K.solution_program, K.starts, K.spare)
+    call_on(K, turned_program(K), K.starts, K.spare)
     for i in range(size):
         K.spare[i] -= without_tangent(K.spare[i])
     solve_kkt(K, size, K.spare)
@@ -106,6 +464,106 @@ def follow_matrix(K: Kernel, m: int, whole: bool) -> None:
         K.work[i] -= K.spare[i]
 
 
-def further_corrections() -> int:
-    """Those that derivatives need to follow the solution, as they lag behind it by one."""
-    return 3
+# a step of several stages ---------------------------------------------------------------------------------------------
+def n_stage_numbers(K: Kernel) -> int:
+    """How many numbers the unknowns of all stages are."""
+    return int(3 * (K.n + K.n_rows + K.n_v))
+
+
+def keep_stages(K: Kernel) -> None:
+    """The values of the stages behind the candidate in K.starts."""
+    place = metric_place(K)
+    o = stage_place(K, STAGE_RATES)
+    for i in range(n_stage_numbers(K)):
+        K.starts[place + i] = K.stages[o + i]
+    if K.vector == 0:
+        o = stage_place(K, STAGE_BEND)
+        for i in range(3 * K.n_v):
+            K.starts[place + n_stage_numbers(K) + i] = K.stages[o + i]
+
+
+def restore_stages(K: Kernel) -> None:
+    """The values that stages had."""
+    place = metric_place(K)
+    o = stage_place(K, STAGE_RATES)
+    for i in range(n_stage_numbers(K)):
+        K.stages[o + i] = K.starts[place + i]
+    if K.vector == 0:
+        o = stage_place(K, STAGE_BEND)
+        for i in range(3 * K.n_v):
+            K.stages[o + i] = K.starts[place + n_stage_numbers(K) + i]
+
+
+def prepare_stages(K: Kernel, m: int, h: float, t1: float) -> int:
+    """Newton's matrices at the middle stage, factored, with their rows behind the stages; 0, or that one is singular."""
+    load_stage(K, 1, h, t1)
+    matrices(K, m, h)
+    o = metric_place(K) + n_stage_numbers(K) + 3 * K.n_v
+    for k in range(m):
+        for j in range(K.n_v):
+            K.starts[o + k * K.n_v + j] = K.kkt[(K.n + k) * (K.n + m) + j]
+    return 0 if factor_stages(K, K.n + m) else 1
+
+
+def follow_held(K: Kernel, m: int) -> None:
+    """The derivatives of H U_i, with H held, for the first correction of positions (see `stage_matrices.keep_held`)."""
+    o_U = stage_place(K, STAGE_SHIFT)
+    o_H = stage_place(K, HELD)
+    o_Z = metric_place(K) + n_stage_numbers(K) + 3 * K.n_v
+    for i in range(3):
+        for k in range(m):
+            total = 0.0
+            for j in range(K.n_v):
+                total += without_tangent(K.starts[o_Z + k * K.n_v + j]) * derivative_of(K.stages[o_U + i * K.n_v + j])
+            K.stages[o_H + i * m + k] = without_tangent(K.stages[o_H + i * m + k]) + total
+
+
+def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
+    """The derivatives of the stages that are there, from those of their prediction.
+
+    The matrices are those of the middle stage, as in the step itself: corrections are taken until they are round-off.
+    """
+    if sharing(K):
+        return NOT_FOLLOWED
+    n = K.n
+    c = without_tangent(K.stages[MU_REAL] * h)
+    keep_stages(K)
+    hold_block(K)
+    predict_stages(K, h, m)
+    # values of the solution, derivatives of the prediction
+    place = metric_place(K)
+    o = stage_place(K, STAGE_RATES)
+    for i in range(n_stage_numbers(K)):
+        K.stages[o + i] = moved(K.stages[o + i], K.starts[place + i])
+    if K.vector == 0:
+        o_E = stage_place(K, STAGE_BEND)
+        for i in range(3 * K.n_v):
+            K.stages[o_E + i] = without_tangent(K.starts[place + n_stage_numbers(K) + i])
+    if prepare_stages(K, m, h, t1) != 0:
+        return NOT_FOLLOWED
+    size = n + m
+    for i in range(size * size):
+        K.kkt[i] = without_tangent(K.kkt[i])
+    o_D = stage_place(K, CHANGES)
+    before = 1e300
+    for iteration in range(MOST_CORRECTIONS):
+        evaluate_stages(K, h, t1, m, 1.0, c, c * c, False)
+        if K.vector == 0 and m == 0:
+            exchange_masses(K, h, t1)
+        if m > 0:
+            if iteration == 0:
+                follow_held(K, m)
+            correct_positions_of_stages(K, m, h, iteration == 0)
+        correct_rates(K, m, h)
+        change = 0.0
+        largest = 0.0
+        for i in range(3):
+            for j in range(n):
+                change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
+                largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
+        if change <= FOLLOWED * largest or change > 0.9 * before:
+            break
+        before = change
+    status = complete(K, h, t1, m, False, False)
+    restore_stages(K)
+    return status

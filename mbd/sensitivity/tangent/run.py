@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.equations.equations import Guard
-from mbd.kernel.records import PROGRAMS, TABLE
+from mbd.kernel.records import TABLE
 from mbd.sensitivity.tangent.build import entry
 from mbd.sensitivity.tangent.printer import LANES
 from mbd.sensitivity.tangent.programs import derivatives_of_modes, derivatives_of_programs
-from mbd.simulation.run.call_table import PLACES, CallTable
+from mbd.simulation.run.call_table import BOUND, PLACES
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.stepper import Stepper
 
@@ -29,34 +29,51 @@ class Kept:
     """In the place of a scheme's memory, which goes into savepoints: the derivatives that the next step depends on."""
 
     def __init__(self, stepper: TangentStepper) -> None:
-        self._stepper = stepper
+        self._room = stepper.rooms[0]
 
     @property
-    def memory(self) -> dict[str, Lanes]:
+    def memory(self) -> Lanes:
         """A copy of them."""
-        return {name: self._stepper.tangent(name).copy() for name in TABLE.kept_reals}
+        return self._room.copy()
 
     @memory.setter
-    def memory(self, kept: dict[str, Lanes]) -> None:
-        for name, found in kept.items():
-            self._stepper.tangent(name)[:] = found
+    def memory(self, kept: Lanes) -> None:
+        self._room[:] = kept
 
 
 class TangentStepper(Stepper):
-    """A run's numbers with the derivatives of each: those of an array (L,) are (L, `LANES`)."""
+    """A run's numbers with the derivatives of each: those of an array (L,) are (L, `LANES`).
+
+    rooms : of derivatives, for each shelf of arrays (see `mbd.simulation.run.shelves`); those of integers are empty
+    """
 
     places: Sequence[int] = ()
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
-        self.straight = self.judges_starts = False
-        self.kernel.treelike = 0
-        self._of: dict[str, tuple[Any, Lanes]] = {}
+        self.judges_starts = False
+        plan, reals = self.shelves.plan, TABLE.real_arrays
+        self.rooms = [
+            np.zeros((length if own and own.keys() <= set(reals) else 0, LANES))
+            for length, own in zip(plan.lengths, plan.places, strict=True)
+        ]
+        K, layout = self.kernel, self.mechanism.layout
+        sizes = 2 * layout.size + 10 * (layout.n + layout.n_rows + layout.n_v + 1) + layout.n_q
+        sizes += K.n_watched + K.n_frictions + layout.n_rows * (2 * layout.n_v + layout.n + layout.n_rows)
+        K.starts = np.zeros(sizes)  # see `rules`
+        self._of = {name: (K_array, room) for name, K_array, room in self._on_shelves()}
+        bases = np.array([*(room.ctypes.data for room in self.rooms), 0])
         self._words = np.zeros(len(PLACES), dtype=np.int64)
+        self._words[BOUND] = bases[plan.shelf] + LANES * plan.offset
         self._programs: list[Any] = []
         self.scheme = Kept(self)
-        layout = self.mechanism.layout
-        self.kernel.starts = np.zeros(layout.size + layout.n + layout.n_rows + layout.n_v)  # see `rules.note_matrix`
+
+    def _on_shelves(self) -> Iterator[tuple[str, Any, Lanes]]:
+        """Names of arrays of reals, the arrays, and the derivatives of each."""
+        for room, places in zip(self.rooms, self.shelves.plan.places, strict=True):
+            for name, place in places.items():
+                if name in TABLE.real_arrays:
+                    yield name, self.shelves.arrays[name], room[place]
 
     def tangent(self, name: str) -> Lanes:
         """The derivatives of an array, which stay as it grows."""
@@ -68,6 +85,7 @@ class TangentStepper(Stepper):
                 count = min(len(found), len(room))
                 room[:count] = found[:count]
             self._of[name], found = (array, room), room
+            self._words[PLACES[name]] = room.ctypes.data
         assert found is not None
         return found
 
@@ -78,23 +96,28 @@ class TangentStepper(Stepper):
         assert len(self._programs) == len(self.functions)  # in the same order
 
     def add_mode(self) -> None:
-        count = int(self.kernel.n_modes)
         super().add_mode()
         code = self.modes[-1]
-        self.kernel.mode_code[PROGRAMS * count + 3] = len(self.functions)
-        self.functions.append(code.residual)
-        self._programs += derivatives_of_modes(self.mechanism, code, self.stabilized, self.places)
+        tangent, residual, turned = derivatives_of_modes(self.mechanism, code, self.stabilized, self.places)
+        self._programs += [tangent, residual]
+        if code.correction is not None:
+            self._programs += [turned, turned]  # in the place of code that runs without derivatives only
+        self._programs.append(turned)
+        self.functions.append(code.residual)  # see `rules.turned_program`
 
     def _advance_compiled(self) -> int:
+        arrays = vars(self.kernel)
         for name in TABLE.real_arrays:
-            if name != "shift1":
-                self._words[PLACES[name]] = self.tangent(name).ctypes.data
+            if name != "shift1" and (name not in self._of or arrays[name] is not self._of[name][0]):
+                self.tangent(name)
         shift = 8 * LANES * self.mechanism.layout.shift
         self._words[PLACES["shift1"]] = self._words[PLACES["block"]] + shift
         code = np.array([each.address for each in self._programs], dtype=np.int64)
         self._words[PLACES["code"]] = code.ctypes.data
-        self._table = CallTable(self.functions, self.kernel, self.shelves.known)
-        return int(entry()(self._table.address, self._words.ctypes.data))
+        return super()._advance_compiled()
+
+    def _enter(self, address: int) -> int:
+        return int(entry()(address, self._words.ctypes.data))
 
 
 class TangentRun(Run):
@@ -103,6 +126,7 @@ class TangentRun(Run):
     stepper_kind = TangentStepper
     stepper: TangentStepper
     ends_exactly = True
+    rows_at_once = 256  # derivatives of more would not stay in the caches of processors
     every_row = False
     differentiated_reset: Callable[[Guard, dict[str, tuple[Any, Lanes]], Any, Any], tuple[Lanes, Lanes]]
 

@@ -29,8 +29,6 @@ from mbd.state import State
 
 __all__ = ["EnergyFindings", "RoomFindings", "RunData", "Savepoint"]
 
-ROWS_AT_ONCE = 1 << 14
-"""Rows of results that the kernel may fill before it hands them over."""
 STEPS_AT_ONCE = {True: 20000, False: 200}
 """Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
 USUAL_SIZE = 10
@@ -102,6 +100,8 @@ class RunData:
     """What a run was asked for, the kernel's arrays, and what was stored until now."""
 
     stepper_kind: type[Stepper] = Stepper
+    rows_at_once = 1 << 14
+    """Rows of results that the kernel may fill before it hands them over."""
     ends_exactly = False
     """Whether a last step of the grid that ends with the run, but for round-off, ends there exactly."""
 
@@ -125,7 +125,7 @@ class RunData:
         self.asked, self.changed, self.dt = settings, dict(changed), dt
         forces: list[Force] = getattr(model, "applied", getattr(model, "forces", []))
         self.places = {force.name: _places(force) for force in forces}
-        rows = int(min(ROWS_AT_ONCE, (end - start.time) / dt / options.get("store", 1) + 64))
+        rows = int(min(self.rows_at_once, (end - start.time) / dt / options.get("store", 1) + 64))
         parameters = self._parameters()
         self.first_parameters = parameters.copy()
         compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}

@@ -320,6 +320,12 @@ class Stepper:
         refresh_scales(K)
         return guard_round_off(K, e, K.time, K.q, K.y)
 
+    def _enter(self, address: int) -> int:
+        """Call the compiled kernel with a table."""
+        from mbd.kernel.entry import entry
+
+        return int(entry()(address))
+
     def _advance_plain(self) -> int:
         from mbd.kernel.stepping.advance import advance
         from mbd.kernel.stepping.many_runs import march_many
@@ -329,15 +335,13 @@ class Stepper:
             return int(march_many(self.kernel) if self.kernel.many else advance(self.kernel))
 
     def _advance_compiled(self) -> int:
-        from mbd.kernel.entry import entry
-
         if self._table is None or self._provisional:
             self._provisional = self.provisional  # before the addresses: whoever settles in between is looked at again
             self._table = CallTable(self.functions, self.kernel, self.shelves.known)
         else:
             self._table.fill(self.functions, self.kernel)
         postponed = [tangent for tangent in self.mechanism.postponed if not tangent.made]
-        status = entry()(self._table.address)
+        status = self._enter(self._table.address)
         for tangent in postponed:
             if tangent.raised is not None:
                 raised, tangent.raised = tangent.raised, None
