@@ -31,8 +31,9 @@ HELD = (
     "schemes.runge_kutta.explicit_error", "schemes.radau_end.estimate_error", "singular.step_size.note_row_norms",
     "stepping.conditioning.known_error", "stepping.contact_step.find_pace", "stepping.control.first_step",
     "events.guard_round_off.guard_round_off", "singular.newmark_step.steps_to_singularity",
-    "schemes.iteration.overturns", "schemes.iteration.is_small", "rules.note_step", "rules.keep_candidate", "rules.restore_candidate", "rules.take_again", "rules.keep_stages", "rules.restore_stages",
-    "rules.prepare_metric", "rules.prepare_corrections", "rules.prepare_newton", "rules.prepare_stages",
+    "schemes.iteration.overturns", "schemes.iteration.is_small", "rules.note_step", "rules.keep_candidate",
+    "rules.restore_candidate", "rules.take_again", "rules.keep_stages", "rules.restore_stages", "rules.prepare_metric",
+    "rules.prepare_corrections", "rules.prepare_newton", "rules.prepare_stages",
 )  # fmt: skip
 """Functions without derivatives: steps are tried and judged, and instants found, by values alone.
 

@@ -375,7 +375,7 @@ def begin_corrections(K: Kernel, m: int) -> bool:
 
 
 def prepare_corrections(K: Kernel, m: int, c_C: float, c_K: float) -> int:
-    """Q, B and factors of the Schur complement ``S = B (Z − c_K Q)`` of `follow_newton`, in K.spare; 0, or that S is singular.
+    """Q, B and factors of the Schur complement ``S = B (Z − c_K Q)``, in K.spare; 0, or that S is singular.
 
     Newton's matrix is in K.out; what it is less with c_K = 0 is the part of it that positions make.
     """
@@ -495,7 +495,7 @@ def restore_stages(K: Kernel) -> None:
 
 
 def prepare_stages(K: Kernel, m: int, h: float, t1: float) -> int:
-    """Newton's matrices at the middle stage, factored, with their rows behind the stages; 0, or that one is singular."""
+    """Newton's matrices at the middle stage, factored, their rows behind the stages; 0, or that one is singular."""
     load_stage(K, 1, h, t1)
     matrices(K, m, h)
     o = metric_place(K) + n_stage_numbers(K) + 3 * K.n_v
