@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.integrators.extension import HERMITE, Extension
 from mbd.integrators.stepping import SchemeMemory, start_of, step_of
 from mbd.integrators.system import (
     Point,
@@ -50,9 +51,8 @@ class Integrator(ABC):
 
     any_chart: ClassVar[bool] = False
     """Whether a step moves positions by `System.compose`, in any chart q ⊕ x; False: along q + x only."""
-    between: ClassVar[str] = "hermite"
-    """How a run is read between its rows: 'hermite', 'quintic' where accelerations are as accurate as positions, or
-    'stages' where steps of `RungeKutta853` are taken again, 'stages of order 4' those of `RungeKutta4`."""
+    between: ClassVar[Extension | str] = HERMITE
+    """How states between the rows of a run follow from these: one of `mbd.integrators.extension`, or its name."""
     stabilized: bool = True
     """Whether rows on positions are held at velocity level too."""
     scheme: ClassVar[str | None] = None

@@ -8,6 +8,7 @@ from typing import ClassVar
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.base import CompiledIntegrator, Integrator, System, completed
+from mbd.integrators.extension import OSCULATING, Extension
 from mbd.integrators.family import DEFAULT_TOLERANCE
 
 __all__ = ["RadauIIA"]
@@ -35,7 +36,7 @@ class RadauIIA(CompiledIntegrator):
     """
 
     any_chart: ClassVar[bool] = True
-    between: ClassVar[str] = "quintic"
+    between: ClassVar[Extension | str] = OSCULATING
     scheme: ClassVar[str | None] = "radau"
 
     tolerance: float = DEFAULT_TOLERANCE

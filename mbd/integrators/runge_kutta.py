@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from mbd.integrators.base import CompiledIntegrator, Integrator, System, completed
+from mbd.integrators.extension import STEPS_OF_ORDER_8, Extension
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.kernel.schemes.tableau import Tableau
 
@@ -28,7 +29,7 @@ class ExplicitRungeKutta(CompiledIntegrator):
     """
 
     any_chart: ClassVar[bool] = True
-    between: ClassVar[str] = "stages"
+    between: ClassVar[Extension | str] = STEPS_OF_ORDER_8
     """Between rows its steps are taken again."""
     tableau: ClassVar[Tableau]
     full_order: ClassVar[int]

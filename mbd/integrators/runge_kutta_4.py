@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from mbd.integrators.extension import STEPS_OF_ORDER_4, Extension
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
 from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER
 from mbd.kernel.schemes.tableau import Tableau
@@ -23,7 +24,7 @@ class RungeKutta4(ExplicitRungeKutta):
     It has no parameters: ``mbd.simulate(model, start, mbd.RungeKutta4(), dt=0.005, until=10.0)``.
     """
 
-    between: ClassVar[str] = "stages of order 4"
+    between: ClassVar[Extension | str] = STEPS_OF_ORDER_4
     scheme: ClassVar[str | None] = "runge-kutta-4"
     tableau: ClassVar[Tableau] = FOURTH_ORDER
     full_order: ClassVar[int] = 4

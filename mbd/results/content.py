@@ -8,6 +8,7 @@ from typing import Any
 from mbd.bodies.rigid_body import FORMS
 from mbd.bodies.values import among, printable
 from mbd.equations.held import HELD_BY
+from mbd.integrators.extension import EXTENSIONS, HERMITE
 from mbd.joints.anatomy import ANATOMY
 from mbd.results.archive import Head, Members, Unreadable
 
@@ -181,6 +182,7 @@ def _words(meta: Mapping[str, Any]) -> None:
     _list(stats.get("notes", []), str, "'notes'")
     for name, kind in (("integrator", str), ("between", str), ("contact", str), ("versions", dict)):
         of_kind(settings.get(name, kind()), kind, f"{name!r}")
+    expect(settings.get("between", HERMITE.name) in EXTENSIONS, "'between'")
     for name in ("dt", "tol"):
         of_kind(settings.get(name) or 0.0, int | float, f"{name!r}")
     expect(of_kind(settings.get("store", 1), int, "'store'") >= 1, "'store'")

@@ -15,8 +15,6 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
-from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER
-from mbd.kernel.schemes.tableau import Tableau
 from mbd.results.balance import Balance, Solved, put
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Places
@@ -26,8 +24,6 @@ from mbd.results.stored_states import StoredStates
 
 __all__ = ["Restepping"]
 
-FORMULAS: dict[str, Tableau] = {"stages": EIGHTH_ORDER, "stages of order 4": FOURTH_ORDER}
-"""By how a run is read between its rows (`Integrator.between`); others are led by order 8 (`dense_implicit`)."""
 NEAR_POSE = 0.2
 """Distance of a stage from a singular configuration, over that of the farther row, below which it is not used [-]."""
 
@@ -45,8 +41,8 @@ class Restepping:
 
         Frictions that follow loads would need a search at every stage.
         """
-        settings, equations = states.record.settings, states.equations
-        stepped = settings.get("between") in FORMULAS and settings.get("store") == 1
+        record, equations = states.record, states.equations
+        stepped = record.extension.formula is not None and record.settings.get("store") == 1
         known = equations.compose is None or Charts.of(equations) is not None
         return stepped and known and not equations.frictions
 
@@ -88,7 +84,7 @@ class Restepping:
 
         Where coordinates do not add, the increment x stands in the place of q.
         """
-        formula = FORMULAS.get(self.states.record.settings["between"], EIGHTH_ORDER)
+        formula = self.states.record.extension.formula or EIGHTH_ORDER
         still = begin.q if self.charts is None else np.zeros_like(begin.v)  # the increment of a chart
         base = np.hstack([still, begin.v, begin.z])
         slopes = np.zeros((formula.stages, *base.shape))

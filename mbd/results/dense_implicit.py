@@ -40,8 +40,8 @@ class LedSteps:
     @staticmethod
     def serves(states: StoredStates) -> bool:
         """Whether its steps can be followed: all stored, of q + x, with no dry friction."""
-        settings, equations = states.record.settings, states.equations
-        stepped = settings.get("between") == "quintic" and settings.get("store") == 1
+        record, equations = states.record, states.equations
+        stepped = record.extension.leads_steps and record.settings.get("store") == 1
         return stepped and equations.compose is None and not equations.frictions and equations.n_v > 0
 
     def at(self, rows: Rows, places: Places, found: Rows) -> Rows:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector, read_only
+from mbd.integrators.extension import HERMITE, Extension, extension_of
 from mbd.notebook import table
 
 if TYPE_CHECKING:
@@ -173,6 +175,11 @@ class Record:
     parameter_changes: Sequence[tuple[int, Vector]] = ()
     start: Any = None
     phase: NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int8))
+
+    @cached_property
+    def extension(self) -> Extension:
+        """How states between its rows follow from these."""
+        return extension_of(self.settings.get("between", HERMITE))
 
     def __post_init__(self) -> None:
         count = len(self.time)

@@ -203,4 +203,4 @@ def is_smooth(record: Record, plain: bool) -> bool:
 
     plain : whether q̇ = v, or charts are known in which positions are interpolated
     """
-    return plain and record.settings.get("between", "hermite") != "hermite"
+    return plain and record.extension.uses_accelerations

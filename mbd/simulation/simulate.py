@@ -19,6 +19,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
+from mbd.integrators.extension import extension_of
 from mbd.later import later
 from mbd.notes import called_from_outside, doubt, is_heard, note
 from mbd.progress import run_bar
@@ -292,7 +293,7 @@ def laid_out(
     settings = {
         "model": getattr(model, "name", ""), "integrator": repr(scheme), "dt": dt if tol is None else None,
         "until": until, **options, **adaptive, "tol_of": list(options.get("tol_of", ())),
-        "contact_reason": reason, "between": scheme.between, "backend": mechanism.backend.name,
+        "contact_reason": reason, "between": extension_of(scheme.between).name, "backend": mechanism.backend.name,
         "versions": dict(_versions()),
     }  # fmt: skip
     own = {name: options[name] for name in ("contact", "impact", "locate", "store", "rest_speed")}

@@ -167,7 +167,7 @@ def _spacing(step: Vector) -> float:
 def _middles(run: Trajectory, end: float, accuracy: float) -> Vector:
     """Middles between rows where what a run gives may be less accurate than its rows: the most doubtful ones."""
     columns, record = run._model_columns, run.record
-    polynomials = record.settings.get("between", "hermite") != "hermite" and columns.equations.compose is None
+    polynomials = record.extension.uses_accelerations and columns.equations.compose is None
     if not polynomials or Restepping.serves(columns):
         return np.zeros(0)
     _, places = columns.grid.middles()
@@ -200,7 +200,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     record, sure = columns.record, np.ones(len(places.time), dtype=bool)
     if columns.equations.compose is not None:
         return np.asarray(columns.between(places, forces=False).q), sure
-    if record.settings.get("between", "hermite") == "hermite":
+    if not record.extension.uses_accelerations:
         return quintic(places, record.q, record.v, record.a), sure
     known = (record.q, record.v, record.a)
     q = quintic(places, *known)
