@@ -158,6 +158,7 @@ if TYPE_CHECKING:
     from mbd.laboratory.kinematics_result import InverseKinematics as InverseKinematics
     from mbd.laboratory.models.read_model import read_model as read_model
     from mbd.laboratory.models.report import ImportedModel as ImportedModel, ImportReport as ImportReport
+    from mbd.laboratory.models.write_model import write_model as write_model
     from mbd.laboratory.muscle_forces import MuscleForces as MuscleForces, muscle_forces as muscle_forces
     from mbd.laboratory.read import read as read
     from mbd.laboratory.recording import PlateRecord as PlateRecord, Recording as Recording
@@ -229,6 +230,7 @@ _HOMES = {
     "mbd.laboratory.inverse_kinematics": "inverse_kinematics",
     "mbd.laboratory.kinematics_result": "InverseKinematics",
     "mbd.laboratory.models.read_model": "read_model",
+    "mbd.laboratory.models.write_model": "write_model",
     "mbd.laboratory.muscle_forces": "MuscleForces muscle_forces",
     "mbd.laboratory.models.report": "ImportReport ImportedModel",
     "mbd.laboratory.read": "read",

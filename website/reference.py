@@ -25,7 +25,7 @@ GROUPS = {
     "Mobility criteria Criteria sensitivities Sensitivities fit Fit optimize Optimum",
     "Gaits": "limit_cycle LimitCycle gait_report GaitReport read_band NormativeBand find_gait GaitSearch "
     "branch Branch PointCurve basin Basin",
-    "Laboratory": "read Recording PlateRecord ForcePlate assign_plates scale read_model ImportedModel "
+    "Laboratory": "read Recording PlateRecord ForcePlate assign_plates scale read_model write_model ImportedModel "
     "ImportReport "
     "inverse_kinematics InverseKinematics inverse_dynamics InverseDynamics "
     "muscle_forces MuscleForces",

@@ -66,7 +66,8 @@ def apart(path):
     mujoco.mj_forward(source, data)
     M = np.zeros((source.nv, source.nv))
     mujoco.mj_fullM(source, data, M)
-    M = (M - np.diag(source.dof_armature))[np.ix_(order, order)]
+    several = np.isin(source.jnt_type[source.dof_jntid], (0, 1))  # of these joints armature is left out
+    M = (M - np.diag(np.where(several, source.dof_armature, 0.0)))[np.ix_(order, order)]
     h = data.qfrc_bias[order]
     terms = mechanism.acceleration_terms(0.0, q, v, mechanism.parameters(), np.zeros(equations.n_anchors))
     return np.abs(terms.M - M).max() / np.abs(M).max(), np.abs(terms.f - h).max() / max(1.0, np.abs(h).max())

@@ -18,6 +18,7 @@ from mbd.constraints.measures import extension, flexion
 from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
+from mbd.forces.rotor import Rotor
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
 from mbd.joints.losses import Coulomb, Viscous
@@ -62,6 +63,7 @@ class _Reader:
         self.model = Model(title or "model", gravity=(x, z, -y))
         self.bodies, self.joints, self.held = dict[str, Body](), dict[str, Joint](), list[Constraint]()
         self.of_joint: dict[int, Joint] = {}
+        self.rotors = list[str]()
 
     def read(self) -> ImportedModel:
         """Bodies and joints from the world outwards, then couplings and the report."""
@@ -147,6 +149,11 @@ class _Reader:
                 ]
         self.of_joint[k] = joint
         self._add(joint)
+        armature = float(source.dof_armature[dof])
+        if armature > 0.0 and kind >= SLIDE:
+            rotor = f"{name} rotor"
+            self.model.apply(Rotor(rotor, joint, armature))
+            self.rotors.append(joint.name)
 
     def _add(self, joint: Joint) -> None:
         self.joints[joint.name] = joint
@@ -209,10 +216,13 @@ class _Reader:
         if turned:
             names = ", ".join(map(repr, turned[:6]))
             report.approximated.append(f"coordinates are counted from the posture of the file: {names}")
-        heavy = [j.name for k, j in self.of_joint.items() if source.dof_armature[int(source.jnt_dofadr[k])] > 0.0]
+        if self.rotors:
+            names = ", ".join(map(repr, self.rotors[:6]))
+            report.understood.append(f"armature (inertia of rotors) of {len(self.rotors)} joints: {names}")
+        dofs = {k: int(source.jnt_dofadr[k]) for k in self.of_joint}
+        heavy = [j.name for k, j in self.of_joint.items() if kinds[k] < SLIDE and source.dof_armature[dofs[k]] > 0.0]
         if heavy:
-            names = ", ".join(map(repr, heavy[:6]))
-            report.left_out.append(f"armature (inertia of rotors) of {len(heavy)} joints: {names}")
+            report.left_out.append(f"armature of joints of several coordinates: {', '.join(map(repr, heavy[:6]))}")
         others = sum(int(kind) != EQUAL_JOINTS for kind in source.eq_type)
         rest = {
             "shapes (contacts)": source.ngeom, "actuators": source.nu, "tendons": source.ntendon,

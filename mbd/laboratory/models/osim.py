@@ -11,7 +11,7 @@ from mbd.bodies.marker import Marker
 from mbd.bodies.rigid_body import RigidBody
 from mbd.errors import ModelError
 from mbd.laboratory.models.inertia import possible_inertia
-from mbd.laboratory.models.osim_constraints import Coupler, couplers_of, hold
+from mbd.laboratory.models.osim_constraints import Coupler, couplers_of, hold, loops_closed
 from mbd.laboratory.models.osim_elements import (
     flag_of,
     listed,
@@ -64,6 +64,7 @@ def read_osim(path: Path, stops: bool, repair: bool) -> ImportedModel:
     for joint in joints:
         connect(file, joint)
     hold(file, couplers)
+    loops_closed(file)
     file.model.connect(*file.joints.values())
     file.model.constrain(*file.held)
     markers = _markers(file)
@@ -155,6 +156,8 @@ def _summary(file: OsimFile, joints: list[OsimJoint], couplers: list[Coupler], m
         first.append(f"locked coordinates as rows: {listed(locked)}")
     if clamped and file.stops:
         first.append(f"clamped coordinates with stops: {listed(clamped)}")
+    if file.loops:
+        first.append(f"constraints that close loops, as joints: {listed(each[0] for each in file.loops)}")
     if muscles:
         first.append(f"{muscles} muscles, which act where they are applied: model.apply(*found.muscles.values())")
     if markers:

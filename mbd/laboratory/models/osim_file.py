@@ -38,6 +38,8 @@ class OsimCoordinate:
     """Whether a lock, a coupler or a stop needs it by itself."""
     free: bool = True
     """Whether no coupler determines it."""
+    coupled: Any = None
+    """The coupler that determines it."""
     joint: Joint | None = None
     """The joint of the model whose one coordinate it is."""
 
@@ -115,6 +117,8 @@ class OsimFile:
     posture: dict[str, Any] = field(default_factory=dict)
     dependents: list[tuple[Joint, Motion]] = field(default_factory=list)
     """Joints of motions that are functions of coordinates."""
+    loops: list[tuple[str, Any, Any, Any]] = field(default_factory=list)
+    """Name, kind and the two ends of joints that close loops."""
     carriers: set[str] = field(default_factory=set)
     """Names of bodies without mass."""
 

@@ -30,7 +30,7 @@ from mbd.laboratory.models.osim_file import (
 from mbd.laboratory.models.osim_functions import Linear, function_of
 from mbd.laboratory.models.xml import Element
 
-__all__ = ["connect", "joints_of", "tree_of", "turned"]
+__all__ = ["connect", "end_at", "joints_of", "tree_of", "turned"]
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MOTIONS: dict[str, tuple[tuple[str, tuple[float, float, float]], ...]] = {
@@ -103,22 +103,24 @@ def _old_ends(file: OsimFile, element: Element, child: str) -> Any:
 
 def _new_ends(file: OsimFile, element: Element, joint: str) -> Any:
     """The frames of a joint by its sockets."""
-    own = element.find("frames")
-    frames = {frame.get("name"): frame for frame in own.all("PhysicalOffsetFrame")} if own else {}
-    ends = []
-    for side in ("parent", "child"):
-        socket = text_of(element, f"socket_{side}_frame")
-        *folder, last = socket.split("/")
-        if last in frames and (not folder or folder[-1] in (element.get("name"), ".")):
-            frame = frames[last]
-            place, turn = numbers_of(frame, "translation", 3), numbers_of(frame, "orientation", 3)
-            body = body_of_socket(file, frame, text_of(frame, "socket_parent"))
-            ends.append((body, np.array(place), turned(turn)))
-        else:
-            ends.append((body_of_socket(file, element, socket), np.zeros(3), np.eye(3)))
+    ends = [end_at(file, element, f"socket_{side}_frame") for side in ("parent", "child")]
     if ends[1][0] == "ground":
         raise element.wrong(f"has the ground as the child of {joint!r}; exchange its parent and its child")
     return ends
+
+
+def end_at(file: OsimFile, element: Element, socket_tag: str) -> tuple[str, Vector, Matrix]:
+    """Body, place and rotation of the frame that a socket names: a frame of the element, or of a body."""
+    own = element.find("frames")
+    frames = {frame.get("name"): frame for frame in own.all("PhysicalOffsetFrame")} if own else {}
+    socket = text_of(element, socket_tag)
+    *folder, last = socket.split("/")
+    if last in frames and (not folder or folder[-1] in (element.get("name"), ".")):
+        frame = frames[last]
+        place, turn = numbers_of(frame, "translation", 3), numbers_of(frame, "orientation", 3)
+        body = body_of_socket(file, frame, text_of(frame, "socket_parent"))
+        return body, np.array(place), turned(turn)
+    return body_of_socket(file, element, socket), np.zeros(3), np.eye(3)
 
 
 def _joint_coordinates(file: OsimFile, element: Element) -> list[OsimCoordinate]:
@@ -270,6 +272,8 @@ def _drivers(file: OsimFile, joint: OsimJoint, motions: list[Motion]) -> dict[st
     found: dict[str, OsimCoordinate] = {}
     for coordinate in joint.coordinates:
         driven = [each for each in motions if each.is_driven and each.coordinates == [coordinate]]
+        if not driven and coordinate.coupled:
+            continue  # all motions follow from what determines it, as those of a patella
         if not driven:
             raise joint.element.wrong(
                 f"cannot be stated exactly: none of its motions is the coordinate {coordinate.name!r} itself, by a "

@@ -25,7 +25,7 @@ def read_model(
 
     Files of MuJoCo are compiled by it (``pip install 'mbd[mjcf]'``): bodies, joints, gravity, damping, friction and
     springs. Soft limits become rigid stops, soft equations between joints rigid couplings, and coordinates count from
-    the posture of the file. Contacts, actuators, tendons and the inertia of rotors are left out, and listed.
+    the posture of the file. Armature becomes a `Rotor`. Contacts, actuators and tendons are left out, and listed.
 
     A robot of a ``.urdf`` stands on the ground by its root link; 'base' is the joint between them. Limits become
     `Unilateral` stops 'elbow upper stop', damping and friction `Viscous` and `Coulomb` losses, mimics `Bilateral`
@@ -36,8 +36,8 @@ def read_model(
     'knee_angle_r.angle', with bodies without mass between them; a BallJoint or FreeJoint without locks, stops and
     couplers is one joint. Motions of a CustomJoint that are functions of coordinates, couplers and locks are
     `Bilateral` rows; `posture` of what is returned has the default values. OpenSim does not enforce ranges in forward
-    dynamics, so that they are read with stops=True only. Muscles, other forces and constraints, shapes are left out,
-    and listed.
+    dynamics, so that they are read with stops=True only. Weld and point constraints close loops; muscles are in
+    `muscles` of what is returned. Other forces and constraints, and shapes are left out, and listed.
 
     Parameters
     ----------

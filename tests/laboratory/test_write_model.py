@@ -1,0 +1,144 @@
+"""Models written as URDF and .osim are read back with the same equations of motion, marks and muscles."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+
+import mbd
+
+INERTIA = (0.05, 0.04, 0.03, 0.002, -0.003, 0.001)
+
+
+def machine(ball, seed=0):
+    """Joints of every kind that the formats have, between tilted frames beside the origins of their bodies."""
+    rng = np.random.default_rng(seed)
+    model = mbd.Model("machine", gravity=(0.3, -9.81, 0.2))
+
+    def body(name):
+        return mbd.RigidBody(name, float(rng.uniform(1.0, 3.0)), INERTIA, tuple(rng.normal(scale=0.1, size=3)))
+
+    def place(owner):
+        axis = rng.normal(size=3)
+        return owner.point(*map(float, rng.normal(scale=0.2, size=3))).turned(float(rng.uniform(-3, 3)), tuple(axis))
+
+    trunk, arm, hand, slide, plate, wheel, tool = map(body, ("trunk", "arm", "hand", "slide", "plate", "wheel", "tool"))
+    loss = mbd.Viscous(0.3) + mbd.Coulomb(0.2)
+    knee = mbd.Revolute("knee", place(arm), place(hand), axis=(1.0, 2.0, -2.0), loss=loss)
+    kind, name = (mbd.Spherical, "ball") if ball else (mbd.Cylindrical, "sleeve")
+    model.connect(
+        mbd.Free("root", place(model.ground), place(trunk)),
+        mbd.Universal("hip", place(trunk), place(arm), axis=(0, 1, 0), second_axis=(0, 0, 1)),
+        knee,
+        mbd.Prismatic("rail", place(slide), place(trunk), axis=(0.0, 1.0, 1.0)),  # from the outer body to the inner one
+        mbd.Planar("table", place(slide), place(plate)),
+        mbd.Weld("flange", place(plate), place(tool)),
+        kind(name, place(tool), place(wheel)),
+    )  # fmt: skip
+    model.constrain(
+        mbd.Unilateral("lower", mbd.extension(knee, offset=-0.4)),
+        mbd.Unilateral("upper", mbd.flexion(knee, offset=-1.2)),
+    )
+    mbd.Marker("TIP", hand, (0.1, -0.2, 0.05))
+    points = (trunk.point(0.1, 0.0), arm.point(0.0, 0.1, 0.02), hand.point(0.05, 0.0))
+    model.apply(
+        mbd.Muscle("biceps", points, 600.0, 0.1, 0.2, 0.1, tendon="rigid", activation_time=0.0, deactivation_time=0.0)
+    )
+    model.apply(mbd.Spring("spring", trunk.origin, hand.origin, 10.0, 0.3))
+    return model
+
+
+def frames(model, rename, seed=1):
+    """A random motion in the coordinates of a model, and the same by the names of another."""
+    rng = np.random.default_rng(seed)
+    state = mbd.assemble(model)
+    count = 6
+    given = {}
+    for name in state.names:
+        if ".orientation." in name:
+            continue
+        given[name] = rng.normal(scale=0.3, size=count)
+    for name in {n.rpartition(".")[0] for n in state.names if ".orientation." in n}:
+        q = rng.normal(size=(count, 4)) * 0.1 + [1.0, 0.0, 0.0, 0.0]
+        given[name] = q / np.linalg.norm(q, axis=1, keepdims=True)
+    rates = {name.removesuffix(".rate"): rng.normal(size=count) for name in state.velocity_names}
+    time = np.arange(count) * 1.0
+    return {"time": time} | {rename(name): value for name, value in given.items()}, rates
+
+
+def balance(model, motion):
+    found = mbd.inverse_dynamics(model, motion)
+    whole = found.effort + found._residual
+    return dict(zip(found.run.record.equations.velocity_names, whole.T, strict=True))
+
+
+def urdf_name(name):
+    """Of a coordinate as the file has it."""
+    owner, _, label = name.rpartition(".")
+    if owner in ("hip", "table", "sleeve"):
+        unit = "displacement" if label in ("x", "y", "displacement") else "angle"
+        return f"{owner} {label}.{unit}"
+    return name
+
+
+def osim_name(name):
+    owner, _, label = name.rpartition(".")
+    if owner in ("hip", "table", "sleeve"):
+        unit = "displacement" if label in ("x", "y", "displacement") else "angle"
+        return f"{owner}_{label}.{unit}"
+    return name
+
+
+@pytest.mark.parametrize(("suffix", "rename"), [(".urdf", urdf_name), (".osim", osim_name)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_model_comes_back_with_the_same_equations_of_motion(suffix, rename, seed, tmp_path):
+    model = machine(ball=suffix == ".osim", seed=seed)
+    path = tmp_path / f"machine{suffix}"
+    report = mbd.write_model(model, path)
+    read = mbd.read_model(path, **({"stops": False} if suffix == ".osim" else {}))
+    bare = model.without("spring", "biceps", *(["knee loss"] if suffix == ".osim" else []))
+    motion, _ = frames(bare, lambda name: name)
+    again = {rename(name) if name != "time" else name: value for name, value in motion.items()}
+    gravity = {} if suffix == ".osim" else {"gravity": model.gravity}
+    other = read.model if not gravity else _with_gravity(read.model, model.gravity)
+    first, second = balance(bare, motion), balance(other, again)
+    size = max(np.abs(values).max() for values in first.values())
+    assert len(first) == len(second)
+    for name, values in first.items():
+        stem = rename(name.removesuffix(".rate")) + ".rate" if name.endswith(".rate") else name
+        np.testing.assert_allclose(second[stem], values, atol=1e-10 * size, err_msg=name)
+    assert "Spring 'spring'" in str(report)
+    if suffix == ".osim":
+        place = mbd.assemble(read.model)["TIP"]
+        np.testing.assert_allclose(place, mbd.assemble(model)["TIP"], atol=1e-13)
+        np.testing.assert_allclose(read.muscles["biceps"].fiber_length, 0.1)
+        assert read.muscles["biceps"].tendon == "rigid"
+    else:
+        stops = {word.name: word for word in read.model.constraints}
+        assert stops["knee lower stop"].measure.offset == -0.4 and stops["knee upper stop"].measure.offset == -1.2
+
+
+def _with_gravity(model, gravity):
+    """The format has no gravity."""
+    other = copy.copy(model)
+    other.gravity = gravity
+    return other
+
+
+def test_what_a_format_lacks_is_named(tmp_path):
+    with pytest.raises(mbd.ModelError, match="URDF has no Spherical"):
+        mbd.write_model(machine(ball=True), tmp_path / "m.urdf")
+    with pytest.raises(mbd.ModelError, match=r"\.urdf or \.osim"):
+        mbd.write_model(machine(ball=True), tmp_path / "m.xml")
+    body, model = mbd.RigidBody("nut", 1.0, INERTIA), mbd.Model("screw")
+    model.connect(mbd.Screw("screw", model.ground.origin, body.origin, 0.1))
+    for suffix in (".urdf", ".osim"):
+        with pytest.raises(mbd.ModelError, match="no Screw"):
+            mbd.write_model(model, tmp_path / f"m{suffix}")
+    alike = mbd.Model("alike")
+    a, b = mbd.RigidBody("left foot", 1.0, INERTIA), mbd.RigidBody("left_foot", 1.0, INERTIA)
+    alike.connect(mbd.Revolute("one", alike.ground.origin, a.origin), mbd.Revolute("two", a.origin, b.origin))
+    with pytest.raises(mbd.ModelError, match="alike without blanks"):
+        mbd.write_model(alike, tmp_path / "m.osim")
