@@ -14,46 +14,52 @@ SCHEMES = (
     mbd.HHT(0.05, start="consistent"),
     mbd.HHT(0.3),
     mbd.GeneralizedAlpha(0.9),
-    mbd.GeneralizedAlpha(0.0),
-    mbd.Newmark(),
     mbd.HHT(0.05, formulation="index3"),
     mbd.RadauIIA(),
     mbd.RungeKutta853(),
 )
-DT = 0.0107
-"""Step [s]: knots of the table, less than two steps apart, do not end steps."""
+EARLIEST = 0.12
+"""When the block sticks at the latest [s]: a table may begin too fast for it."""
 
 
-def shaken(seed, spatial, falls):
-    """A table shaken ever harder, whose acceleration changes within a step; that acceleration and the limit [m/s²]."""
+def swung(seed):
+    """A block on a table that a spline leads to a sudden halt; its acceleration there jumps to and fro, knot by knot.
+
+    Returns the model, the acceleration of the table over time, the largest one at which the block sticks [m/s²], and
+    when the spline ends [s].
+    """
     rng = np.random.default_rng(seed)
     model = mbd.Model("table")
     table, block = mbd.PointMass("table", 3.0), mbd.PointMass("block", rng.uniform(0.5, 2.0))
     rail = mbd.Prismatic("rail", model.ground.origin, table.origin, axis=(1.0, 0.0, 0.0))
-    flight = mbd.Translation("flight", model.ground.origin, block.origin, axes="xyz" if spatial else "xy")
+    flight = mbd.Translation("flight", model.ground.origin, block.origin, axes="xyz" if seed % 2 else "xy")
     model.connect(rail, flight)
-    t = 0.02 * np.arange(31)
-    rough = rng.uniform(-1.0, 1.0, len(t)) * np.exp(8.0 * t) * 2e-5
-    samples = mbd.Samples(t, rough, kind="spline", ends="clamped")
-    acceleration = CubicSpline(t, rough, bc_type="clamped").derivative(2)
-    model.constrain(mbd.Bilateral("drive", rail, value=samples))
-    mu = rng.uniform(0.15, 0.4)
-    law = mbd.Stribeck(mu, 0.7 * mu, 0.1) if falls else mu
+    t = 0.02 * np.arange(rng.integers(40, 46))  # so many knots that steps do not end at them
+    w = rng.uniform(4.0, 8.0)
+    values = rng.uniform(0.05, 0.15) * np.sin(w * t)
+    acceleration = CubicSpline(t, values, bc_type="clamped").derivative(2)
+    model.constrain(mbd.Bilateral("drive", rail, value=mbd.Samples(t, values, kind="spline", ends="clamped")))
+    at_knots = np.abs(acceleration(t))
+    limit = rng.uniform(1.2 * np.max(at_knots[6:-7]), 0.9 * np.max(at_knots[6:]))
+    mu = limit / 9.81
+    law = mu if seed % 4 < 2 else mbd.Stribeck(mu, 0.85 * mu, 0.09)
     touch = mbd.touchdown(block.origin, mbd.Plane((0.0, 1.0, 0.0), 0.0, frame=table.origin))
     model.constrain(mbd.Unilateral("foot", touch, friction=law))
-    return model, acceleration, mu * 9.81
+    return model, acceleration, limit, t[-1]
 
 
-@pytest.mark.parametrize("seed", [2, 3, 7, 10, 15, 18])
-@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
-def test_a_block_slips_where_its_limit_is_reached(scheme, seed):
-    model, acceleration, limit = shaken(seed, seed % 2 == 1, seed > 3)
-    fine = np.linspace(0.0, 0.58, 29001)
+@pytest.mark.parametrize("seed", [0, 3, 27, 28])
+def test_a_block_slips_where_its_limit_is_reached(seed):
+    """Multipliers of steps that are long for the table lag: in a row just after the onset they are too small."""
+    model, acceleration, limit, end = swung(seed)
+    fine = np.linspace(EARLIEST, end, 20001)
     k = int(np.flatnonzero(np.abs(acceleration(fine)) > limit)[0])
     onset = brentq(lambda t: abs(acceleration(t)) - limit, fine[k - 1], fine[k], xtol=1e-14)
-    row = DT * np.ceil(onset / DT)
-    assert abs(acceleration(row)) > limit  # what is over within a step may be seen at neither of its ends
-    run = mbd.simulate(model, mbd.assemble(model, {}, project=True), scheme, dt=DT, until=row + DT)
-    slips = [event.time for event in run.events if event.kind == "slipped"]
-    assert slips
-    assert abs(slips[0] - onset) <= 1e-9
+    dt = (onset + seed % 3 * 1.5e-4 + 1e-4) / int(onset / 0.0104)
+    assert abs(acceleration(dt * np.ceil(onset / dt))) > limit
+    start = mbd.assemble(model, {}, project=True)
+    for scheme in SCHEMES:
+        run = mbd.simulate(model, start, scheme, dt=dt, until=end)
+        slips = [event.time for event in run.events if event.kind == "slipped" and event.time > EARLIEST]
+        assert slips, scheme
+        assert abs(slips[0] - onset) <= 1e-9, scheme

@@ -207,7 +207,7 @@ def judge(K: Switching, h: float) -> bool:
             if K.armed[c] != 1 or not is_watched(K, c, K.guards0):
                 continue
             if g1 < -tiny:
-                if min(d0, d1) >= -tiny and rises(g0, g1 + tiny, d1, LOST * gap_scale(K, c), d1 * K.dt / h):
+                if min(d0, d1) >= -tiny and rises(g0, g1 + tiny, d0, d1, LOST * gap_scale(K, c), d1 * K.dt / h):
                     continue
                 slow = d0 >= -tiny and g0 - g1 > tiny  # what comes before it is looked at first
                 if g0 > tiny:
@@ -247,14 +247,15 @@ def judge(K: Switching, h: float) -> bool:
     return bool(K.event_kind >= 0)
 
 
-def rises(g0: float, g1: float, d1: float, lost: float, reach: float) -> bool:
+def rises(g0: float, g1: float, d0: float, d1: float, lost: float, reach: float) -> bool:
     """Whether a gap whose rate is none or positive at both ends of a step is below zero by an error of the step alone.
 
     By what Newton's method leaves open, `lost`; or where it was at rest on its surface, by less than it rises in a
     step: as a force passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs by. From
-    there it comes up again, by `reach` in a step of dt; what is farther below has jumped there.
+    there it comes up again, by `reach` in a step of dt; what is farther below has jumped there. What left the surface
+    with a speed and is below it at the end has come down in between.
     """
-    return g1 >= -lost or (abs(g0) <= lost and g0 - g1 <= d1) or (g0 <= g1 and -reach <= g0 < 0.0)
+    return g1 >= -lost or (abs(g0) <= lost and d0 <= lost and g0 - g1 <= d1) or (g0 <= g1 and -reach <= g0 < 0.0)
 
 
 def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:
