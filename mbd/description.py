@@ -211,7 +211,7 @@ class Description:
     @property
     def machines(self) -> list[Machine]:
         """Modes and sampled laws."""
-        return [word for word in self.constraints if isinstance(word, Machine)]
+        return [cast(Machine, word) for word in self.constraints if word.kind == "machine"]
 
     @property
     def parameters(self) -> dict[str, float]:

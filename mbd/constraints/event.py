@@ -2,46 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from mbd.bodies.domains import Domain
 from mbd.bodies.promises import function_of
 from mbd.bodies.values import among, flag, name_of, names_of
-from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression, plain
+from mbd.constraints.machine import Change, Machine
 from mbd.constraints.measure import Measure
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
+from mbd.scope import Scope
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["Event"]
 
 
 @dataclass(frozen=True)
-class Event(Constraint):
-    """Something that happens as a measure crosses zero.
+class Event(Machine):
+    """Something that happens as a measure crosses zero, or with something else.
 
     Parameters
     ----------
     name : its name, under which it stands in the run
-    guard : the measure
+    guard : the measure; None: it happens `on` something
     reset : named values to set, {'hip.rate': 0.0}, or a function that makes them from named values; None for no change.
         A value may be a function of named values, or a sympy expression: ``{theta.q: -theta.q, phi.v: 0}``
     terminal : whether the run ends there
     direction : −1 as the guard falls through zero, +1 as it rises, 0 both
+    on : name of what it happens with, in the place of a guard: a contact that closes ('left foot'), after its impact,
+        or opens ('left foot opened'), another event, a mode that changes or enters a state ('gait: swing')
     """
 
     name: str
-    guard: Measure
+    guard: Measure | None = None
     reset: Any = field(default=None, hash=False)
     terminal: bool = False
     direction: int = 0
+    on: str | None = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Event")
-        object.__setattr__(self, "guard", measure_of(self.guard, f"Event '{self.name}'"))
+        if (self.guard is None) == (self.on is None):
+            raise ModelError(f"Event '{self.name}' takes one cause, a guard or on=, such as on='left foot'")
+        if self.on is not None and (not isinstance(self.on, str) or not self.on or self.on == self.name):
+            raise ModelError(f"on of Event '{self.name}' is the name of something else that happens, got {self.on!r}")
+        if self.on is not None and self.direction:
+            raise ModelError(f"direction of Event '{self.name}' is that of a guard; leave it out beside on=")
+        if self.guard is not None:
+            object.__setattr__(self, "guard", measure_of(self.guard, f"Event '{self.name}'"))
         if not (self.reset is None or isinstance(self.reset, Mapping) or callable(self.reset)):
             raise ModelError(f"reset of Event '{self.name}' maps names to values, got {self.reset!r}")
         if isinstance(self.reset, Mapping):
@@ -57,26 +69,59 @@ class Event(Constraint):
 
     @property
     def kind(self) -> str:
-        """'event'."""
-        return "event"
+        """'event'; 'machine' of one that happens with something else, a machine of one state."""
+        return "event" if self.on is None else "machine"
 
     @property
     def details(self) -> str:
-        """Nothing more."""
-        return ""
+        """What it happens with."""
+        return "" if self.on is None else f", with {self.on!r}"
 
     def mentions(self) -> list[Mention]:
         """What its guard depends on, and the names that it resets."""
-        return [*self.guard.mentions(), *(self.reset if isinstance(self.reset, Mapping) else ())]
+        guard = [] if self.guard is None else self.guard.mentions()
+        return [*guard, *(self.reset if isinstance(self.reset, Mapping) else ())]
 
     def parameters(self) -> dict[str, float]:
         """Those of its guard."""
-        return self.guard.parameters()
+        return {} if self.guard is None else self.guard.parameters()
 
     def domains(self) -> dict[str, Domain]:
         """Those of its guard."""
-        return self.guard.domains()
+        return {} if self.guard is None else self.guard.domains()
 
     def faults(self) -> list[str]:
         """Those of its guard."""
-        return self.guard.faults(self.name)
+        return [] if self.guard is None else self.guard.faults(self.name)
+
+    # the promise of machines, for one that happens with something else ---------------------------------------------
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """One."""
+        return ("waiting",)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Its state."""
+        return ("index",)
+
+    def initial(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        """It waits."""
+        return (0.0,)
+
+    @property
+    def quantity_names(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    def quantities(self, scope: Scope, held: Sequence[Node]) -> Mapping[str, Scalar]:
+        """None."""
+        return {}
+
+    def changes(self, scope: Scope, held: Sequence[Node]) -> Sequence[Change]:
+        """It happens, and waits again."""
+        return [Change(self.name, 0, 0, on=str(self.on), reset=self.reset, terminal=self.terminal)]
+
+    def first_values(self, scope: Scope, held: Sequence[Node]) -> Mapping[int, Scalar]:
+        """Nothing."""
+        return {}

@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from mbd.constraints.base import Constraint
 from mbd.scope import Scope
@@ -35,6 +36,7 @@ class Change:
     contact : name of a contact that must be closed for it to happen; '' for none
     condition : what must be positive for it to happen
     stored : by the number of the field, what the machine holds from then on
+    reset, terminal : of its event, as of `mbd.Event`
     """
 
     name: str
@@ -46,6 +48,8 @@ class Change:
     contact: str = ""
     condition: Scalar | None = None
     stored: Mapping[int, Scalar] = field(default_factory=dict)
+    reset: Any = None
+    terminal: bool = False
 
 
 class Machine(Constraint):

@@ -267,6 +267,7 @@ def _undefined(word: Constraint) -> str:
 
 def _guard(scope: DerivationScope, event: Event) -> Guard:
     """A user's event; its measure may depend on velocities."""
+    assert event.guard is not None
     value = gap_of(event.guard, scope)
     return Guard(event.name, scope.real(value), scope.change(value), event.direction, event.terminal, event.reset)
 

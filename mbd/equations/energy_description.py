@@ -175,7 +175,7 @@ class EnergyDescription:
     @property
     def machines(self) -> list[Machine]:
         """Modes and sampled laws."""
-        return [word for word in self.words if isinstance(word, Machine)]
+        return [cast(Machine, word) for word in self.words if word.kind == "machine"]
 
     @property
     def events(self) -> list[Event]:

@@ -103,7 +103,7 @@ def machine_guards(
             index = held[other][0]
             condition = scope.tape.lift(0.5 - abs(index - float(state)))
         guards.append(Guard(
-            change.name, value, rate, change.direction,
+            change.name, value, rate, change.direction, change.terminal, change.reset,
             transition=Transition(
                 m, change.source, change.target, causes.of(change, len(events) + number), contact, condition,
                 tuple(places),

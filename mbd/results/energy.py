@@ -308,7 +308,11 @@ def _resets(equations: Equations, record: Any, rows: int) -> Any:
         moved = {m for m, machine in enumerate(equations.machines) if held & set(machine.anchors)}
         taken = ((guard.name, guard.transition) for guard in equations.guards)
         setting |= {name for name, each in taken if each is not None and each.machine in moved}
-    places = [event.row for event in record.events if event.kind == "event" and event.name in setting]
+    late = {guard.name for guard in equations.guards if guard.reset is not None and guard.transition is not None}
+    places = [
+        event.row + (event.name in late) for event in record.events if event.kind == "event" and event.name in setting
+    ]
+    places = [row for row in places if row < rows]  # a run may end with the event
     places += [row for row, _ in record.parameter_changes if row < rows]
     found[places] = True
     return found

@@ -208,6 +208,9 @@ class Walk:
     def _after(self, before: Motion, mode: Mode, fired: Trigger, row: int, rates: Rates) -> Motion:
         """The state after an event: impact, what contacts hold from now on."""
         equations, events = self.programs.equations, self.rows.events[row]
+        sets = {guard.name for guard in equations.guards if guard.transition is not None and guard.reset is not None}
+        if late := [event.name for event in events if event.kind == "event" and event.name in sets]:
+            raise unknown(f"{late[0]!r} sets values beside what it happens with, at t = {before.t:.9g} s")
         later = self.rows.mode(row)
         fresh = [c for c in range(len(equations.contacts)) if later.closed[c] and not mode.closed[c]]
         rigid = [c for c in fresh if equations.contacts[c].kind != "penalty"]

@@ -251,5 +251,7 @@ class Run(RunData):
         return ended
 
     def reset(self, guard: Guard) -> None:
-        """What a user's event sets."""
+        """What a user's event sets; after a row of its own where the row of that with which it happens is stored."""
         apply_reset(self, guard)
+        if guard.transition is not None:
+            self.kernel.restart_due = 1
