@@ -138,7 +138,11 @@ class Facts:
             equations.shapes,
             equations.anatomy,
             tuple(equations.mirror().items()) if equations.mirror is not None else (),
-            tuple((each.name, each.states) for each in equations.machines if len(each.states) > 1),
+            tuple(
+                (each.name, each.states)
+                for each in equations.machines
+                if len(each.states) > 1 and each.name in equations.output_names()  # a sampled law only waits
+            ),
         )
 
     @classmethod

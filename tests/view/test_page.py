@@ -257,3 +257,14 @@ def test_the_page_plays_in_a_browser_without_a_network(tmp_path):
         assert tab.inner_text("#clock") == "2.000 s" and "trunk.x" in tab.inner_text("#legend")
         browser.close()
     assert complaints == [] and len(requests) == 1
+
+
+def test_a_sampled_law_with_a_delay_is_no_mode_of_the_page(tmp_path):
+    model = mbd.Model("sampled")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
+    model.connect(pin := mbd.Revolute("pin", model.ground.origin, rod.start))
+    model.apply(mbd.Motor("drive", pin, torque=0.0))
+    model.apply(mbd.SampledLaw("law", 0.02, {"drive.torque": lambda q: -q}, arguments=("pin.angle",), delay=0.005))
+    run = mbd.simulate(model, mbd.assemble(model, position={"pin.angle": 0.5}), dt=1e-2, until=0.1)
+    assert run.facts.modes == ()
+    assert run.page(tmp_path / "page.html").is_file()
