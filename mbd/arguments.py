@@ -58,7 +58,7 @@ def _sentence(
     faults = [f"{name} has no argument {wrong!r}{_meant(wrong, known)}" for wrong in unknown]
     faults += [f"{name} got {each!r} twice" for each in placed if each in named]
     needed = [
-        repr(each.name)
+        f"{each.name!r}{SENSE.get(each.name, '')}"
         for each in known.values()
         if each.default is each.empty and each.name not in named and each.name not in placed
     ]
@@ -67,10 +67,26 @@ def _sentence(
     if needed and not faults:
         faults.append(f"{name} needs {', '.join(needed)}")
     shown = [_shown(each) for each in parameters]
-    if first := [k for k, each in enumerate(parameters) if each.kind is each.KEYWORD_ONLY][:1]:
-        shown.insert(first[0], "*")
+    first = next((k for k, each in enumerate(parameters) if each.kind is each.KEYWORD_ONLY), len(parameters))
+    if len(parameters) > MAX_SHOWN:  # those that may be given by place, and what has no default
+        required = [k for k in range(first, len(parameters)) if parameters[k].default is inspect.Parameter.empty]
+        kept = [shown[k] for k in (*range(first), *required)]
+        shown = [*kept[:first], "*", *kept[first:], "…"] if first < len(parameters) else kept
+    elif first < len(parameters):
+        shown.insert(first, "*")
     listed = ", ".join(shown)
-    return f"{'; '.join(faults) or own_words}; it takes {name}({listed})"
+    more = f"; help(mbd.{name}) tells all" if len(parameters) > MAX_SHOWN else ""
+    return f"{'; '.join(faults) or own_words}; it takes {name}({listed}){more}"
+
+
+MAX_SHOWN = 12
+"""Arguments of a function that are all shown."""
+
+SENSE = {
+    "until": ", the end time [s] or the name of an event",
+    "start": ", a state such as mbd.assemble(model, position={…}) gives",
+}
+"""What an argument that is missing stands for."""
 
 
 MEANT = {
@@ -83,6 +99,7 @@ MEANT = {
     "position": ("q", "q0", "positions", "coordinates"),
     "velocity": ("v", "qd", "v0", "velocities", "rates"),
     "torque": ("moment", "tau"),
+    "loss": ("damping", "friction", "damper", "c", "viscosity"),
     "damping": ("c", "damper"), "stiffness": ("k",), "mass": ("m",),
 }  # fmt: skip
 """Words of other programs for an argument."""

@@ -11,7 +11,7 @@ from typing import Any, Self, TypeVar, cast
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.promises import promise_faults
-from mbd.bodies.values import Vector3, names_of, number, printable, triple
+from mbd.bodies.values import Vector3, is_number, names_of, number, printable, triple
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
@@ -181,6 +181,10 @@ class Description:
 
     @gravity.setter
     def gravity(self, value: Any) -> None:
+        if is_number(value):
+            raise ModelError(
+                f"gravity of '{self.name}' is a vector [m/s²], such as (0.0, {-abs(value):g}, 0.0), got {value:g}"
+            )
         self._gravity = triple(value, f"gravity of '{self.name}'")
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.domains import ParameterCheck
 from mbd.description import Description
@@ -13,6 +13,17 @@ if TYPE_CHECKING:
     from mbd.equations.cost import Cost
 
 __all__ = ["Model"]
+
+
+INSTEAD = {
+    "; model.without() is a copy": ("copy", "clone", "deepcopy"),
+    "; mbd.simulate(model, mbd.assemble(model, position={…}), until=1.0) makes a run": ("simulate", "run", "solve"),
+    "; mbd.assemble(model, position={…}) makes a start": ("assemble", "initialize", "start"),
+    "; joints go to model.connect, contacts and constraints to constrain, forces to apply": (
+        "add", "add_joint", "add_body", "add_link", "add_force", "add_constraint", "add_contact", "append",
+    ),
+}  # fmt: skip
+"""What to write in the place of attributes that models of other programs have."""
 
 
 class Model(Description):
@@ -38,6 +49,13 @@ class Model(Description):
     >>> model.check()
     []
     """
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Asked for what is no attribute: what other programs call so."""
+            hint = next((text for text, others in INSTEAD.items() if name in others), "")
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 
     def check(self) -> list[str]:
         """Every fault of the description, one sentence each; empty where there is none.

@@ -67,6 +67,15 @@ class Trajectory:
             raise TrajectoryError("this run has neither equations nor stored columns")
         return ModelColumns(self.record, self.record.equations)
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Asked for what is no attribute: results go by their names."""
+            known = () if name.startswith("_") or "record" not in self.__dict__ else self.columns.names
+            near = next((each for each in known if each.startswith(f"{name}.") or each.split()[0] == name), None)
+            hint = "" if near is None else f"; results are asked for by name, such as run[{near!r}]"
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
+
     # values -----------------------------------------------------------------------------------------------------
     @property
     def time(self) -> Vector:
@@ -246,7 +255,7 @@ class Trajectory:
         - came to rest: over the last 5 % of the time the kinetic energy was below 10⁻⁶ of its largest of the run.
         - fell: of a mechanism with contacts at places of its bodies, and no other point that stays where it is, the
           height (of the highest point of the figure over the lowest, along gravity) is at the end below half of that
-          at the start.
+          at the start; or a contact that is ignored is further below its surface than a quarter of it.
         - walks: it did not fall, it has three steps at least (`mbd.analysis.gait`: touchdowns of one foot after the
           other), and its last touchdown is at least half as far from the first as the way from one to the next.
         - in motion: none of these.

@@ -416,3 +416,24 @@ def test_a_period_that_was_meant_as_a_frequency_is_doubted(kind):
         model.apply(mbd.SampledLaw("PD", 100, {"drive.torque": lambda q: -q}, arguments=("pin.angle",)))
     with pytest.warns(mbd.MbdWarning, match="'PD' samples once in 100 s; .* 100 Hz is period=0.01"):
         mbd.assemble(model)
+
+
+@pytest.mark.parametrize(
+    ("made", "kind", "said"),
+    [
+        (lambda m, s, r: mbd.simulate(m, s), TypeError, r"needs .until., the end time .*simulate\(model, .*until, …\)"),
+        (lambda m, s, r: mbd.simulate(m, until=1.0), TypeError, r"needs 'start', a state such as mbd.assemble"),
+        (lambda m, s, r: mbd.Revolute("a", m.ground.origin, None, damping=0.3), TypeError, "did you mean 'loss'"),
+        (lambda m, s, r: r.pin, AttributeError, r"such as run\['pin.angle'\]"),
+        (lambda m, s, r: m.copy(), AttributeError, r"model.without\(\) is a copy"),
+        (lambda m, s, r: m.add_joint(1), AttributeError, "model.connect"),
+        (lambda m, s, r: mbd.Model("x", gravity=9.81), mbd.ModelError, r"vector \[m/s²\], such as \(0.0, -9.81, 0.0\)"),
+        (lambda m, s, r: mbd.cone(m.joints[0], 50), mbd.ModelError, "50° is 0.873 rad"),
+    ],
+)  # fmt: skip
+def test_what_other_programs_call_otherwise_is_explained(made, kind, said):
+    model, _ = pendulum()
+    start = mbd.assemble(model, position={"pin.angle": 0.1})
+    run = mbd.simulate(model, start, dt=1e-2, until=0.1)
+    with pytest.raises(kind, match=said):
+        made(model, start, run)

@@ -28,6 +28,9 @@ STRETCH = 0.05
 FALLEN = 0.5
 """Height over that of the start below which a mechanism has fallen [-]."""
 
+SUNK = 0.25
+"""Depth of an ignored contact below its surface, over the height at the start, at which a mechanism has fallen [-]."""
+
 STEPS, PROGRESS = 3, 0.5
 """Steps that make a walk at least; distance of the last touchdown from the first over the way from each to the next."""
 
@@ -97,6 +100,18 @@ def _rest(run: Trajectory) -> str:
     )
 
 
+def _sunk(run: Trajectory, height: float) -> str:
+    """Of a contact that is ignored (`only_while`, a release): that its place is far below its surface."""
+    for contact in run.facts.contacts:
+        name = f"{contact.name}.gap"
+        if contact.place and contact.unit == "m" and name in run:
+            below = np.flatnonzero(run[name] < -SUNK * height)
+            if len(below):
+                depth = -float(np.min(run[name]))
+                return f"fell at {run.time[below[0]]:.3g} s: '{contact.name}' gets {depth:.3g} m below its surface"
+    return ""
+
+
 def _fall(run: Trajectory) -> str:
     """Of what stands on contacts with places and hangs on nothing: that it is less than half as high as at first."""
     places = {contact.place for contact in run.facts.contacts if contact.place}
@@ -114,6 +129,8 @@ def _fall(run: Trajectory) -> str:
         return ""
     height = whole @ (-gravity / size)
     reach = np.ptp(height, axis=0)
+    if sunk := _sunk(run, float(reach[0])):
+        return sunk
     if not reach[0] > 0.0 or reach[-1] >= FALLEN * reach[0]:
         return ""
     top = points[int(np.argmax(height[:, 0]))]

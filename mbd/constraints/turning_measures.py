@@ -94,7 +94,9 @@ def cone(joint: Joint, limit: float, axis: Any = (0.0, 1.0, 0.0), direction: Any
     """
     found = _angle(joint, limit, "cone")
     if not 0.0 < found < math.pi:
-        raise ModelError(f"limit of the cone of '{joint.name}' must be above 0 and below π rad, got {found:g}")
+        raise ModelError(
+            f"limit of the cone of '{joint.name}' must be above 0 and below π rad, got {found:g}{_as_degrees(found)}"
+        )
     own = unit_vector(axis, f"axis of the cone of '{joint.name}'")
     middle = own if direction is None else unit_vector(direction, f"direction of the cone of '{joint.name}'")
     return Cone(joint, found, own, middle)
@@ -115,8 +117,16 @@ def twist(joint: Joint, limit: float, axis: Any = (0.0, 1.0, 0.0)) -> Twist:
     """
     found = _angle(joint, limit, "twist")
     if not 0.0 < abs(found) < math.pi:
-        raise ModelError(f"limit of the twist of '{joint.name}' must lie within ±π rad and not be 0, got {found:g}")
+        raise ModelError(
+            f"limit of the twist of '{joint.name}' must lie within ±π rad and not be 0, got {found:g}"
+            f"{_as_degrees(found)}"
+        )
     return Twist(joint, found, unit_vector(axis, f"axis of the twist of '{joint.name}'"))
+
+
+def _as_degrees(limit: float) -> str:
+    """What a limit beyond π is in radians if it was meant in degrees."""
+    return f"; {limit:g}° is {math.radians(limit):.3g} rad" if math.pi < abs(limit) <= 180.0 else ""
 
 
 def _angle(joint: Any, limit: Any, what: str) -> float:

@@ -36,8 +36,8 @@ MOST_TRIES = 1_000_000
 
 CURES = {
     "scuffs": (
-        "a swing foot touches the ground as it passes; let it pass with only_while= of its contact (the legs and feet "
-        "of mbd.parts take it), bend the knee, or shorten the leg in swing"
+        "a swing foot touches the ground as it passes; let it pass with only_while= of its contact (feet of mbd.parts "
+        "take it), bend the knee, or shorten the leg in swing"
     ),
     "falls": "start nearer to a walk: take narrower ranges, a smaller slope, or legs that swing faster",
     "misses": "the section is not reached; name the contact or event that ends each step, or give a larger longest=",

@@ -14,7 +14,8 @@ __all__ = ["arc_foot"]
 
 
 def arc_foot(
-    model: Description, name: str, center: Frame, radius: float, *, release: Any = None, friction: float | None = None,
+    model: Description, name: str, center: Frame, radius: float, *, release: Any = None,
+    only_while: Any = None, friction: float | None = None,
     ground: Any = None,
 ) -> Unilateral:  # fmt: skip
     """A round foot that strikes without bouncing and rolls: ``g = y_C − r``, ``v_C + r φ̇ = 0`` at the touching point.
@@ -27,7 +28,7 @@ def arc_foot(
     model, name : the model, and the name of the contact
     center : of the arc, a frame of the shank or foot
     radius : r > 0 [m]; the run-time parameter '<center>.radius'
-    release, friction, ground : as of `point_foot`; the ground is a plane
+    release, only_while, friction, ground : as of `point_foot`; the ground is a plane
 
     >>> import mbd
     >>> model, leg = mbd.Model("leg"), mbd.Link("leg", mass=3.0, length=1.0, center=0.5)
@@ -37,6 +38,12 @@ def arc_foot(
     ([], 0.3)
     """  # fmt: skip
     check(model, name, "arc_foot")
-    foot = Unilateral(name, rolling_touchdown(center, radius, ground), friction=friction, release=released(release))
+    foot = Unilateral(
+        name,
+        rolling_touchdown(center, radius, ground),
+        friction=friction,
+        release=released(release),
+        only_while=only_while,
+    )
     model.constrain(foot)
     return foot

@@ -17,6 +17,7 @@ __all__ = ["capsule_foot"]
 
 def capsule_foot(
     model: Description, name: str, first: Frame, second: Frame, radius: float, *, release: Any = None,
+    only_while: Any = None,
     friction: float | Loss | None = None, spin_friction: float = 0.0, restitution: float = 0.0, ground: Any = None,
 ) -> tuple[Unilateral, Unilateral]:  # fmt: skip
     """A capsule over a plane: ``0 ≤ g ⟂ p ≥ 0`` of the ball at either end, g = n · s − r.
@@ -30,7 +31,7 @@ def capsule_foot(
     model, name : the model, and the name that both contacts begin with
     first, second : the middles of the ends, points of one body
     radius : r > 0; the run-time parameters '<point>.radius' [m]
-    release : as of `point_foot`, of both
+    release, only_while : as of `point_foot`, of both
     friction, spin_friction, restitution : as of `Unilateral`; None: it rolls
     ground : None for y = 0, or a `Plane`, which may lie on another body, or run
 
@@ -53,6 +54,7 @@ def capsule_foot(
     one, two = (
         Unilateral(
             f"{name} end {k}", sphere_touchdown(end, size, ground), friction=friction, release=released(release),
+            only_while=only_while,
             spin_friction=spin_friction, restitution=restitution,
         )
         for k, end in enumerate(ends, start=1)

@@ -14,7 +14,8 @@ __all__ = ["heel_and_toe"]
 
 
 def heel_and_toe(
-    model: Description, name: str, heel: Frame, toe: Frame, *, release: Any = None, friction: float | None = None,
+    model: Description, name: str, heel: Frame, toe: Frame, *, release: Any = None,
+    only_while: Any = None, friction: float | None = None,
     ground: Any = None,
 ) -> tuple[Unilateral, Unilateral]:  # fmt: skip
     """Two points that strike and stick each on its own: the foot lands on the heel, lies flat, and tips over the toe.
@@ -28,7 +29,7 @@ def heel_and_toe(
     ----------
     model, name : the model, and the name that both contacts begin with
     heel, toe : points of the foot
-    release : as of `point_foot`, of both; None: each opens on pull
+    release, only_while : as of `point_foot`, of both; None: each opens on pull
     friction, ground : as of `point_foot`
 
     >>> import mbd
@@ -41,7 +42,9 @@ def heel_and_toe(
     check(model, name, "heel_and_toe")
     ends = between("heel_and_toe", name, heel=heel, toe=toe)
     first, second = (
-        point_foot(model, f"{name} {end}", frame, release=release, friction=friction, ground=ground)
+        point_foot(
+            model, f"{name} {end}", frame, release=release, only_while=only_while, friction=friction, ground=ground
+        )
         for end, frame in zip(("heel", "toe"), ends, strict=True)
     )
     return first, second

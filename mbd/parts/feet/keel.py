@@ -23,7 +23,8 @@ CHARACTERISTIC_RADIUS = 0.85
 
 def keel_foot(
     model: Description, name: str, heel: Frame, root: Frame, *, length: float, stiffness: float, mass: float,
-    loss: Loss | None = None, release: Any = None, friction: float | None = None, ground: Any = None,
+    loss: Loss | None = None, release: Any = None,
+    only_while: Any = None, friction: float | None = None, ground: Any = None,
 ) -> tuple[Unilateral, Unilateral]:  # fmt: skip
     """A blade spring clamped at its root, whose end is the toe: a rigid link of γ l on a torsion spring.
 
@@ -46,7 +47,7 @@ def keel_foot(
     stiffness : k at the toe [N/m]
     mass : of the part that turns, a uniform rod [kg]
     loss : hysteresis of the blade, such as Viscous(0.5)
-    release, friction, ground : as of `heel_and_toe`
+    release, only_while, friction, ground : as of `heel_and_toe`
 
     >>> import mbd
     >>> model, shank = mbd.Model("leg"), mbd.Link("shank", mass=2.0, length=0.4, center=0.2)
@@ -67,4 +68,6 @@ def keel_foot(
     hinge = replace(root, name=f"{name} keel", offset=(x, y, z), landmark=None)
     model.connect(Revolute(f"{name} keel", hinge, blade.origin, loss=loss, stiffness=k * reach * reach))
     toe = blade.point(reach, 0.0, name="toe")
-    return heel_and_toe(model, name, heel, toe, release=release, friction=friction, ground=ground)
+    return heel_and_toe(
+        model, name, heel, toe, release=release, only_while=only_while, friction=friction, ground=ground
+    )

@@ -20,6 +20,7 @@ def point_foot(
     point: Frame,
     *,
     release: Any = None,
+    only_while: Any = None,
     friction: float | Loss | None = None,
     ground: Any = None,
 ) -> Unilateral:
@@ -34,6 +35,7 @@ def point_foot(
     point : where it meets the ground
     release : name of the foot that takes over as it strikes (McGeer's rule), or `When`; None: it opens on pull. With
         ``When(other, may_pull=False)`` it opens by either; friction of a foot that pulls is 0, never negative
+    only_while : as of `Unilateral`: it may touch only then, so that the swing foot of a straight leg passes the ground
     friction : μ; None: it sticks; or a loss of the speed of the slip, as of `Unilateral`
     ground : as of `touchdown`
 
@@ -44,6 +46,8 @@ def point_foot(
     True
     """
     check(model, name, "point_foot")
-    foot = Unilateral(name, touchdown(point, ground), friction=friction, release=released(release))
+    foot = Unilateral(
+        name, touchdown(point, ground), friction=friction, release=released(release), only_while=only_while
+    )
     model.constrain(foot)
     return foot

@@ -18,7 +18,7 @@ __all__ = ["polygon_foot"]
 
 
 def polygon_foot(
-    model: Description, name: str, corners: Iterable[Frame], *, release: Any = None,
+    model: Description, name: str, corners: Iterable[Frame], *, release: Any = None, only_while: Any = None,
     friction: float | Loss | None = None, spin_friction: float = 0.0, restitution: float = 0.0, ground: Any = None,
 ) -> tuple[Unilateral, ...]:  # fmt: skip
     """A convex polygon, or the corners of a box, over the ground: ``0 ≤ g ⟂ p ≥ 0`` at each corner.
@@ -31,7 +31,7 @@ def polygon_foot(
     ----------
     model, name : the model, and the name that all contacts begin with
     corners : points of one body, two at least, none twice; those inside the hull never touch a plane
-    release : as of `point_foot`, of all
+    release, only_while : as of `point_foot`, of all
     friction, spin_friction, restitution : as of `Unilateral`; None: corners stick
     ground : as of `touchdown`; on ground that is not flat only the corners touch
 
@@ -58,6 +58,7 @@ def polygon_foot(
     contacts = tuple(
         Unilateral(
             f"{name} corner {k}", touchdown(point, ground), friction=friction, release=released(release),
+            only_while=only_while,
             spin_friction=spin_friction, restitution=restitution,
         )
         for k, point in enumerate(points, start=1)

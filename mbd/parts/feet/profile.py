@@ -14,7 +14,8 @@ __all__ = ["profile_foot"]
 
 
 def profile_foot(
-    model: Description, name: str, frame: Frame, sole: Any, *, release: Any = None, friction: float | None = None,
+    model: Description, name: str, frame: Frame, sole: Any, *, release: Any = None,
+    only_while: Any = None, friction: float | None = None,
     ground: Any = None,
 ) -> Unilateral:  # fmt: skip
     """A convex sole that strikes without bouncing and rolls along its length: ``g = y_O − h(ψ)``, ``v_O + h φ̇ = 0``.
@@ -31,7 +32,7 @@ def profile_foot(
     model, name : the model, and the name of the contact
     frame : in whose axes the sole lies: that of the shank for a roll-over shape of ankle and foot
     sole : (n ≥ 3, 2) points from heel to toe [m], or the support function h(ψ); see `profile_touchdown`
-    release, friction, ground : as of `point_foot`; the ground is a plane
+    release, only_while, friction, ground : as of `point_foot`; the ground is a plane
 
     >>> import mbd
     >>> model, leg = mbd.Model("leg"), mbd.Link("leg", mass=3.0, length=0.9, center=0.4)
@@ -42,6 +43,12 @@ def profile_foot(
     ([], <Sole of circumference 0.363228 m>)
     """  # fmt: skip
     check(model, name, "profile_foot")
-    foot = Unilateral(name, profile_touchdown(frame, sole, ground), friction=friction, release=released(release))
+    foot = Unilateral(
+        name,
+        profile_touchdown(frame, sole, ground),
+        friction=friction,
+        release=released(release),
+        only_while=only_while,
+    )
     model.constrain(foot)
     return foot
