@@ -1,7 +1,7 @@
 """C99 text of functions: of typed trees (`mbd.trees.tree`), and of straight ones (`compile.lowering.Target`).
 
-Compiled with ``-ffp-contract=off`` (gcc contracts by default) it gives the bits of LLVM's code, where that is told to
-do without fused multiply-add, which is used in sines and cosines only. C may compute the operands of an operation in
+Compiled with ``-ffp-contract=off`` (gcc contracts by default) it gives the bits of LLVM's code, where that does
+without fused multiply-add, which is used in sines and cosines only. C may compute the operands of an operation in
 any order; of the kernel's functions no two that stand in one expression change what the other reads.
 """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,8 @@ import pytest
 
 import mbd
 from mbd.integrators import StepReport, StepResult
+from mbd.kernel import codes
+from mbd.simulation.diagnostics.causes import CAUSES, Words
 from tests.simulation.mechanisms import ball, falling, pendulum, point, run
 
 
@@ -177,3 +180,17 @@ def test_what_an_integrator_of_ones_own_says_of_its_failure_is_told():
     model, _body = falling()
     failed = mbd.simulate(model, mbd.assemble(model), Shy(), dt=0.01, until=1.0, on_failure="return")
     assert "Shy says: too shy" in failed.message and "rank" not in failed.message
+
+
+def test_every_failure_of_the_kernel_has_a_cause_and_a_cure():
+    named = {name: code for name, code in vars(codes).items() if name.isupper() and 10 <= code < 40}
+    assert len(named) > 20
+    for name, code in named.items():
+        rows = [cause for cause in CAUSES if code in cause.status]
+        assert rows and rows[-1].cure, name
+
+
+def test_a_cause_asks_for_nothing_that_words_do_not_tell():
+    told = set(dir(Words)) | set(Words.__init__.__code__.co_names) | {"v", "stepper"}
+    asked = {name for cause in CAUSES for name in re.findall(r"{x\.(\w+)", cause.sentence + cause.cure)}
+    assert asked and asked <= told

@@ -17,7 +17,7 @@ from mbd.integrators import Integrator
 from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
-from mbd.simulation.diagnostics.failures import residual_names
+from mbd.simulation.diagnostics.residuals import residual_names
 from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import prepared
 from mbd.state import State
