@@ -121,7 +121,10 @@ class InverseDynamics:
             for k, axis in enumerate("xyz")
         }
 
-    def __getitem__(self, name: str) -> Any:
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.names)
+
+    def __getitem__(self, name: str) -> Vector:
         """A named quantity at every frame: (R,), or (R, 3) for a vector."""
         parts = scalars_behind(name, self._own.__contains__) if isinstance(name, str) else ()
         if len(parts) > 1:

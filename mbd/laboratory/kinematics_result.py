@@ -93,7 +93,10 @@ class InverseKinematics:
         """Times of the frames (R,) [s]."""
         return self.run.time
 
-    def __getitem__(self, name: str) -> Any:
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.names)
+
+    def __getitem__(self, name: str) -> Vector:
         return self.run[name]
 
     def __contains__(self, name: object) -> bool:

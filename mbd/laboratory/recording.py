@@ -125,6 +125,9 @@ class Recording(Mapping[str, Any]):
         put(self, "channels", {name: _table(value, (count,), name) for name, value in self.channels.items()})
 
     # by name ----------------------------------------------------------------------------------------------------
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
     def __getitem__(self, name: str) -> Any:
         if name == "time":
             return self.time
