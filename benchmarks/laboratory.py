@@ -49,7 +49,7 @@ def measure(repeats: int) -> list[Figure]:
         tasks["pinocchio"] = partial(processor_seconds, calls)
     samples = interleaved(tasks, repeats)
     other = samples["pinocchio"].least / FRAMES * 1e6 if calls is not None else None
-    yardstick, ratio = ("", None) if other is None else ("rnea from Python", 1.5)
+    yardstick, ratio = ("", None) if other is None else ("rnea from Python", 1.2)
     moments, postures = samples["moments"], samples["postures"]
     value = moments.least / FRAMES * 1e6
     return [

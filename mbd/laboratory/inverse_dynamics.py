@@ -37,6 +37,9 @@ from mbd.trajectory import Trajectory
 
 __all__ = ["inverse_dynamics"]
 
+CHUNK = 256
+"""Frames whose inputs are laid out at once, so that they stay in the processor's cache."""
+
 
 def inverse_dynamics(
     model: Any,
@@ -130,21 +133,23 @@ def dynamics_of(
     driven = _driven(model, equations, joints)
     record = record_of(mechanism, motion, parameters)
     columns = ModelColumns(record, equations)
-    blocks = blocks_of(mechanism.layout, columns.all_inputs(columns.rows))
-    g, R = _forces(mechanism, blocks, parameters)
+    g, R = _forces(mechanism, columns.all_inputs(columns.rows), parameters)
     found = balanced(g, R, driven)
     lam = record.lam.copy()
     lam[:, list(equations.bilateral)] = found.lam
     run = Trajectory(replace(record, lam=lam, message="motion that was given", settings={"method": "inverse dynamics"}))
-    noisy = [] if motion.run is not None else noise_remarks(equations, motion, found.effort, driven)
+    recorded = motion.run is None and motion.differentiated
+    noisy = noise_remarks(equations, motion, found.effort, driven) if recorded else []
     doubt(*noisy, of=model)
     remarks = [*motion.notes, *noisy, *notes]
     remarks += _notes(equations, found.free, found.shared, driven, motion, bool(plates))
     return InverseDynamics(run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), plates)
 
 
-def _forces(mechanism: Mechanism, blocks: Matrix, parameters: Vector | Matrix) -> tuple[Matrix, NDArray[np.float64]]:
-    """g (R, n_v) and R (R, n_v, m) of the rows that always act, whose multipliers are zero in the blocks."""
+def _forces(
+    mechanism: Mechanism, inputs: Mapping[str, Any], parameters: Vector | Matrix
+) -> tuple[Matrix, NDArray[np.float64]]:
+    """g (R, n_v) and R (R, n_v, m) of the rows that always act, whose multipliers are zero in the inputs."""
     equations, n_v, m = mechanism.equations, mechanism.equations.n_v, len(mechanism.equations.bilateral)
     key = "inverse dynamics"
     with equations.tape.lock:
@@ -152,7 +157,12 @@ def _forces(mechanism: Mechanism, blocks: Matrix, parameters: Vector | Matrix) -
             functions = mechanism.backend.functions(mechanism.layout)
             functions.add({"inverse_dynamics": _program(equations)})
             mechanism.named[key] = functions
-    out = at_blocks(mechanism.named[key]["inverse_dynamics"], blocks, parameters)
+    function, count = mechanism.named[key]["inverse_dynamics"], len(inputs["t"])
+    out = np.zeros((count, function.size))
+    for first in range(0, count, CHUNK):
+        part = slice(first, first + CHUNK)
+        blocks = blocks_of(mechanism.layout, {kind: values[part] for kind, values in inputs.items()})
+        out[part] = at_blocks(function, blocks, parameters[part] if parameters.ndim == 2 else parameters)
     return out[:, :n_v], out[:, n_v:].reshape(len(out), m, n_v).transpose(0, 2, 1)
 
 

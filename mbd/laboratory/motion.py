@@ -42,6 +42,7 @@ class Motion:
     time : (R,) [s]
     q : (R, n_q); v, a : (R, n_v)
     run : the run that it comes from, whose contact forces are known; None of a recorded motion
+    differentiated : whether accelerations are second derivatives of splines, which noise in the values scatters
     notes : what was done to get it, a sentence each
     """
 
@@ -51,6 +52,7 @@ class Motion:
     a: Matrix
     run: Trajectory | None = None
     notes: tuple[str, ...] = ()
+    differentiated: bool = True
 
 
 def motion_of(model: Any, mechanism: Mechanism, motion: Any, changed: Mapping[str, float]) -> Motion:
@@ -124,7 +126,8 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
     time = _times(given)
     columns = _columns(equations, given, time)
     count, n_q, n_v = len(time), equations.n_q, equations.n_v
-    q, v, a = np.zeros((count, n_q)), np.zeros((count, n_v)), np.zeros((count, n_v))
+    q, v, a = np.zeros((n_q, count)), np.zeros((n_v, count)), np.zeros((n_v, count))  # row by row, turned at the end
+    differentiated = False
     names = [c.name for c in equations.coordinates]
     missing = [name for name in names if name not in columns]
     whole = equations.configuration
@@ -142,22 +145,22 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
             raise ModelError(f"motion: the orientation {parts[0].removesuffix('.w')!r} is missing or incomplete")
         turned |= set(range(at, at + 4))
         values = continuous(np.column_stack([columns[part].value for part in parts]), parts[0].removesuffix(".w"))
-        q[:, at : at + 4] = values
+        q[at : at + 4] = values.T
         own = slice(first_v + joint.adding, first_v + joint.adding + 3)
         spins = [columns[name] for name in equations.velocity_names[own] if name in columns]
         if len(spins) == 3:
-            v[:, own] = np.column_stack([spin.value for spin in spins])
-            a[:, own] = np.column_stack(
-                [derivatives(time, s.value)[0] if s.acceleration is None else s.acceleration for s in spins]
-            )
+            v[own] = [spin.value for spin in spins]
+            a[own] = [derivatives(time, s.value)[0] if s.acceleration is None else s.acceleration for s in spins]
+            differentiated |= any(spin.acceleration is None for spin in spins)
         else:
-            v[:, own], a[:, own] = quaternion_rates(values, *derivatives(time, values))
+            rates, accelerations = quaternion_rates(values, *derivatives(time, values))
+            v[own], a[own], differentiated = rates.T, accelerations.T, True
     places = {int(place): k for k, place in enumerate(whole.places) if place >= 0}
     for place, name in enumerate(names):
         if place in turned or name in missing:
             continue
         column, k = columns[name], places[place]
-        q[:, place] = column.value
+        q[place] = column.value
         rate, acceleration = column.rate, column.acceleration
         if rate is None or acceleration is None:
             first, second = derivatives(time, column.value)
@@ -165,24 +168,26 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
                 rate = first
             elif acceleration is None:
                 second = derivatives(time, rate)[0]
+            differentiated |= acceleration is None
             acceleration = second if acceleration is None else acceleration
-        v[:, k], a[:, k] = rate, acceleration
+        v[k], a[k] = rate, acceleration
     doubt(*_in_degrees(equations, columns), of=model)
     remarks = (f"channels that are no coordinates are not used: {_few(unused)}",) if unused else ()
-    motion = Motion(time, q, v, a, None, remarks)
+    q, v, a = (np.ascontiguousarray(table.T) for table in (q, v, a))
+    motion = Motion(time, q, v, a, None, remarks, differentiated)
     return motion if not missing else _closed(model, mechanism, motion, missing, changed)
 
 
 def _in_degrees(equations: Equations, columns: Mapping[str, _Column]) -> list[str]:
     """Sentences on angles that swing to and fro by more than a turn, as those of a joint do in degrees."""
     found = []
-    for coordinate in equations.coordinates:
-        column = columns.get(coordinate.name)
-        if coordinate.unit != "rad" or column is None or len(column.value) < 3:
-            continue
-        values = column.value
-        swing = float(np.ptp(values))
-        if swing > math.tau and float(np.sum(np.abs(np.diff(values)))) > 1.5 * swing:
+    angles = [c for c in equations.coordinates if c.unit == "rad" and c.name in columns]
+    if not angles or len(columns[angles[0].name].value) < 3:
+        return []
+    swings = np.ptp([columns[coordinate.name].value for coordinate in angles], axis=1)
+    for k in np.flatnonzero(swings > math.tau):
+        coordinate, swing = angles[k], float(swings[k])
+        if float(np.sum(np.abs(np.diff(columns[coordinate.name].value)))) > 1.5 * swing:
             found.append(
                 f"motion: {coordinate.name!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; "
                 "angles are in radians: numpy.radians(…) converts degrees, a file says 'knee.angle [deg]'"
@@ -271,8 +276,10 @@ def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
     shape = (len(time),) if width == 1 else (len(time), width)
     if table.shape != shape:
         raise ModelError(f"motion: the values of {key!r} must have the shape {shape}, got {table.shape}")
-    wrong = np.flatnonzero(~np.isfinite(table.reshape(len(time), -1)).all(axis=1))
-    if len(wrong):
+    if not np.isfinite(np.sum(table)):
+        wrong = np.flatnonzero(~np.isfinite(table.reshape(len(time), -1)).all(axis=1))
+        if not len(wrong):
+            raise ModelError(f"motion: the values of {key!r} are too large, up to {np.abs(table).max():.3g}")
         raise ModelError(
             f"motion: {key!r} has a gap at t = {time[wrong[0]]:.6g} s ({len(wrong)} of {len(time)} frames); fill it, "
             "or leave these frames out"

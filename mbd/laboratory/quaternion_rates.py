@@ -19,7 +19,7 @@ def continuous(quaternions: Matrix, what: str) -> Matrix:
     >>> continuous(np.array([[0.6, 0.8, 0.0, 0.0], [-0.6, -0.8, 0.0, 0.0]]), "trunk.orientation")[:, :2].tolist()
     [[0.6, 0.8], [0.6, 0.8]]
     """
-    sizes = np.linalg.norm(quaternions, axis=1)
+    sizes = np.sqrt(np.einsum("ij,ij->i", quaternions, quaternions))
     wrong = np.flatnonzero(np.abs(sizes - 1.0) > LENGTH)
     if len(wrong):
         raise ModelError(

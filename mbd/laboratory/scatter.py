@@ -15,8 +15,8 @@ from mbd.laboratory.motion import Motion
 
 __all__ = ["Scatter", "noise_remarks", "scatter_of"]
 
-FEWEST = 20
-"""Frames from which the scatter is estimated."""
+FEWEST, MOST = 20, 600
+"""Frames from which the scatter is estimated: of more, those in the middle."""
 EVEN = 0.01
 """How unevenly the frames may be spaced, relative [-]."""
 MIN_RATIO = 0.6
@@ -45,6 +45,9 @@ def scatter_of(time: Vector, coordinate: Vector, moment: Vector) -> Scatter | No
     Differences of high order leave noise and remove motion; their median does not see single impacts. White noise of
     deviation σ in the values gives accelerations of deviation 6 σ/h², and moments with the same spectrum.
     """
+    middle = max(len(time) - MOST, 0) // 2
+    part = slice(middle, middle + MOST)
+    time, coordinate, moment = time[part], coordinate[part], moment[part]
     widths = np.diff(time)
     if len(time) < FEWEST or np.ptp(widths) > EVEN * widths.mean():
         return None
