@@ -163,6 +163,7 @@ if TYPE_CHECKING:
     from mbd.laboratory.read import read as read
     from mbd.laboratory.recording import PlateRecord as PlateRecord, Recording as Recording
     from mbd.laboratory.scale import scale as scale
+    from mbd.laboratory.stability import margin_of_stability as margin_of_stability
     from mbd.lagrangian import Lagrangian as Lagrangian
     from mbd.model import Model as Model
     from mbd.optimization.optimize import optimize as optimize
@@ -236,6 +237,7 @@ _HOMES = {
     "mbd.laboratory.read": "read",
     "mbd.laboratory.recording": "PlateRecord Recording",
     "mbd.laboratory.scale": "scale",
+    "mbd.laboratory.stability": "margin_of_stability",
     "mbd.lagrangian": "Lagrangian",
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",

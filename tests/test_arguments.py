@@ -111,7 +111,7 @@ BESIDE = {
         mbd.load, mbd.mobility, mbd.project, mbd.replay, mbd.sensitivities, mbd.simulate, mbd.sweep,
         mbd.branch, mbd.find_gait, mbd.optimize, mbd.inverse_dynamics, mbd.read,
         mbd.inverse_kinematics, mbd.muscle_forces, mbd.read_band,
-        mbd.assign_plates, mbd.ForcePlate, mbd.scale, mbd.read_model, mbd.write_model,
+        mbd.assign_plates, mbd.ForcePlate, mbd.scale, mbd.read_model, mbd.write_model, mbd.margin_of_stability,
     ),
     "of numbers and traced values": (
         mbd.acos, mbd.asin, mbd.atan, mbd.atan2, mbd.clip, mbd.cos, mbd.cosh, mbd.exp, mbd.floor, mbd.hypot, mbd.log,

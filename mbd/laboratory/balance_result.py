@@ -56,10 +56,12 @@ class InverseDynamics:
         residual: Matrix,
         notes: tuple[str, ...] = (),
         plates: Sequence[ForcePlate] = (),
+        friction: Matrix | None = None,
     ) -> None:
         self.run, self.notes, self.plates = run, notes, tuple(plates)
         self._joints, self.driven = joints, driven
         self.effort, self._residual = effort, residual
+        self._friction = np.zeros_like(effort) if friction is None else friction
 
     @property
     def time(self) -> Vector:
@@ -96,7 +98,9 @@ class InverseDynamics:
         ground = {contact.name for contact in equations.contacts} | {plate.name for plate in self.plates}
         nodes = net_moments(equations, ground)
         columns: Any = self.run.columns
-        return np.column_stack(columns.evaluate(nodes, columns.rows)) if nodes else np.zeros((len(self.time), 0))
+        if not nodes:
+            return np.zeros((len(self.time), 0))
+        return np.column_stack(columns.evaluate(nodes, columns.rows)) + self._friction
 
     def _wrench(self, joint: Joint | None, name: str, places: tuple[int, ...]) -> dict[str, Vector]:
         """Residual force and moment of a joint that leaves its child free, in ground axes."""

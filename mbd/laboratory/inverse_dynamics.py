@@ -25,11 +25,13 @@ from mbd.joints.planar import Planar
 from mbd.joints.translation import Translation
 from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate, all_plates, loaded_model, wrenches
-from mbd.laboratory.least_norm import balanced
+from mbd.laboratory.least_norm import Balanced, balanced
 from mbd.laboratory.motion import Motion, motion_of, parameters_of, record_of
+from mbd.laboratory.pins import Pin, pin_moments, without_pins
 from mbd.laboratory.scatter import noise_remarks
 from mbd.notes import doubt
 from mbd.results.columns import ModelColumns
+from mbd.results.record import Record
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 from mbd.topology.plan import plan
@@ -39,6 +41,8 @@ __all__ = ["inverse_dynamics"]
 
 CHUNK = 256
 """Frames whose inputs are laid out at once, so that they stay in the processor's cache."""
+MAX_LOADS, SETTLED = 60, 1e-13
+"""How often forces in pins and their friction are solved for in a loop, and the change at which that ends [-]."""
 
 
 def inverse_dynamics(
@@ -62,6 +66,8 @@ def inverse_dynamics(
        Newton–Euler sweep (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 5.3).
     3. Without rows ``τ = g`` at the driven coordinates and ``ρ = g`` at the others. With rows ρ is made as small as it
        can be, then τ, then λ, each of least norm; `InverseDynamics.notes` says where that was needed.
+
+    The friction of pins follows from the forces in their joints, and is zero where a pin is at rest.
 
     The contacts of a run push with the forces of the run; those of a recorded motion are open, so that their forces are
     part of ρ.
@@ -87,7 +93,8 @@ def inverse_dynamics(
     ModelError
         for a motion that is not one of this model, gaps, joints that are cut or that the model lacks.
     CapabilityError
-        for states of forces of a recorded motion, and for friction that follows the force of a joint.
+        for states of forces of a recorded motion, and for friction that follows the force of a joint of several
+        coordinates, or of one that closes a loop.
 
     Examples
     --------
@@ -104,7 +111,8 @@ def inverse_dynamics(
     if faults := named_number_faults(parameters, "parameters"):
         raise ModelError(faults)
     plates = all_plates(plates)
-    loaded = loaded_model(model, plates)
+    bare, pins = without_pins(model)
+    loaded = loaded_model(bare, plates)
     mechanism = mechanism_of(loaded, backend, parameters)
     found = motion_of(loaded, mechanism, motion, parameters or {})
     if plates:
@@ -116,7 +124,7 @@ def inverse_dynamics(
         for name, column in wrenches(plates, found.time).items():
             if name in places:  # those that push sideways are in no equation of the plane
                 values[:, places[name]] = column
-    return dynamics_of(loaded, mechanism, found, values, joints, plates=plates)
+    return dynamics_of(loaded, mechanism, found, values, joints, plates, pins, parameters or {})
 
 
 def dynamics_of(
@@ -125,8 +133,9 @@ def dynamics_of(
     motion: Motion,
     parameters: Vector | Matrix,
     joints: Sequence[str] | None,
-    notes: Sequence[str] = (),
     plates: Sequence[ForcePlate] = (),
+    pins: Sequence[Pin] = (),
+    changed: Mapping[str, float] | None = None,
 ) -> InverseDynamics:
     """The balance of a motion whose parameters are known at each frame."""
     equations = mechanism.equations
@@ -135,15 +144,39 @@ def dynamics_of(
     columns = ModelColumns(record, equations)
     g, R = _forces(mechanism, columns.all_inputs(columns.rows), parameters)
     found = balanced(g, R, driven)
-    lam = record.lam.copy()
-    lam[:, list(equations.bilateral)] = found.lam
-    run = Trajectory(replace(record, lam=lam, message="motion that was given", settings={"method": "inverse dynamics"}))
+    run = _moved(record, equations, found)
+    friction, notes = np.zeros_like(g), list[str]()
+    for _ in range(MAX_LOADS if pins else 0):
+        # what pins rub follows from the forces in them, which in loops follow from what they rub
+        last = friction
+        friction, notes = pin_moments(pins, run, equations.velocity_names, changed or {})
+        found = balanced(g - friction, R, driven)
+        run = _moved(record, equations, found)
+        if np.abs(friction - last).max() <= SETTLED * np.abs(friction).max(initial=0.0) or not R.shape[2]:
+            break
+    else:
+        if pins:
+            raise CapabilityError(
+                f"inverse dynamics: the friction of '{pins[0].joint}' and the forces of the loop do not settle; leave "
+                f"it out by model.without('{pins[0].joint} loss')"
+            )
     recorded = motion.run is None and motion.differentiated
     noisy = noise_remarks(equations, motion, found.effort, driven) if recorded else []
     doubt(*noisy, of=model)
     remarks = [*motion.notes, *noisy, *notes]
     remarks += _notes(equations, found.free, found.shared, driven, motion, bool(plates))
-    return InverseDynamics(run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), plates)
+    return InverseDynamics(
+        run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), plates, friction
+    )
+
+
+def _moved(record: Record, equations: Equations, found: Balanced) -> Trajectory:
+    """The motion as a run with these multipliers."""
+    lam = record.lam.copy()
+    lam[:, list(equations.bilateral)] = found.lam
+    return Trajectory(
+        replace(record, lam=lam, message="motion that was given", settings={"method": "inverse dynamics"})
+    )
 
 
 def _forces(

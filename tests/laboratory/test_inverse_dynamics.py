@@ -373,3 +373,36 @@ def test_angles_that_look_like_degrees_are_in_doubt():
         warnings.simplefilter("error")
         mbd.inverse_dynamics(model, {"time": time, "knee.angle": 30.0 * time})
         mbd.inverse_dynamics(model, {"time": time, "knee.angle": np.radians(30.0 * np.sin(6.0 * time))})
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_pins_rub_by_the_force_that_they_carry(loop):
+    """The drive of a run is found again, though friction in the pins follows the force in them."""
+    model = mbd.Model("pins", cut=["rocker"] if loop else "auto")
+    crank = mbd.Link("crank", mass=1.0, length=0.2, center=0.1, inertia=0.004)
+    bar = mbd.Link("bar", mass=2.0, length=0.5, center=0.25, inertia=0.04)
+    loss = mbd.PinFriction(0.2, 0.02) + mbd.Viscous(0.05)
+    drive = mbd.Revolute("drive", model.ground.origin, crank.start, loss=loss)
+    pin = mbd.Revolute("pin", crank.end, bar.start, loss=mbd.PinFriction(0.3, 0.015))
+    model.connect(drive, pin)
+    if loop:
+        third = mbd.Link("third", mass=1.5, length=0.4, center=0.2, inertia=0.02)
+        model.connect(mbd.Revolute("support", model.ground.point(0.4, 0.0), third.start))
+        model.connect(mbd.Revolute("rocker", bar.end, third.end))
+    start = mbd.assemble(model, position={"drive.angle": 0.3}, velocity={"drive.angle.rate": 4.0})
+    model.apply(mbd.Motor("motor", drive, torque=lambda t: 6.0 + mbd.sin(9.0 * t)))
+    if not loop:
+        model.apply(mbd.Motor("other", pin, torque=lambda t: 3.0 * mbd.cos(5.0 * t)))
+        start = mbd.assemble(
+            model, {"drive.angle": 0.3, "pin.angle": 0.4}, {"drive.angle.rate": 4.0, "pin.angle.rate": 2.0}
+        )
+    run = mbd.simulate(model, start, mbd.RadauIIA(), tol=1e-9, until=0.15)
+    bare = model.without("motor", *([] if loop else ["other"]))
+    found = mbd.inverse_dynamics(bare, run, joints=["drive"] if loop else None)
+    moving = (np.abs(run["drive.rate"]) > 0.1) & (np.abs(run["pin.rate"]) > 0.1)
+    assert moving.sum() > 10
+    assert found["drive.moment"][moving] == pytest.approx(run["motor.torque"][moving], abs=1e-6)
+    if not loop:
+        assert found["pin.moment"][moving] == pytest.approx(run["other.torque"][moving], abs=1e-6)
+        rubbing = found["drive.net_moment"] - run["motor.torque"] + 0.05 * run["drive.rate"]
+        assert np.abs(rubbing[moving]) == pytest.approx(np.abs(run["drive.friction"][moving]), abs=1e-6)
