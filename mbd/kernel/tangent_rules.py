@@ -8,8 +8,8 @@ from __future__ import annotations
 from mbd.kernel.records import Kernel, Steps
 
 __all__ = [
-    "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_stages", "further_corrections",
-    "is_differentiated", "note_matrix", "note_solution", "note_step", "takes_part",
+    "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_rates", "follow_stages",
+    "further_corrections", "is_differentiated", "note_matrix", "note_solution", "note_step", "takes_part",
 ]  # fmt: skip
 
 NOT_FOLLOWED = -3
@@ -46,6 +46,11 @@ def note_solution(K: Steps) -> None:
 def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int:
     """The solution of a step with its derivatives, from the prediction in the block; 0, or `NOT_FOLLOWED`."""
     return NOT_FOLLOWED
+
+
+def follow_rates(K: Kernel, t: float) -> int:
+    """The consistent rates in K.jump and K.impulse of (q1, y1) with their derivatives; 0, or a status."""
+    return 0
 
 
 def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:

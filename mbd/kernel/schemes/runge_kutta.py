@@ -36,7 +36,7 @@ from mbd.kernel.stepping.restart import (
     measure_accepted,
     raise_scales,
 )
-from mbd.kernel.tangent_rules import is_differentiated
+from mbd.kernel.tangent_rules import follow_rates, is_differentiated
 
 __all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -94,6 +94,8 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         if not (free and stage_in_chart(K, t, s)):
             place_in_chart(K, s)
             status = explicit_rates(K, t)
+            if status == 0:
+                status = follow_rates(K, t)
             if status != 0:
                 return status
         for i in range(n):
@@ -115,6 +117,8 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         note_uneven(K)
         if status == 0 and K.uneven_masses == 1 and factor_saddle(K, K.n_active, False, LOSS_AT_ONCE):
             polish_with_rows(K, K.n_active)
+    if status == 0:
+        status = follow_rates(K, t1)
     if status != 0:
         return status
     for i in range(n):
@@ -345,7 +349,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
 
 def return_straight(K: Equations) -> bool:
     """Corrections of positions and velocities by code of the mode, in K.spare; false where pivots are searched for."""
-    if K.returns_program == 0:
+    if K.returns_program == 0 or is_differentiated():
         return False
     call_on(K, K.returns_program, K.acc, K.spare)
     return bool(K.spare[0] == 1.0)

@@ -21,7 +21,7 @@ from mbd.trees import tree
 
 __all__ = ["LANES", "tangent_text"]
 
-LANES = 24
+LANES = 32
 """Derivatives of a real; the last is kept for that by the size of a step, which an event needs."""
 VECTOR = f"<{LANES} x double>"
 ROOM = f"[{LANES} x double]"

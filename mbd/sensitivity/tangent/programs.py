@@ -10,12 +10,14 @@ import numpy as np
 from mbd.compile.mechanism import Mechanism
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
+from mbd.equations.inputs import Inputs
 from mbd.sensitivity.tangent.printer import LANES
 from mbd.tape.derivatives import jvps, live
 from mbd.tape.node import Node
 
-__all__ = ["Derivative", "derivatives_of_modes", "derivatives_of_programs"]
+__all__ = ["Derivative", "balance_function", "derivatives_of_modes", "derivatives_of_programs"]
 
+BALANCE = "tangent_balance"
 WITHOUT = ("switch",)
 """Inputs that never have derivatives: whether penalties act."""
 
@@ -99,7 +101,33 @@ def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list
         "chart_end": none if vector else lambda: chart_end(equations),
         "chart_motion": none if vector else lambda: chart_motion(equations), "free_rates": none,
     }  # fmt: skip
-    return [Derivative(mechanism, name, outputs, places) for name, outputs in named.items()]
+    found = [Derivative(mechanism, name, outputs, places) for name, outputs in named.items()]
+    held = (*WITHOUT, "a", "s", "lam", "c")
+    return [*found, Derivative(mechanism, BALANCE, lambda: balance(mechanism), places, without=held)]
+
+
+def balance(mechanism: Mechanism) -> list[Node]:
+    """``M v̇ + f + R λ`` (n) and ``B v̇ + γ`` of all rows (R), at any v̇ and λ."""
+    equations, n, rows = mechanism.equations, mechanism.layout.n, mechanism.layout.n_rows
+    inputs, known, one = Inputs.of(equations), mechanism._accelerations, equations.tape.one
+    at_R, at_B = n * n + n, n * n + n + n * rows
+    at_bias = at_B + n * rows + 2 * rows
+    rates = [*inputs.a, *inputs.s, one, *inputs.lam]
+    lines = [
+        [*known[i * n : (i + 1) * n], known[n * n + i], *known[at_R + i * rows : at_R + (i + 1) * rows]]
+        for i in range(n)
+    ]
+    lines += [[*known[at_B + k * n : at_B + (k + 1) * n], known[at_bias + k]] for k in range(rows)]
+    return [_dot(line, rates[: len(line)]) for line in lines]
+
+
+def balance_function(mechanism: Mechanism) -> Any:
+    """The code of `balance`."""
+    if BALANCE not in mechanism.named:
+        with mechanism.equations.tape.lock:
+            mechanism.common.add({BALANCE: balance(mechanism)}, True)
+            mechanism.named[BALANCE] = mechanism.common[BALANCE]
+    return mechanism.named[BALANCE]
 
 
 def derivatives_of_modes(mechanism: Mechanism, code: Any, stabilized: bool, places: Sequence[int]) -> list[Derivative]:

@@ -12,6 +12,7 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK
+from mbd.kernel.contact.islands import saddle_entry
 from mbd.kernel.events.guards import guard_value, watch
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import Integers, Kernel, Reals
@@ -38,15 +39,17 @@ from mbd.kernel.schemes.stages import (
 )
 from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate
 from mbd.kernel.stepping.candidate import carry
-from mbd.kernel.stepping.restart import compose, consistent, fill_block
+from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = [
-    "at_root", "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_stages",
+    "at_root", "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_rates", "follow_stages",
     "further_corrections", "is_differentiated", "note_matrix", "note_solution", "note_step", "seeded", "takes_part",
     "without_tangent",
 ]  # fmt: skip
 
+BALANCE = 9
+"""The function behind those of `mbd.kernel.codes`: M v̇ + f + R λ and B v̇ + γ of all rows."""
 NOT_FOLLOWED = -3
 """Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
 FOLLOWED = 1e-12
@@ -462,6 +465,53 @@ def follow_matrix(K: Kernel, m: int, whole: bool) -> None:
     solve_kkt(K, size, K.spare)
     for i in range(size):
         K.work[i] -= K.spare[i]
+
+
+# accelerations at a state ---------------------------------------------------------------------------------------------
+def prepare_rates(K: Kernel, t: float, m: int) -> int:
+    """Factors of ``[M R; B 0]`` at (q1, y1), with (v̇, λ) in K.rhs; 0, or that it is singular."""
+    n = K.n
+    size = n + m
+    evaluate(K, t, K.q1, K.y1)
+    for i in range(size):
+        for j in range(size):
+            K.kkt[i * size + j] = saddle_entry(K, i, j, False)
+    K.order_start = 0
+    if factor(K.kkt, size, K.pivots) != 0:
+        return 1
+    for i in range(n):
+        K.rhs[i] = -K.acc[K.acc_f + i]
+    for k in range(m):
+        K.rhs[n + k] = -K.acc[K.acc_bias + K.rows[k]]
+    solve(K.kkt, size, K.pivots, K.rhs)
+    return 0
+
+
+def follow_rates(K: Kernel, t: float) -> int:
+    """``[M R; B 0] (δv̇, δλ) = −δ(M v̇ + f + R λ, B v̇ + γ)`` with v̇ and λ held; `consistent` where friction follows λ."""
+    n = K.n
+    m = K.n_active
+    if K.n_frictions > 0 or K.loaded > 0 or K.rubs == 1 or K.n_dropped > 0 or prepare_rates(K, t, m) != 0:
+        return consistent(K, t, K.q1, K.y1)
+    fill_block(K, t, K.q1, K.y1)
+    for i in range(n):
+        K.block[K.o_a + i] = without_tangent(K.rhs[i])
+    K.block[K.o_lam : K.o_lam + K.n_rows] = 0.0
+    for k in range(m):
+        K.block[K.o_lam + K.rows[k]] = without_tangent(K.rhs[n + k])
+    call(K, BALANCE, K.out)
+    for i in range(n):
+        K.rhs[i] = -derivative_of(K.out[i])
+    for k in range(m):
+        K.rhs[n + k] = -derivative_of(K.out[n + K.rows[k]])
+    solve_plain(K.kkt, n + m, K.pivots, K.rhs)
+    for i in range(n):
+        K.jump[i] = without_tangent(K.jump[i]) + K.rhs[i]
+    for k in range(K.n_rows):
+        K.impulse[k] = without_tangent(K.impulse[k])
+    for k in range(m):
+        K.impulse[K.rows[k]] += K.rhs[n + k]
+    return 0
 
 
 # a step of several stages ---------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from mbd.equations.equations import Guard
 from mbd.kernel.records import TABLE
 from mbd.sensitivity.tangent.build import entry
 from mbd.sensitivity.tangent.printer import LANES
-from mbd.sensitivity.tangent.programs import derivatives_of_modes, derivatives_of_programs
+from mbd.sensitivity.tangent.programs import balance_function, derivatives_of_modes, derivatives_of_programs
 from mbd.simulation.run.call_table import BOUND, PLACES
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.stepper import Stepper
@@ -57,6 +57,7 @@ class TangentStepper(Stepper):
             np.zeros((length if own and own.keys() <= set(reals) else 0, LANES))
             for length, own in zip(plan.lengths, plan.places, strict=True)
         ]
+        self.functions.append(balance_function(self.mechanism))  # see `rules.BALANCE`
         K, layout = self.kernel, self.mechanism.layout
         sizes = 2 * layout.size + 10 * (layout.n + layout.n_rows + layout.n_v + 1) + layout.n_q
         sizes += K.n_watched + K.n_frictions + layout.n_rows * (2 * layout.n_v + layout.n + layout.n_rows)
@@ -96,13 +97,11 @@ class TangentStepper(Stepper):
         assert len(self._programs) == len(self.functions)  # in the same order
 
     def add_mode(self) -> None:
+        known = len(self.functions)
         super().add_mode()
-        code = self.modes[-1]
+        code, others = self.modes[-1], len(self.functions) - known - 2
         tangent, residual, turned = derivatives_of_modes(self.mechanism, code, self.stabilized, self.places)
-        self._programs += [tangent, residual]
-        if code.correction is not None:
-            self._programs += [turned, turned]  # in the place of code that runs without derivatives only
-        self._programs.append(turned)
+        self._programs += [tangent, residual, *others * [turned], turned]  # others run without derivatives only
         self.functions.append(code.residual)  # see `rules.turned_program`
 
     def _advance_compiled(self) -> int:
