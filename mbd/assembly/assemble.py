@@ -330,9 +330,10 @@ def _below(work: Posture, opened: set[str]) -> list[str]:
         named_off = isinstance(contact.only_while, str) and contact.only_while not in work.manager.mode(work.flags)
         off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
         if values[c] < -BELOW and not work.flags[c] and contact.name not in opened and not off:
+            on = "let it push" if contact.kind == "penalty" else "set it on the surface"
             inside = (
                 f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} {_beyond(contact.unit)}, "
-                f"name it in closed=[…] to set it on the surface, or in open=[…] to ignore it until it has risen"
+                f"name it in closed=[…] to {on}, or in open=[…] to ignore it until it has risen"
             )
             against = (
                 f"{contact.name!r} starts open at {values[c]:.6g} {contact.unit}, a velocity at which it acts; name it "

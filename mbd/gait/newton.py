@@ -176,8 +176,11 @@ def _gap(map_: ReturnMap, point: FixedPoint, c: Vector, found: Measured, values:
 
 
 def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:
-    """That nothing moves any more, which repeats itself too; a machine may go on from there by itself."""
-    if map_.mechanism.equations.machines:
+    """That nothing moves any more, which repeats itself too; a machine may go on from there by itself.
+
+    Where the section is an event of velocities, such as an apex, all may be still for an instant.
+    """
+    if map_.mechanism.equations.machines or point.chart.section.speeds:
         return None
     if float(np.max(np.abs(point.state.v), initial=0.0)) > REST * tol:
         return None

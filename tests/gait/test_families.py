@@ -118,6 +118,21 @@ def test_a_gait_that_is_alone_has_no_other_energy() -> None:
         mbd.limit_cycle(model, start, section="right foot", mirror=SIDES, energy=300.0)
 
 
+@pytest.mark.parametrize("section", ["lowest", "highest", "mat"])
+def test_a_ball_on_a_spring_bounces_with_the_energy_asked_for(section: str) -> None:
+    """From any instant, compressed ones too: ``T = 2 v/g + (π + 2 atan(g/(ω v)))/ω`` with ``m v²/2 = E``."""
+    model, ball = mbd.Model("ball"), mbd.PointMass("ball", 1.0)
+    model.connect(mbd.Prismatic("rail", model.ground.origin, ball.origin, axis="y"))
+    model.constrain(
+        mbd.Penalty("mat", mbd.height(ball.origin), stiffness=1e3),
+        *(mbd.Event(name, mbd.measure("rail.rate"), direction=way) for name, way in (("lowest", 1), ("highest", -1))),
+    )
+    start = mbd.assemble(model, {"rail.displacement": -0.05}, closed="mat")
+    gait = mbd.limit_cycle(model, start, section=section, energy=2.0)
+    w, v = math.sqrt(1e3), 2.0
+    np.testing.assert_allclose(gait.period, 2.0 * v / G + (math.pi + 2.0 * math.atan(G / (w * v))) / w, rtol=1e-11)
+
+
 def test_what_a_family_keeps_must_be_told() -> None:
     model, start = runner()
     gait = mbd.limit_cycle(model, start, section="apex")
@@ -127,6 +142,8 @@ def test_what_a_family_keeps_must_be_told() -> None:
     ):
         with pytest.raises(mbd.ModelError, match="is one of a family, since nothing takes energy"):
             asked()
+    with pytest.raises(mbd.ModelError, match="is one of a family, since nothing takes energy: starts of other"):
+        mbd.basin(model, gait, {"place.y": np.linspace(0.95, 1.0, 3)})
     with pytest.raises(mbd.ModelError, match="'gravity.x' is an exact 0 or ±1 of the model"):
         gait.at({"gravity.x": 0.1})
     with pytest.raises(mbd.ModelError, match="energy and speed each pick one gait"):

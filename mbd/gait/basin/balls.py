@@ -85,6 +85,11 @@ def ball_of(name: str, gait: LimitCycle, walked: Walked) -> Ball:
     size = gait.chart.size
     P = np.asarray(gait.map_derivative.matrix[:size, :size], dtype=float)
     spectral = float(np.max(np.abs(np.linalg.eigvals(P)), initial=0.0)) if size else 0.0
+    if "energy" in gait.stability_of.trivial:
+        raise ModelError(
+            f"{name} is one of a family, since nothing takes energy: starts of other energies come to other gaits, and "
+            "none attracts them; follow the family by mbd.branch(gait, 'energy', …), or let something take energy"
+        )
     if not spectral < 1.0 or gait.stability != "stable":
         raise ModelError(
             f"{name} attracts nothing: its largest multiplier is {max(spectral, gait.largest_multiplier):.6g} "
