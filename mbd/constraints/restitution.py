@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 
+from mbd.arrays import Vector
 from mbd.bodies.values import among
 from mbd.errors import ModelError, nearest
 
@@ -108,6 +110,15 @@ def stored_work(chi: float) -> float:
     return _work(chi, 0.0)
 
 
+@cache
+def _quadrature(nodes: int) -> tuple[Vector, Vector]:
+    """Nodes and weights of Gauss and Legendre."""
+    import numpy as np
+
+    places, weights = np.polynomial.legendre.leggauss(nodes)
+    return places, weights
+
+
 def impact_integral(chi: float, exponent: float, end: float, nodes: int = 200) -> float:
     """``∫_end¹ dw/(P(w)^{n/(n+1)} (1 + χ w))`` with ``P(w) = ∫_w¹ s/(1 + χ s) ds``: a duration in its own scale.
 
@@ -117,7 +128,7 @@ def impact_integral(chi: float, exponent: float, end: float, nodes: int = 200) -
     import numpy as np
 
     p, power = exponent + 1.0, exponent / (exponent + 1.0)
-    places, weights = np.polynomial.legendre.leggauss(nodes)
+    places, weights = _quadrature(nodes)
     tau = 0.5 * (places + 1.0)
     front, back = tau**p, (1.0 - tau) ** p
     w = end + (1.0 - end) * front / (front + back)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.assemble import assemble
+from mbd.bodies.marker import Marker
 from mbd.bodies.values import named_number_faults, number, shown
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
@@ -23,6 +25,11 @@ from mbd.laboratory.recording import Recording
 from mbd.state import State
 
 __all__ = ["inverse_kinematics"]
+
+LEAST_APART = 0.02
+"""Distance of two markers on a body from which on their distances are compared with the model's [m]."""
+LIKELY = (0.1, 10.0)
+"""Distances of markers on a body over those of the model that may be in the same unit [-]."""
 
 
 def inverse_kinematics(
@@ -82,13 +89,14 @@ def inverse_kinematics(
     mechanism = mechanism_of(model, backend, parameters)
     equations = mechanism.equations
     notes: list[str] = []
-    points = point_names(equations, _pairs(equations, recording, markers, notes))
+    points = point_names(equations, _pairs(model, equations, recording, markers, notes))
     followed = _followed(equations, recording, coordinates)
     size = _weights(weights, [*points, *followed])
     # rows that hold, and stops that must not be passed
     rows = [k for k in equations.bilateral if not equations.rows[k].is_velocity]
     gaps = stops_of(equations)
     program = marker_program(mechanism, list(points.values()), list(followed), rows, gaps)
+    _in_meters(model, recording, points)
     problem = _problem(program, recording, points, followed, size, len(rows), len(gaps))
     values = mechanism.parameters(parameters, getattr(model, "parameters", {}))
     # the first frame, then all others
@@ -101,7 +109,7 @@ def inverse_kinematics(
 
 
 def _pairs(
-    equations: Equations, recording: Recording, markers: Mapping[str, Any] | None, notes: list[str]
+    model: Any, equations: Equations, recording: Recording, markers: Mapping[str, Any] | None, notes: list[str]
 ) -> dict[str, Any]:
     """Points of the model by the markers of the recording."""
     if markers is None:
@@ -115,6 +123,11 @@ def _pairs(
             )
         if rest:
             notes.append(f"{len(rest)} markers are no points of the model: {', '.join(map(repr, rest[:5]))}")
+        own = [frame.name for frame in getattr(model, "markers", ()) if isinstance(frame, Marker)]
+        absent = [name for name in own if name not in found]
+        if absent:
+            more = f" and {len(absent) - 5} more" if absent[5:] else ""
+            notes.append(f"the recording lacks markers of the model: {', '.join(map(repr, absent[:5]))}{more}")
         return found
     if not isinstance(markers, Mapping) or not markers:
         raise ModelError(
@@ -124,6 +137,28 @@ def _pairs(
         if name not in recording.markers:
             raise ModelError(f"markers: {nearest(str(name), recording.markers, 'marker', 'The recording has')}")
     return dict(markers)
+
+
+def _in_meters(model: Any, recording: Recording, points: Mapping[str, Any]) -> None:
+    """Refuse markers whose distances on one body are far from those of the model, as those in other units are."""
+    known = {frame.full_name: frame for frame in getattr(model, "markers", ())}
+    own = [(name, known.get(point if isinstance(point, str) else getattr(point, "full_name", ""))) for name, point in
+           points.items()]  # fmt: skip
+    ratios: list[float] = []
+    for k, (name, frame) in enumerate(own):
+        for other, second in own[k + 1 :]:
+            if frame is None or second is None or second.body is not frame.body:
+                continue
+            apart = math.dist(frame.offset, second.offset)
+            seen = np.linalg.norm(recording.markers[name] - recording.markers[other], axis=1)
+            if apart > LEAST_APART and np.isfinite(seen).any():
+                ratios.append(float(np.nanmedian(seen)) / apart)
+    ratio = float(np.median(ratios)) if ratios else 1.0
+    if not LIKELY[0] < ratio < LIKELY[1]:
+        raise ModelError(
+            f"markers: they lie {ratio:.3g} times as far from each other on a body as in the model; are they in "
+            "meters? mbd.read turns the units of files into meters"
+        )
 
 
 def _followed(equations: Equations, recording: Recording, coordinates: Mapping[str, Any] | None) -> dict[str, Vector]:

@@ -24,6 +24,8 @@ ENDS = {
     "left foot": ("heel", "toe"), "right foot": ("heel", "toe"),
 }  # fmt: skip
 """Points whose distance is the length of a segment that is no link."""
+STRAIGHT = 12.0
+"""Angle between thigh and shank of a static trial from which a knee counts as bent [°]."""
 PLAUSIBLE = (0.7, 1.4)
 """Factors of length outside of which a measured length is in doubt [-]."""
 RIGID = 0.02
@@ -82,6 +84,7 @@ def scale(
         factors[name] = _measured(name, given, recording) / own
         if not PLAUSIBLE[0] <= factors[name] <= PLAUSIBLE[1]:
             doubt(f"scale: {name!r} would be {factors[name]:.2f} times as long as before; are the lengths in meters?")
+    doubt(*_bent_knees(lengths, recording))
     mean = float(np.mean(list(factors.values())))
     found, kept, proportion = person, list[str](), list[str]()
     weights = {name: each.solid.mass for name, each in segments.items() if isinstance(each, Segment)}
@@ -103,6 +106,24 @@ def scale(
         note(f"scale: in proportion {', '.join(proportion)}")
     if kept:
         note(f"scale: kept as they are {', '.join(map(repr, kept))}")
+    return found
+
+
+def _bent_knees(lengths: Mapping[str, Any], recording: Recording | None) -> list[str]:
+    """Sentences on knees that are bent in the static trial, where markers tell."""
+    found = []
+    for side in ("left", "right"):
+        pairs = [lengths.get(f"{side} {part}") for part in ("thigh", "shank")]
+        if recording is None or not all(isinstance(pair, tuple | list) and len(pair) == 2 for pair in pairs):
+            continue
+        (a, b), (c, d) = (tuple(recording.markers[name] for name in pair) for pair in pairs if pair is not None)
+        thigh, shank = np.nanmedian(b - a, axis=0), np.nanmedian(d - c, axis=0)
+        bend = np.degrees(np.arccos(thigh @ shank / (np.linalg.norm(thigh) * np.linalg.norm(shank))))
+        if bend > STRAIGHT:
+            found.append(
+                f"scale: the {side} knee is bent by {bend:.0f}° in the static trial; lengths between markers hold all "
+                "the same, but marker places that are taken from this posture do not: let the patient stand straight"
+            )
     return found
 
 

@@ -212,6 +212,20 @@ def test_what_does_not_fit_is_named(change, words):
         mbd.inverse_kinematics(model, **given)
 
 
+def test_markers_that_are_missing_on_either_side_are_told_and_other_units_refused():
+    model = mbd.Model("knee")
+    shank = mbd.Link("shank", mass=3.0, length=0.4, center=0.2, inertia=0.04)
+    for name, place in (("ANK", (0.0, -0.4)), ("TIB", (0.05, -0.2)), ("FIB", (-0.05, -0.3))):
+        mbd.Marker(name, shank, place)
+    model.connect(mbd.Revolute("knee", model.ground.origin, shank.start))
+    seen = {"ANK": np.array([[0.0, -0.4, 0.0]] * 2), "TIB": np.array([[0.05, -0.2, 0.0]] * 2), "TOE": np.zeros((2, 3))}
+    found = mbd.inverse_kinematics(model, mbd.Recording([0.0, 1.0], seen))
+    assert "1 markers are no points of the model: 'TOE'" in found.notes
+    assert "the recording lacks markers of the model: 'FIB'" in found.notes
+    with pytest.raises(mbd.ModelError, match=r"1e\+03 times as far from each other on a body .* in meters"):
+        mbd.inverse_kinematics(model, mbd.Recording([0.0, 1.0], {name: 1e3 * place for name, place in seen.items()}))
+
+
 @pytest.mark.slow
 def test_a_frame_of_a_person_with_forty_markers_takes_at_most_a_millisecond():
     body, model, names = person(limbs=())

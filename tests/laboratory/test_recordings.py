@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
-import warnings
 
 import numpy as np
 import pytest
@@ -231,49 +229,6 @@ def test_the_axes_of_a_file_are_turned_to_x_forward_and_y_up(tmp_path, up, forwa
     found = mbd.read(given.save(tmp_path / "m.trc"), up=up, forward=forward)
     assert found["M"][0] == pytest.approx(vector)
     assert any("axes:" in note for note in found.notes)
-
-
-def mutated(data, rng):
-    """A damaged text: bytes and lines changed, doubled, left out."""
-    out = bytearray(data)
-    for _ in range(rng.randint(1, 4)):
-        if not out:
-            break
-        at, kind = rng.randrange(len(out)), rng.randrange(5)
-        if kind == 0:
-            out[at] = rng.randrange(256)
-        elif kind == 1:
-            del out[at : at + rng.randint(1, 20)]
-        elif kind == 2:
-            out[at:at] = bytes(rng.choice(b"0123456789eE+-.,;\t\n\rabcNn=\"'#") for _ in range(rng.randint(1, 5)))
-        elif kind == 3:
-            lines = bytes(out).split(b"\n")
-            k = rng.randrange(len(lines))
-            lines[k:k] = [lines[rng.randrange(len(lines))]]
-            out = bytearray(b"\n".join(lines))
-        else:
-            out = out[:at]
-    return bytes(out)
-
-
-@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 20))])
-def test_a_damaged_file_gives_a_named_error_or_numbers(tmp_path, seed):
-    rng = random.Random(seed)
-    kinds = [("a.trc", TRC), ("a.sto", STO), ("a.mot", STO), ("a.csv", CSV)]
-    refused = 0
-    for _ in range(120):
-        name, text = kinds[rng.randrange(len(kinds))]
-        path = written(tmp_path, name, mutated(text.encode(), rng))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", mbd.MbdWarning)
-            try:
-                found = mbd.read(path)
-            except mbd.TrajectoryError as error:
-                refused += str(error).startswith(name)
-                continue
-        assert np.all(np.diff(found.time) > 0.0)
-        assert all(values.shape[0] == len(found.time) for values in [*found.markers.values(), *found.channels.values()])
-    assert 10 < refused < 118
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -67,3 +67,14 @@ def test_what_does_not_fit_is_named(lengths, more, words):
 def test_lengths_in_millimeters_are_doubted():
     with pytest.warns(mbd.MbdWarning, match="are the lengths in meters"):
         mbd.scale(mbd.human(75.0, 1.80), {"left thigh": 430.0})
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.5])
+def test_a_bent_knee_in_the_static_trial_is_doubted(bend, recwarn):
+    hip = np.tile([0.0, 0.9, -0.1], (10, 1))
+    knee = hip + 0.41 * np.array([np.sin(bend), -np.cos(bend), 0.0])
+    static = mbd.Recording(np.arange(10) / 100.0, {"LHIP": hip, "LKNE": knee, "LANK": knee - [0.0, 0.39, 0.0]})
+    lengths = {"left thigh": ("LHIP", "LKNE"), "left shank": ("LKNE", "LANK")}
+    mbd.scale(mbd.human(75.0, 1.80), lengths, static)
+    said = [str(each.message) for each in recwarn if issubclass(each.category, mbd.MbdWarning)]
+    assert any("left knee is bent by 29°" in text for text in said) == (bend > 0.0)
