@@ -435,6 +435,12 @@ class Straight(Writer):
         head = f"define {linkage}void @{self.symbol}({given}) nounwind{' noinline' if self.apart else ''} {{"
         return "\n".join([head, "entry:", *self.lines, "ret void", "}"])
 
+    def emit(self, text: str) -> str:
+        name = f"%{self.count}"  # a number, which LLVM reads faster than a name
+        self.count += 1
+        self.lines.append(f"{name} = {text}")
+        return name
+
     def number(self, value: float) -> str:
         return f"0x{pack('>d', value).hex()}"
 
@@ -442,10 +448,19 @@ class Straight(Writer):
         return self.emit(f"getelementptr double, ptr %{array}, i64 {place}")
 
     def load(self, array: str, place: int) -> str:
-        return self.emit(f"load double, ptr {self.address(array, place)}")
+        address, name = f"%{self.count}", f"%{self.count + 1}"
+        self.count += 2
+        self.lines += (
+            f"{address} = getelementptr double, ptr %{array}, i64 {place}", f"{name} = load double, ptr {address}"
+        )  # fmt: skip
+        return name
 
     def store(self, value: str, array: str, place: int) -> None:
-        self.lines.append(f"store double {value}, ptr {self.address(array, place)}")
+        address = f"%{self.count}"
+        self.count += 1
+        self.lines += (
+            f"{address} = getelementptr double, ptr %{array}, i64 {place}", f"store double {value}, ptr {address}"
+        )  # fmt: skip
 
     def clear(self, array: str, first: int, count: int) -> None:
         self.needs.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
@@ -453,7 +468,10 @@ class Straight(Writer):
         self.lines.append(f"call void @llvm.memset.p0.i64(ptr align 8 {start}, i8 0, i64 {8 * count}, i1 false)")
 
     def arithmetic(self, sign: str, a: str, b: str) -> str:
-        return self.emit(f"{REAL[sign]} double {a}, {b}")
+        name = f"%{self.count}"
+        self.count += 1
+        self.lines.append(f"{name} = {REAL[sign]} double {a}, {b}")
+        return name
 
     def floor(self, x: str) -> str:
         self.needs.add("declare double @llvm.floor.f64(double)")
