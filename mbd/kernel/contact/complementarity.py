@@ -9,6 +9,9 @@
    from its branches; then only the branch that breaks its law most changes. Multipliers of least norm of dependent
    rows, by which steps judge, may leave limits that other multipliers keep: then a friction slides that need not.
 3. In impacts, whose impulses nothing judges again, those of the cones stand where 2 finds none and no rows conflict.
+4. Where rows depend on each other, a friction may slide at its limit though others that stick hold its place: the
+   accelerations are the same with fewer that slide, so that it sticks. Else which of them slides would change with
+   every restart.
 
 Non-smooth steps with friction in space begin with the cones.
 """
@@ -18,7 +21,7 @@ from __future__ import annotations
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CONFLICT, NO_IMPACT
 from mbd.kernel.contact.branches import is_on, solve_directed
-from mbd.kernel.contact.cone_contacts import solve_cones
+from mbd.kernel.contact.cone_contacts import keep_branches, solve_cones
 from mbd.kernel.contact.cone_directions import misses, turn_directions
 from mbd.kernel.contact.cone_problem import CONE_TOLERANCE
 from mbd.kernel.contact.cones import aim, follows
@@ -49,6 +52,14 @@ def complementarity(K: Balance, level: int) -> int:
     measure_free(K, level)
     if K.n_cones > 0 and K.strategy == 1 and level < 2 and solve_cones(K, level, CONE_TOLERANCE) == 1:
         return 0
+    status = choose_branches(K, level)
+    if status == 0 and level == 0 and K.strategy == 0 and K.n_cones > 0:
+        return stick_where_held(K)
+    return status
+
+
+def choose_branches(K: Balance, level: int) -> int:
+    """Branches that no solution contradicts, by Newton's method and over cones; a status."""
     status = change_branches(K, level, 0)
     if status == CONFLICT or status == NO_IMPACT:
         solve_cones(K, level, NEARLY_SOLVED)  # else from the last branches
@@ -77,6 +88,51 @@ def change_branches(K: Balance, level: int, single: int) -> int:
         elif status != 0 or (change_all(K) if attempt < MAX_NEWTON else change_worst(K)) == 0:
             return status
     return failed
+
+
+def stick_where_held(K: Balance) -> int:
+    """Frictions that may choose and slide though nothing moves there stick, where they all can; a status.
+
+    Where they cannot all branches are those that were found, which are solved for again.
+    """
+    found = False
+    keep_branches(K, True)
+    for f in range(K.n_frictions):
+        if K.loose[f] == 1 and K.sticks[f] == 0 and is_on(K, f) and not follows(K, f) and is_held_still(K, f):
+            p = K.partner[f]
+            K.sticks[f] = 1
+            K.slip[f] = 0.0
+            if p >= 0:
+                K.sticks[p] = 1
+                K.slip[p] = 0.0
+            found = True
+    if not found:
+        return 0
+    if solve_branches(K, 0) == 0 and not is_contradicted(K):
+        return 0
+    keep_branches(K, False)
+    return solve_branches(K, 0)
+
+
+def is_held_still(K: ContactForces, f: int) -> bool:
+    """Whether the acceleration along a friction, and its partner, is round-off of its terms."""
+    row = K.friction_row[f]
+    still = departure(K, row, 1.0, ROUND_OFF) <= 0.0 and departure(K, row, -1.0, ROUND_OFF) <= 0.0
+    if still and K.partner[f] >= 0:
+        row = K.friction_row[K.partner[f]]
+        still = departure(K, row, 1.0, ROUND_OFF) <= 0.0 and departure(K, row, -1.0, ROUND_OFF) <= 0.0
+    return bool(still)
+
+
+def is_contradicted(K: ContactForces) -> bool:
+    """Whether a contact or friction that may choose breaks its law in the solution."""
+    largest = largest_impulse(K)
+    found = False
+    for f in range(K.n_frictions):
+        found = found or (K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f, largest) > 0.0)
+    for c in range(K.n_contacts):
+        found = found or (K.free[c] > 0 and contact_fault(K, c, largest) > 0.0)
+    return found
 
 
 def solve_branches(K: Balance, level: int) -> int:

@@ -23,7 +23,7 @@ from mbd.kernel.records import Frictions, Guards, Kernel
 from mbd.kernel.stepping.trial_step import try_step, turns
 
 __all__ = [
-    "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "shorter_turn", "slides_at_first", "slides_on",
+    "LONGER", "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "shorter_turn", "slides_at_first", "slides_on",
     "slides_until_event",
 ]  # fmt: skip
 

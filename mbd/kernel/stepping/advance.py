@@ -19,6 +19,7 @@ from mbd.kernel.codes import (
     STICK,
 )
 from mbd.kernel.contact.cone_steps import (
+    LONGER,
     SHORTER,
     TURNS_AWAY,
     approached_end,
@@ -364,6 +365,7 @@ def take_step(K: Kernel) -> int:
     full = h
     if K.n_cones > 0 and K.strategy == 1:
         hold_for_step(K, h)
+    begun = K.begun_step / LONGER
     status = tried_step(K, h, t1)
     if K.n_cones > 0 and K.strategy == 0:
         released = False
@@ -394,6 +396,8 @@ def take_step(K: Kernel) -> int:
         h = K.step_taken
         t1 = t + h
         cut = cut and h >= full
+    if 0.0 < K.begun_step <= begun:  # they do not grow: short ones may fail by round-off where a whole one does not
+        K.begun_step = 0.0
     if K.adaptive == 1 or K.paired_step == FIRST or K.paired_step == ALONE:
         full = h
     K.n_steps += 1
