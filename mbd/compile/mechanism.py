@@ -17,7 +17,7 @@ from mbd.compile.backend import Backend, Function, Functions, backend as choose_
 from mbd.compile.cache import key_of
 from mbd.compile.energies import Energies
 from mbd.compile.layout import Layout
-from mbd.compile.orders import elimination_order, may_pay
+from mbd.compile.orders import Filled, elimination_order, may_pay
 from mbd.compile.postponed import Postponed
 from mbd.compile.remembered import Facts, Remembered
 from mbd.equations import programs
@@ -143,6 +143,10 @@ class Mechanism:
     def _accelerations(self) -> list[Node]:
         return programs.accelerations(self.equations)
 
+    @cached_property
+    def _filled(self) -> Filled:
+        return Filled.of(self._accelerations, self.layout.n, self.layout.n_rows)
+
     def free_rates(self) -> Function | None:
         """Accelerations of a tree on which no row acts, without M; made on first use, None where only M leads to them.
 
@@ -228,7 +232,7 @@ class Mechanism:
 
                 def make() -> Made:
                     order = None
-                    pays = may_pay(self._accelerations, n, self.layout.n_rows, sorted(rows))
+                    pays = may_pay(self._filled, n, sorted(rows))
                     if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
                         order = self._order(self._of(mode, programs.newton), rows)
                     found = None
@@ -290,7 +294,8 @@ class Mechanism:
 
     def _order(self, tangent: Sequence[Node], rows: Sequence[int]) -> list[int] | None:
         """The order in which the matrices of these rows are eliminated, None where it does not pay."""
-        found = elimination_order(tangent, self._accelerations, self.layout.n, self.layout.n_rows, sorted(rows))
+        n, n_rows = self.layout.n, self.layout.n_rows
+        found = elimination_order(tangent, self._accelerations, self._filled, n, n_rows, sorted(rows))
         return None if found is None else list(found.tolist())
 
     def _add(

@@ -16,6 +16,7 @@ Z, Z, Z               where its value is: in the tangent; in the program `accele
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ import numpy as np
 from mbd.tape.node import Node
 from mbd.tape.ordering import Order, order
 
-__all__ = ["FEWER", "SMALLEST", "elimination_order", "flat_order", "may_pay"]
+__all__ = ["FEWER", "SMALLEST", "Filled", "elimination_order", "flat_order", "may_pay"]
 
 SMALLEST = 21
 """Unknowns from which on an order is looked for: below, loops over dense rows take no longer [-]."""
@@ -31,21 +32,21 @@ FEWER = 4
 """How many times fewer operations than dense elimination it must take [-]."""
 
 
-def may_pay(accelerations: Sequence[Node], n: int, n_rows: int, rows: Sequence[int]) -> bool:
+def may_pay(filled: Filled, n: int, rows: Sequence[int]) -> bool:
     """Whether there may be an order that pays, as far as size and entries of the matrices of accelerations tell."""
     size = n + len(rows)
-    return size >= SMALLEST and 4 * len(_of_accelerations(accelerations, n, n_rows, rows)) <= size * size
+    return size >= SMALLEST and 4 * len(filled.places(n, rows)) <= size * size
 
 
 def elimination_order(
-    tangent: Sequence[Node], accelerations: Sequence[Node], n: int, n_rows: int, rows: Sequence[int]
+    tangent: Sequence[Node], accelerations: Sequence[Node], filled: Filled, n: int, n_rows: int, rows: Sequence[int]
 ) -> Any | None:
     """The order for the outputs of `programs.newton` and `programs.accelerations`, None where it does not pay."""
     size = n + len(rows)
-    if not may_pay(accelerations, n, n_rows, rows):
+    if not may_pay(filled, n, rows):
         return None
     places = {divmod(k, size) for k, node in enumerate(tangent[: size * size]) if not node.is_zero}
-    places |= _of_accelerations(accelerations, n, n_rows, rows)
+    places |= filled.places(n, rows)
     numbers = set[tuple[int, int]]()
     for i, j in places:
         there = [tangent[i * size + j], *(accelerations[k] for k in _both(i, j, n, n_rows, rows) if k >= 0)]
@@ -59,18 +60,36 @@ def elimination_order(
     return flat_order(found, n, n_rows, rows)
 
 
-def _of_accelerations(accelerations: Sequence[Node], n: int, n_rows: int, rows: Sequence[int]) -> set[tuple[int, int]]:
-    """Places of what is not zero in [M R; B 0] and [M Bᵀ; B 0]."""
-    at_R, at_B, column = n * n + n, n * n + n + n * n_rows, {row: n + k for k, row in enumerate(rows)}
-    places = {divmod(k, n) for k, node in enumerate(accelerations[: n * n]) if not node.is_zero}
-    for k, node in enumerate(accelerations[at_R : at_B + n * n_rows]):
-        if not node.is_zero:
-            (i, row) = divmod(k, n_rows) if k < n * n_rows else divmod(k - n * n_rows, n)[::-1]
-            if row in column:
-                places.add((i, column[row]))
-                if k >= n * n_rows:
-                    places.add((column[row], i))
-    return places
+@dataclass(frozen=True)
+class Filled:
+    """Places of what is not zero in M, and coordinates that R and B of each row concern, which serve all modes."""
+
+    M: frozenset[tuple[int, int]]
+    R: tuple[frozenset[int], ...]
+    B: tuple[frozenset[int], ...]
+
+    @classmethod
+    def of(cls, accelerations: Sequence[Node], n: int, n_rows: int) -> Filled:
+        """These of the outputs of `programs.accelerations`."""
+        at_R, at_B = n * n + n, n * n + n + n * n_rows
+        known = [k for k, node in enumerate(accelerations[: at_B + n_rows * n]) if not node.is_zero]
+        R, B = ([set[int]() for _ in range(n_rows)] for _ in range(2))
+        for k in known:
+            if k >= at_B:
+                row, i = divmod(k - at_B, n)
+                B[row].add(i)
+            elif k >= at_R:
+                i, row = divmod(k - at_R, n_rows)
+                R[row].add(i)
+        M = frozenset(divmod(k, n) for k in known if k < n * n)
+        return cls(M, tuple(map(frozenset, R)), tuple(map(frozenset, B)))
+
+    def places(self, n: int, rows: Sequence[int]) -> set[tuple[int, int]]:
+        """Places of what is not zero in [M R; B 0] and [M Bᵀ; B 0] of some rows."""
+        found = set(self.M)
+        for column, row in enumerate(rows, n):
+            found |= {(i, column) for i in self.R[row] | self.B[row]} | {(column, i) for i in self.B[row]}
+        return found
 
 
 def _both(i: int, j: int, n: int, n_rows: int, rows: Sequence[int]) -> tuple[int, int]:

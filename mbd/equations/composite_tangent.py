@@ -34,7 +34,7 @@ from mbd.equations.kinematic_proxies import Wrench
 from mbd.equations.kinematics import Moving
 from mbd.equations.placement import Placement
 from mbd.scope import Rotation, Triple
-from mbd.tape.derivatives import jvp, jvps
+from mbd.tape.derivatives import Sweeps, jvp
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["Branches", "turns_by_numbers"]
@@ -143,6 +143,8 @@ class Branches:
         for body in reversed(self._bodies):
             self._join(body)
         self._ways = [way for body in self._bodies for way in self._ways_of(body)]
+        self._above = [set(way.body.path) for way in self._ways]  # numbers of the coordinates that move it
+        self._sweeps = Sweeps()
 
     def _ground(self, body: Moving, vector: Triple | Flat) -> Flat:
         """A vector of a body in ground axes."""
@@ -288,16 +290,17 @@ class Branches:
     ) -> None:
         """S_ij of one j: rows beyond its joint, of its joint, and of joints on the way to the root."""
         own, c_K, lift = self._known[way.body], self._inputs.c[1], self._placement.tape.lift
+        below = set(way.body.path)
         change = _minus(_times(way.turn, own.moved), _times(own.mass, way.push))  # of the force on the branch, by −ẑ ×
         moment = way.turn * moment - _dot(own.first, way.push)
         above = moment + c_K * _cross(way.slide, force) + _dot(own.joint, change)
-        for row, (first, second) in zip(self._ways, beyond, strict=True):
+        for row, above_row, (first, second) in zip(self._ways, self._above, beyond, strict=True):
             if row.body is way.body:
                 entry = row.turn * moment - _dot(_quarter(row.slide), change)
                 entry = entry + c_K * _dot(row.slopes[way.number], force)
-            elif way.number in row.body.path:
+            elif way.number in above_row:
                 entry = way.turn * first - _dot(second, way.given)
-            elif row.number in way.body.path:
+            elif row.number in below:
                 entry = row.turn * above - _dot(row.arm, change)
             else:
                 continue
@@ -313,23 +316,38 @@ class Branches:
         parts = [lift(part) for pull in pulls for part in (pull.ground[0], pull.ground[1], pull.torque[2])]
         nodes = [*parts, *others]
         directions = self._inputs.directions(partials(self._placement, nodes))
+        places = [
+            _plus(
+                self._known[pull.carrier].joint, self._ground(pull.carrier, difference(pull.place, pull.carrier.shift))
+            )
+            for pull in pulls
+        ]
         return [
-            [*self._generalized(pulls, found[: len(parts)]), *found[len(parts) :]] for found in jvps(nodes, directions)
+            [*self._generalized(pulls, places, found[: len(parts)]), *found[len(parts) :]]
+            for found in self._sweeps(nodes, directions)
         ]
 
-    def _generalized(self, pulls: Sequence[Wrench], parts: Sequence[Node]) -> list[Node]:
-        """Forces (x, y) and torques on bodies, in the places of `pulls`, as generalized forces (n_v)."""
-        sums: dict[Moving, tuple[Flat, Scalar]] = {body: (NOWHERE, 0.0) for body in self._bodies}
-        for k, pull in enumerate(pulls):
-            body, (x, y, torque) = pull.carrier, parts[3 * k : 3 * k + 3]
-            place = _plus(self._known[body].joint, self._ground(body, difference(pull.place, body.shift)))
-            force, moment = sums[body]
-            sums[body] = _plus(force, (x, y)), moment + (torque + _cross(place, (x, y)))
-        result = [self._placement.tape.zero] * len(self._ways)
-        for way in reversed(self._ways):
+    def _generalized(self, pulls: Sequence[Wrench], places: Sequence[Flat], parts: Sequence[Node]) -> list[Node]:
+        """Forces (x, y) and torques on bodies, at the `places` of `pulls`, as generalized forces (n_v).
+
+        Bodies without any are passed over: of many that move apart from each other a direction concerns few.
+        """
+        sums: dict[Moving, tuple[Flat, Scalar]] = {}
+        zero = self._placement.tape.zero
+        for k, (pull, place) in enumerate(zip(pulls, places, strict=True)):
+            x, y, torque = parts[3 * k : 3 * k + 3]
+            if x is zero and y is zero and torque is zero:
+                continue
+            force, moment = sums.get(pull.carrier, (NOWHERE, 0.0))
+            sums[pull.carrier] = _plus(force, (x, y)), moment + (torque + _cross(place, (x, y)))
+        result = [zero] * len(self._ways)
+        for way in reversed(self._ways) if sums else ():
+            if way.body not in sums:
+                continue
             force, moment = sums[way.body]
             result[way.number] = self._placement.tape.lift(way.turn * moment + _dot(way.arm, _quarter(force)))
-            if way.body.edge is not None and way.number == way.body.edge.first and way.body.parent in sums:
-                before, known = sums[way.body.parent]
-                sums[way.body.parent] = _plus(before, force), known + moment
+            parent = way.body.parent
+            if way.body.edge is not None and way.number == way.body.edge.first and parent in self._known:
+                before, known = sums.get(parent, (NOWHERE, 0.0))
+                sums[parent] = _plus(before, force), known + moment
         return result

@@ -105,9 +105,9 @@ class Dynamics:
         n = len(direct)
         S = []
         for line in branches.changes(pulls, [*direct, *rests]):
-            S.append([*(a + b for a, b in zip(line[:n], line[n : 2 * n], strict=True)), *line[2 * n :]])
+            S.append([*_sums(line[:n], line[n : 2 * n]), *line[2 * n :]])
         for column, entries in zip(S[:n], branches.tangent([*self._inertia, *pulls]), strict=True):
-            column[:n] = [a + b for a, b in zip(entries, column[:n], strict=True)]
+            column[:n] = _sums(entries, column[:n])
         return S
 
     def _branches(self, n_z: int) -> Branches | None:
@@ -196,3 +196,8 @@ class Dynamics:
                 center = self._views.position(self._placement.point(body, mass.center))
                 energy = energy - mass.mass * dot(gravity, center)
         return self._tape.lift(energy)
+
+
+def _sums(one: Sequence[Node], other: Sequence[Node]) -> list[Node]:
+    """Sums of many nodes, most of which are zero."""
+    return [b if a.is_zero else a if b.is_zero else a + b for a, b in zip(one, other, strict=True)]

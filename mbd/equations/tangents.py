@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from mbd.equations.equations import Equations
 from mbd.equations.factoring import factored
 from mbd.equations.inputs import Inputs
-from mbd.tape.derivatives import jvps, live
+from mbd.tape.derivatives import Sweeps, live
 from mbd.tape.node import Node
 
 __all__ = ["Columns", "Forces", "seeded", "tangent"]
@@ -55,7 +55,8 @@ def seeded(equations: Equations, r: Sequence[Node]) -> Columns:
     known: Sequence[Mapping[Node, Node]] = [{} for _ in inputs.x]
     if equations.geometry is not None:
         known = equations.geometry.partials(r)
-    plain = [entry for column in jvps(r, inputs.directions(known)) for entry in column]
+    sweeps: Sweeps = equations.memory.setdefault("sweeps of tangents", Sweeps())
+    plain = [entry for column in sweeps(r, inputs.directions(known)) for entry in column]
     entries = min(plain, factored(plain, inputs.c), key=lambda S: len(live([*r, *S])))
     return [entries[j * len(r) : (j + 1) * len(r)] for j in range(len(r))]
 

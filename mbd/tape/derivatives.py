@@ -110,6 +110,35 @@ def jvps(outputs: Sequence[Node], directions: Iterable[Mapping[Node, Scalar]]) -
     return results
 
 
+class Sweeps:
+    """`jvps` of more and more outputs in the same directions: what was differentiated before is not once more.
+
+    Directions may name more nodes each time. A node has one derivative in each, whenever it is asked for.
+    """
+
+    def __init__(self) -> None:
+        self._dots: list[dict[int, Node]] = []
+        self._pushed: set[int] = set()
+
+    def __call__(self, outputs: Sequence[Node], directions: Sequence[Mapping[Node, Scalar]]) -> list[list[Node]]:
+        """The same as `jvps`."""
+        if not outputs:
+            return [[] for _ in directions]
+        given = {node.index for seeds in directions for node in seeds}
+        if len(self._dots) != len(directions) or not given.isdisjoint(self._pushed):  # it is named for the first time
+            self._dots, self._pushed = [{} for _ in directions], set()
+        tape, pushed = outputs[0].tape, self._pushed
+        order = [node for node in live(outputs, given) if node.args and node.op not in _FLAT]
+        order = [node for node in order if node.index not in given and node.index not in pushed]
+        results = []
+        for dots, seeds in zip(self._dots, directions, strict=True):
+            dots.update({node.index: tape.lift(seed) for node, seed in seeds.items()})
+            _push_forward(tape, order, dots)
+            results.append([dots.get(node.index, tape.zero) for node in outputs])
+        pushed.update(node.index for node in order)
+        return results
+
+
 def _push_forward(tape: Tape, order: Sequence[Node], dots: dict[int, Node]) -> None:
     """Fill `dots`, which holds the derivatives of some nodes by their index, for all nodes in `order`."""
     zero, mul, get = tape.zero, tape.mul, dots.get

@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from mbd.tape.derivatives import gradient, jvp, jvps, vjp
+from mbd.tape.derivatives import Sweeps, gradient, jvp, jvps, vjp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.functions import atan2, log, maximum, minimum, sqrt, where
 from mbd.tape.node import Tape
@@ -68,6 +68,21 @@ def test_several_directions_at_once_are_those_one_by_one():
     both = jvps(outputs, [{x: 1.0}, {y: x, x: 2.0}])
     assert all(a is b for a, b in zip(both[0], jvp(outputs, {x: 1.0}), strict=True))
     assert all(a is b for a, b in zip(both[1], jvp(outputs, {y: x, x: 2.0}), strict=True))
+
+
+@given(programs, directions)
+def test_derivatives_of_more_and_more_outputs_are_those_of_all_at_once(program, direction):
+    """The same nodes, as long as what was asked before has not been named since."""
+    graph, sweeps = build(program), Sweeps()
+    seeds = [dict(zip(graph.inputs, direction, strict=True)), {graph.inputs[0]: 1.0}]
+    for first, last in ((2, 3), (4, 8), (0, 8), (0, 2)):
+        outputs = graph.nodes[-8:][first:last]
+        for found, known in zip(sweeps(outputs, seeds), jvps(outputs, seeds), strict=True):
+            assert all(one is other for one, other in zip(found, known, strict=True))
+    named = [node for node in graph.nodes if node.args][:1]
+    more = [{**seeds[0], **dict.fromkeys(named, 0.5)}, seeds[1]]
+    for found, known in zip(sweeps(graph.nodes[-8:], more), jvps(graph.nodes[-8:], more), strict=True):
+        assert all(one is other for one, other in zip(found, known, strict=True))
 
 
 def test_a_seeded_node_is_independent_of_the_others():
