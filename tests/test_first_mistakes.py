@@ -380,7 +380,6 @@ def test_an_event_that_ends_a_run_is_no_success(tmp_path):
     run = mbd.simulate(model, mbd.assemble(model, {"pin.angle": 0.1}, backend="python"), dt=0.01, until=2.0,
                        backend="python")  # fmt: skip
     assert "success" not in str(run) and re.search(r"outcome +ended by 'fall' at t = ", str(run))
-    pytest.importorskip("pandas")
     lines = run.to_csv(tmp_path / "run", ["pin.angle"]).read_text().splitlines()
     assert lines[0].split(",")[1] == "pin.angle" and len(lines) == 1 + len(run.time)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import sys
 
 import numpy as np
 import pytest
@@ -151,3 +152,17 @@ def test_other_files_and_names_are_refused(run, tmp_path):
         with pytest.raises(mbd.MbdError, match=text):
             run.to_sto(tmp_path / path, names)
     assert not list(tmp_path.iterdir())
+
+
+def test_csv_files_are_those_of_pandas_and_need_none(tmp_path, monkeypatch):
+    pytest.importorskip("pandas")
+    model = mbd.Model("arm")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
+    model.connect(pin := mbd.Revolute("pin", model.ground.origin, rod.start))
+    model.constrain(mbd.Mode("phase", ("up", "down"), transitions=[mbd.Transition("up", "down", after=0.05)]))
+    model.apply(mbd.Motor("drive", pin, lambda t: 1e-9 * t, arguments=("t",)))
+    run = mbd.simulate(model, mbd.assemble(model, position={"pin.angle": 0.5}), dt=1e-2, until=0.1)
+    names = ["pin.angle", "phase", "rod.end"]
+    expected = run.to_dataframe(names).to_csv(lineterminator="\n")
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    assert run.to_csv(tmp_path / "run", names).read_text() == expected

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,9 +65,18 @@ def dataframe(
 def csv_file(
     run: Trajectory, path: str | Path, names: Sequence[str] | None, at: ArrayLike | None, side: OneSide | None
 ) -> Path:
-    """See `Trajectory.to_csv`."""
-    target, frame = named_file(path, ".csv"), dataframe(run, names, at, side)
-    write_whole(target, frame.to_csv)
+    """See `Trajectory.to_csv`; the text is that which pandas writes of the same table, and needs no pandas."""
+    target = named_file(path, ".csv")
+    time, columns = columns_of(run, names, at, side)
+
+    def write(partial: Path) -> None:
+        cells = [["" if x != x else x for x in values.tolist()] for values in (time, *columns.values())]
+        with partial.open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(["time", *columns])
+            table.writerows(zip(*cells, strict=True))
+
+    write_whole(target, write)
     return target
 
 
