@@ -30,9 +30,13 @@ def couples(K: DependentRows, u: int, v: int) -> bool:
 
 
 def find_islands(K: DependentRows, m: int) -> int:
-    """Numbers of the islands of coordinates and of the m rows in K.rows, into K.island; how many islands there are."""
+    """Numbers of the islands of coordinates and of the m rows in K.rows, into K.island; how many islands there are.
+
+    Once every unknown has its island, which in one mechanism takes a few rows, nothing else is looked at.
+    """
     size = K.n + m
     count = 0
+    left = size
     for u in range(size):
         K.island[u] = -1
     for first in range(size):
@@ -40,13 +44,15 @@ def find_islands(K: DependentRows, m: int) -> int:
             continue
         K.island[first] = count
         K.members[0] = first
+        left -= 1
         waiting = 1
-        while waiting > 0:
+        while waiting > 0 and left > 0:
             waiting -= 1
             u = K.members[waiting]
             for v in range(size):
                 if K.island[v] < 0 and couples(K, u, v):
                     K.island[v] = count
+                    left -= 1
                     K.members[waiting] = v
                     waiting += 1
         count += 1
