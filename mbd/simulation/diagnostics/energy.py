@@ -194,7 +194,8 @@ class EnergyWatch(EnergyFindings):
         anchors = np.tile(run.kernel.anchors[: run.kernel.n_anchors], (len(chosen), 1))
         inputs = ModelColumns.inputs(record.rows(anchors))
         self.rows += len(chosen)
-        return run.mechanism.energies(inputs, record.parameters_at(chosen))
+        kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
+        return kinetic, potential
 
     def _overflow(self, run: RunData) -> None:
         """Energies beyond the largest number: the scheme's own where the run began with less, else not judged."""
