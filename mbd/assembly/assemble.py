@@ -37,13 +37,12 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.joints.orientations import ROUNDED
+from mbd.kernel.stepping.begin_run import BELOW
 from mbd.notes import doubt
 from mbd.state import State, of_model
 
 __all__ = ["assemble"]
 
-BELOW = 1e-6
-"""Depth [m, rad] below which an open contact is reported to start inside the ground."""
 LIFTED = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
 

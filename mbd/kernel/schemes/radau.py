@@ -48,6 +48,7 @@ from mbd.kernel.singular.stages import (
     spans_singularity,
 )
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms
+from mbd.kernel.stepping.mass_ratios import SETTLED
 from mbd.kernel.stepping.restart import (
     lower_to_step,
     measure_accepted,
@@ -73,8 +74,6 @@ PATIENT = 6
 STUCK = 0.9
 """Part of the residual left by a correction above which it falls no more; between both it falls slowly."""
 
-SETTLED = 1e-8
-"""Part of the largest rate that a correction of residuals that pass may change without another look [-]."""
 NEGLIGIBLE = 1e-2
 """The same over the square of the first correction, the size of the step's own error [-]."""
 

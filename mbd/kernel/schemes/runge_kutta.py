@@ -17,6 +17,7 @@ from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, INCREMENT_RATES, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
+from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import Balance, DependentRows, Equations, Kernel, Memory, SingularSteps, Steps
 from mbd.kernel.schemes.contract import Abilities, Scheme
@@ -40,8 +41,6 @@ from mbd.kernel.tangent_rules import follow_rates, is_differentiated
 
 __all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
-STILL = 1e-9
-"""Speed [m/s, rad/s] below which nothing moves: what the projection changes of it is round-off."""
 MOST_RETURNS = 8
 """Newton corrections of positions onto the rows after a step; it takes one or two [-]."""
 

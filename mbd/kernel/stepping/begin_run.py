@@ -14,7 +14,7 @@ __all__ = ["begin_run", "judge_start"]
 LONG_AGO = float("-inf")
 """When the last switch was, before any [s]."""
 BELOW = 1e-6
-"""Depth inside a surface from which an open contact cannot start, as `mbd.assembly.assemble.BELOW` [m, rad]."""
+"""Depth inside a surface from which an open contact cannot start, and a start is reported [m, rad]."""
 INCONSISTENT, ROUND_OFF = 1e-6, 1e-8
 """Residuals of rows, as in `mbd.assembly.consistency`."""
 CLOSE, SLOW = 1e-8, 1e-9

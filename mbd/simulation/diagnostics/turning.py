@@ -14,6 +14,7 @@ from mbd.kernel.stepping.charts import QUARTER_TURN
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
+from mbd.simulation.run.stored import BLOCK
 from mbd.tape.derivatives import live
 
 __all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
@@ -22,8 +23,6 @@ HALF_TURN = np.pi
 """Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
 SIDEWAYS = 1.7321
 """Largest length of a vector over its largest component, a little more than √3 [-]."""
-BLOCK = 4096
-"""Rows that are looked at together."""
 
 
 def blocks(values: Matrix) -> Iterator[Matrix]:

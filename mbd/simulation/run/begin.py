@@ -7,13 +7,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.assembly.assemble import BELOW
 from mbd.assembly.consistency import residuals
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.machines import first_anchors, store_first
 from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture
 from mbd.errors import ModelError
+from mbd.kernel.stepping.begin_run import BELOW
 from mbd.simulation.parameters import residuals_now, violations_now
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of_end

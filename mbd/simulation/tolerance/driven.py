@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Equations, Row
-from mbd.results.balance import Balance
+from mbd.results.balance import SAMPLES, Balance
 from mbd.results.record import Rows
 from mbd.tape.derivatives import live, substitute
 
@@ -34,8 +34,6 @@ LEAST = 1e-5
 """Force of a drive, over the terms that cancel in it, below which it is measured by these [-]."""
 FREE = 1e-9
 """Part of a coordinate in a motion that all rows allow from which it is free [-]."""
-SAMPLES = 16
-"""Rows of a run at which the rank of the constraints is judged, at most [-]."""
 BENT = 64
 """Rows of a run that are compared with the balance, at most [-]."""
 
