@@ -10,6 +10,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError
 from mbd.laboratory.axes import axis_of
+from mbd.laboratory.c3d_parameters import check_parameters
 from mbd.laboratory.recording import PlateRecord, Recording
 from mbd.laboratory.units import factor_of
 from mbd.results.tables import library
@@ -33,6 +34,7 @@ def read_c3d(path: Path) -> Recording:
         for a file that ezc3d does not read.
     """
     ezc3d = library("ezc3d", "c3d", "reading .c3d")
+    check_parameters(path)
     try:
         file = ezc3d.c3d(str(path), extract_forceplat_data=True)
     except Exception:

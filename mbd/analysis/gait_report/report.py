@@ -120,7 +120,7 @@ class GaitReport:
         return [
             (
                 kind if side == BOTH else f"{kind}, {side}",
-                *(_text(walk.spent().get((side, kind), 0.0)) for walk in self.walks),
+                *(_text(walk.spent().get((side, kind), 0.0) if walk.energies else np.nan) for walk in self.walks),
             )
             for side, kind in ordered
         ]
