@@ -127,6 +127,7 @@ class Law:
     while_closed : name of a contact by rows that must be closed for rows on velocities to hold
     rates : (z, ż) of its first-order states ``scope.state(self.name, field, initial)``. They follow their rates at all
         times, also while a contact is open; forces, limits and `elastic` may depend on z, rows and gaps may not
+    foot : places (x, y, z) of what touches while closed and while open, if no body tells them: 'name.foot.x' in results
     rates_while_open : False where the states of a force law stand still while it is open
     """
 
@@ -139,3 +140,4 @@ class Law:
     while_closed: str | None = None
     rates: Sequence[tuple[Node, Scalar]] = field(default=())
     rates_while_open: bool = True
+    foot: tuple[Sequence[Scalar], Sequence[Scalar]] | None = None

@@ -44,8 +44,9 @@ class SpringLeg(Constraint):
     length : l > 0 [m]
     touchdown_angle : α of the leg in flight, 0 < α < π [rad]; beyond π/2 the foot is behind the hip
 
-    Results: 'name.force' its part along y, 'name.thrust' that along x [N]. In the ledger both have a line of the kind
-    'penalty', whose sum is what its spring gives; what it holds is part of the energy of a gait.
+    Results: 'name.force' its part along y, 'name.thrust' that along x [N], 'name.foot' where its foot is [m]. In the
+    ledger both have a line of the kind 'penalty', whose sum is what its spring gives; what it holds is part of the
+    energy of a gait.
     """
 
     name: str
@@ -103,8 +104,9 @@ class SpringLeg(Constraint):
         (foot,) = hold([x + length * cos(angle)])
         r = sqrt((x - foot) * (x - foot) + y * y)
         tension = k * (length - r) / r
+        swung = (x + length * cos(angle), y - length * sin(angle), 0.0)
         return Law(
             contact=Closing(y - length * sin(angle), opens_on="pull"), push=tension * y,
             elastic=0.5 * k * (length - r) * (length - r),
-            drags=[Drag(motion.velocity[0], tension * (x - foot), "thrust")],
+            drags=[Drag(motion.velocity[0], tension * (x - foot), "thrust")], foot=((foot, 0.0, 0.0), swung),
         )  # fmt: skip

@@ -255,8 +255,17 @@ def _by_force(
     return Contact(
         word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,
         generalized=generalized, opens_on=at.opens_on, unit=f"{at.unit}/s" if fast else at.unit, drags=tuple(drags),
-        is_velocity=fast, undefined=_undefined(word),
+        is_velocity=fast, undefined=_undefined(word), foot=_foot(law, scope, number),
     )  # fmt: skip
+
+
+def _foot(law: Law, scope: DerivationScope, number: int) -> tuple[Node, ...]:
+    """The place of what touches, by the switch of the contact; none where a body tells it."""
+    if law.foot is None:
+        return ()
+    switch = scope.tape.input("switch", number)
+    pairs = zip(*law.foot, strict=True)
+    return tuple(switch * scope.real(down) + (1.0 - switch) * scope.real(up) for down, up in pairs)
 
 
 def _undefined(word: Constraint) -> str:

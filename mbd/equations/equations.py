@@ -118,6 +118,7 @@ class Contact:
         rows those of smooth friction, which follow the multiplier of its normal row
     is_velocity : whether its gap is a velocity, along which its force acts then
     undefined : what it means where the gap is no number, for errors
+    foot : the place (x, y, z) where it touches, if no body tells it
     """
 
     name: str
@@ -139,6 +140,7 @@ class Contact:
     is_velocity: bool = False
     undefined: str = ""
     released_in: tuple[str, ...] = ()
+    foot: tuple[Node, ...] = ()
 
 
 @dataclass(frozen=True)

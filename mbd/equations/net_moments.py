@@ -96,7 +96,7 @@ def contact_places(equations: Equations) -> list[str]:
     known = {c: p for shape in equations.shapes for c, p in zip(shape.contacts, shape.points, strict=True)}
     for contact in equations.contacts:
         captured = {node.index for node in contact.captured}
-        found.append(known.get(contact.name, ""))
+        found.append(f"{contact.name}.foot" if contact.foot else known.get(contact.name, ""))
         for frame, position in ({} if found[-1] else positions).items():
             moving = {node.index for node in position if not node.is_constant}
             if captured == moving if captured else contact.gap is position[1]:

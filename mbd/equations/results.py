@@ -117,6 +117,8 @@ def offer_contacts(outputs: Outputs, tape: Tape, rows: Sequence[Row], contacts: 
     """Force (≥ 0 pushes), friction (of the ground on the body), gap and its rate."""
     for number, contact in enumerate(contacts):
         outputs.value(f"{contact.name}.gap", contact.gap)
+        if contact.foot:
+            outputs.triple(f"{contact.name}.foot", partial(tuple, contact.foot))
         outputs.value(f"{contact.name}.gap_rate", contact.gap_rate)
         if contact.force is not None:
             outputs.value(f"{contact.name}.force", tape.input("switch", number) * contact.force)

@@ -315,7 +315,9 @@ class ReturnMap:
             return {}
         out = np.zeros(3 * len(self.feet))
         y = np.concatenate([state.v, state.z])
-        self._where(self.mechanism.block(0.0, state.q, y, state.anchors), self.vector(values), out)
+        closed = np.flatnonzero(self.manager.flags(state.mode.closed))
+        block = self.mechanism.block(0.0, state.q, y, state.anchors, closed.tolist())
+        self._where(block, self.vector(values), out)
         return dict(zip(self.feet, out.reshape(-1, 3), strict=True))
 
     @property

@@ -145,8 +145,9 @@ def forces_at(run: Trajectory, side: Side, times: Vector, at: When = "right") ->
     normal, forward = np.zeros(len(times)), np.zeros(len(times))
     for name in side.contacts:
         normal = normal + np.nan_to_num(named[f"{name}.force"])
-        if f"{name}.friction.forward" in run:
-            forward = forward + np.nan_to_num(named[f"{name}.friction.forward"])
+        for along in ("friction.forward", "thrust"):  # of a foot, of a spring leg
+            if f"{name}.{along}" in run:
+                forward = forward + np.nan_to_num(named[f"{name}.{along}"])
     for grip in grips_of(run, side):
         forward = forward + np.nan_to_num(named[f"{grip}{'.forward' * (f'{grip}.forward.force' in run)}.force"])
     return {"normal force": normal, "forward force": forward}

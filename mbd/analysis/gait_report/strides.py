@@ -19,6 +19,9 @@ __all__ = ["Interval", "Side", "Stride", "base_name", "of_side", "sides_of", "st
 
 Interval = tuple[float, float]
 
+JUST_STRUCK = 1e-6
+"""Share of its largest force below which a foot of a force law has just struck [-]."""
+
 
 @dataclass(frozen=True)
 class Stride:
@@ -73,7 +76,8 @@ def sides_of(run: Trajectory, names: Sequence[str], most: int | None = None) -> 
     """The sides of a run with their strides, or the last ones of them.
 
     A strike is a foot's first touch after one of the other side; where a foot touches more than once between two
-    strikes, it leaves where its longest time in the air begins. A foot that stands alone at the start has just struck.
+    strikes, it leaves where its longest time in the air begins. A foot that stands alone at the start has just struck,
+    unless it is one of a force law that pushes already.
 
     Raises
     ------
@@ -133,12 +137,20 @@ def _strikes(
     touches = sorted((begin, side) for side, found in stances.items() for begin, _ in found)
     strikes: list[tuple[float, str, Matrix]] = []
     for time, side in touches:
-        if (time == start and len(standing) > 1) or (strikes and strikes[-1][1] == side):
+        late = time == start and (len(standing) > 1 or _pushes_at_start(run, contacts[side]))
+        if late or (strikes and strikes[-1][1] == side):
             continue
         rows = [event for event in run.events if event.kind == "closed" and event.time == time]
         own = next((event.name for event in rows if event.name in contacts[side]), contacts[side][0])
         strikes.append((time, side, np.asarray(run.at([time])[places[own]][0])))
     return strikes
+
+
+def _pushes_at_start(run: Trajectory, contacts: Sequence[str]) -> bool:
+    """Whether a foot of a force law pushes in the first row, so that it has struck before."""
+    own = [each.name for each in run.facts.contacts if each.name in contacts and each.kind == "penalty"]
+    forces = [run[f"{name}.force"] for name in own]
+    return any(force[0] > JUST_STRUCK * np.max(force) for force in forces)
 
 
 def strides_between(
