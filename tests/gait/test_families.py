@@ -58,6 +58,23 @@ def test_a_runner_of_a_given_energy_runs_as_by_hand(energy: float) -> None:
     assert gait.residual["J"] < 1e-7
 
 
+@pytest.mark.parametrize(("near", "stability"), [(0.95, "stable"), (1.32, "unstable")])
+def test_a_runner_of_one_energy_has_a_low_stable_gait_and_a_high_unstable_one(near: float, stability: str) -> None:
+    """67°, 1860 J: the two fixed points of the apex map."""
+    model, _ = runner()
+    angle, speed = math.radians(67.0), speed_at(near, 1860.0)
+    start = mbd.assemble(model, {"place.y": near}, {"place.x": speed, "place.y": 0.0})
+    gait = mbd.limit_cycle(model, start, section="apex", energy=1860.0, parameters={"leg.touchdown_angle": angle})
+
+    def apex(c: np.ndarray) -> list[float]:
+        return [runner_apex(float(c[0]), speed_at(float(c[0]), 1860.0), STIFFNESS, angle)[0]]
+
+    y = float(fsolve(lambda c: np.array(apex(c)) - c, [near], xtol=1e-13)[0])
+    np.testing.assert_allclose(gait.state["place.y"], y, atol=1e-9)
+    np.testing.assert_allclose(gait.multipliers, derivative(apex, [y])[0], atol=1e-8)
+    assert gait.stability == stability
+
+
 def test_a_walker_of_816_joules_walks_on_two_springs_as_by_hand() -> None:
     """k = 14 kN/m, 69°, 816 J: walking of Geyer, Seyfarth & Blickhan (2006)."""
     model, start = walker()
