@@ -17,6 +17,7 @@ taken from the C library.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from struct import pack
 
@@ -57,89 +58,92 @@ COSINE = tuple(
 """K, lowest power first: (cos r − 1 + z/2)/z² on z = r²."""
 
 
-def constant(value: float) -> str:
-    """A double in LLVM's exact notation."""
-    return f"0x{pack('>d', value).hex().upper()}"
+class _Real:
+    """A number in a target's words; its operations are written as they are asked for."""
+
+    def __init__(self, text: str, writer: _Writer) -> None:
+        self.text, self.writer = text, writer
+
+    def __add__(self, other: _Real | float) -> _Real:
+        return self.writer.operation("add", self, other)
+
+    def __sub__(self, other: _Real | float) -> _Real:
+        return self.writer.operation("sub", self, other)
+
+    def __rsub__(self, other: float) -> _Real:
+        return self.writer.operation("sub", other, self)
+
+    def __mul__(self, other: _Real | float) -> _Real:
+        return self.writer.operation("mul", self, other)
 
 
-class _Writer:
-    """Writes operations, one name each; a target says how it writes them, for the angle `x`."""
-
-    x = "x"
+class _Writer(ABC):
+    """Writes operations, one name each; a target says how."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.count = 0
 
-    def polynomial(self, c: Sequence[float], z: str, zz: str) -> str:
-        """Σ c_k z^k of degree 5 (Estrin's scheme)."""
-        low, middle, high = (self.mad(self.number(c[k + 1]), z, self.number(c[k])) for k in (0, 2, 4))
-        return self.mad(self.mad(high, zz, middle), zz, low)
-
-    def number(self, value: float) -> str:
-        raise NotImplementedError
-
-    def real(self, operation: str, a: str, b: str) -> str:
-        """The sum, difference or product of two reals: 'add', 'sub' or 'mul'."""
-        raise NotImplementedError
-
-    def mad(self, a: str, b: str, c: str) -> str:
-        """a b + c, in one rounding where the machine can and may."""
-        return self.real("add", self.real("mul", a, b), c)
-
+    @abstractmethod
+    def number(self, value: float) -> str: ...
+    @abstractmethod
+    def write(self, operation: str, a: str, b: str) -> str: ...
+    @abstractmethod
     def bits(self, value: str) -> str:
         """The bits of a real as an integer."""
-        raise NotImplementedError
 
+    @abstractmethod
     def following(self, n: str) -> str:
         """n + 1."""
-        raise NotImplementedError
 
-    def choose_by_bit_zero(self, n: str, a: str, b: str) -> str:
-        raise NotImplementedError
+    @abstractmethod
+    def choose_by_bit_zero(self, n: str, a: str, b: str) -> str: ...
+    @abstractmethod
+    def negate_on_bit_one(self, value: str, n: str) -> str: ...
 
-    def negate_on_bit_one(self, value: str, n: str) -> str:
-        raise NotImplementedError
+    def text(self, value: _Real | float) -> str:
+        return value.text if isinstance(value, _Real) else self.number(value)
 
-    def sine_and_cosine(self) -> tuple[str, str]:
+    def operation(self, operation: str, a: _Real | float, b: _Real | float) -> _Real:
+        return _Real(self.write(operation, self.text(a), self.text(b)), self)
+
+    def mad(self, a: _Real, b: _Real | float, c: _Real | float) -> _Real:
+        """a b + c, in one rounding where the machine can and may."""
+        return a * b + c
+
+    def polynomial(self, c: Sequence[float], z: _Real, zz: _Real) -> _Real:
+        """Σ c_k z^k of degree 5 (Estrin's scheme)."""
+        low, middle, high = (_Real(self.number(c[k + 1]), self) for k in (0, 2, 4))
+        low, middle, high = (self.mad(part, z, c[2 * k]) for k, part in enumerate((low, middle, high)))
+        return self.mad(self.mad(high, zz, middle), zz, low)
+
+    def sine_and_cosine(self, angle: str) -> tuple[str, str]:
         """Those of a near angle."""
-
-        def add(a: str, b: str) -> str:
-            return self.real("add", a, b)
-
-        def sub(a: str, b: str) -> str:
-            return self.real("sub", a, b)
-
-        def mul(a: str, b: str) -> str:
-            return self.real("mul", a, b)
-
-        number, mad = self.number, self.mad
-        shifted = add(mul(self.x, number(TWO_OVER_PI)), number(SHIFT))
-        n, bits = sub(shifted, number(SHIFT)), self.bits(shifted)
+        x = _Real(angle, self)
+        shifted = x * TWO_OVER_PI + SHIFT
+        n, bits = shifted - SHIFT, self.bits(shifted.text)
         # the angle less n π/2, and what that lost
-        first = sub(self.x, mul(n, number(HALF_PI[0])))
-        part = mul(n, number(HALF_PI[1]))
-        second = sub(first, part)
-        rest = mul(n, number(HALF_PI[2]))
-        r = sub(second, rest)
-        c = add(sub(part, sub(first, second)), sub(rest, sub(second, r)))
+        first = x - n * HALF_PI[0]
+        part = n * HALF_PI[1]
+        second = first - part
+        rest = n * HALF_PI[2]
+        r = second - rest
+        c = (part - (first - second)) + (rest - (second - r))
         # polynomials
-        z = mul(r, r)
-        zz, half = mul(z, z), mul(z, number(0.5))
-        top = sub(number(1.0), half)
-        sine = sub(r, mad(mul(r, z), self.polynomial(SINE, z, zz), mul(c, top)))
-        tail = mad(zz, self.polynomial(COSINE, z, zz), mul(r, c))
-        cosine = add(top, add(sub(sub(number(1.0), top), half), tail))
+        z = r * r
+        zz, half = z * z, z * 0.5
+        top = 1.0 - half
+        sine = r - self.mad(r * z, self.polynomial(SINE, z, zz), c * top)
+        tail = self.mad(zz, self.polynomial(COSINE, z, zz), r * c)
+        cosine = top + ((1.0 - top - half) + tail)
         # exchanged and with their signs
         turned = self.following(bits)
-        s = self.negate_on_bit_one(self.choose_by_bit_zero(bits, cosine, sine), bits)
-        return s, self.negate_on_bit_one(self.choose_by_bit_zero(bits, sine, cosine), turned)
+        s = self.negate_on_bit_one(self.choose_by_bit_zero(bits, cosine.text, sine.text), bits)
+        return s, self.negate_on_bit_one(self.choose_by_bit_zero(bits, sine.text, cosine.text), turned)
 
 
 class _Lanes(_Writer):
     """LLVM's operations on `width` lanes at once."""
-
-    x = "%x"
 
     def __init__(self, width: int, fused: bool) -> None:
         super().__init__()
@@ -162,14 +166,14 @@ class _Lanes(_Writer):
         self.lines.append(f"{name} = {instruction}")
         return name
 
-    def real(self, operation: str, a: str, b: str) -> str:
+    def write(self, operation: str, a: str, b: str) -> str:
         return self.do(f"f{operation} {self.type} {a}, {b}")
 
-    def mad(self, a: str, b: str, c: str) -> str:
+    def mad(self, a: _Real, b: _Real | float, c: _Real | float) -> _Real:
         if not self.fused:
             return super().mad(a, b, c)
-        t = self.type
-        return self.do(f"call {t} @llvm.fma.{self.suffix}({t} {a}, {t} {b}, {t} {c})")
+        given = ", ".join(f"{self.type} {self.text(each)}" for each in (a, b, c))
+        return _Real(self.do(f"call {self.type} @llvm.fma.{self.suffix}({given})"), self)
 
     def is_near(self) -> str:
         """Whether |x| is below LIMIT, lane by lane."""
@@ -221,7 +225,7 @@ def sincos(width: int, fused: bool) -> tuple[list[str], Iterable[str]]:
     w = _Lanes(width, fused)
     kind, flag = w.type, w.flag
     w.lines.append(f"define internal fastcc {w.pair} @mbd.sincos{width}({kind} %x) nounwind noinline {{\nentry:")
-    near, (sine, cosine) = w.is_near(), w.sine_and_cosine()
+    near, (sine, cosine) = w.is_near(), w.sine_and_cosine("%x")
     every = near if width == 1 else w.do(f"call i1 @llvm.vector.reduce.and.v{width}i1({flag} {near})")
     w.lines.append(f'br i1 {every}, label %fast, label %far, !prof !{{!"branch_weights", i32 1000000, i32 1}}\nfast:')
     w.give(sine, cosine)
@@ -249,7 +253,7 @@ class _InC(_Writer):
     def number(self, value: float) -> str:
         return f"({value.hex()})"
 
-    def real(self, operation: str, a: str, b: str) -> str:
+    def write(self, operation: str, a: str, b: str) -> str:
         return self.do("double", f"{a} {'+' if operation == 'add' else '-' if operation == 'sub' else '*'} {b}")
 
     def bits(self, value: str) -> str:
@@ -270,7 +274,7 @@ class _InC(_Writer):
 def sincos_in_c() -> str:
     """The function ``sine_and_cosine(x, &sine, &cosine)``, with the bits of `sincos` where that is not fused."""
     w = _InC()
-    sine, cosine = w.sine_and_cosine()
+    sine, cosine = w.sine_and_cosine("x")
     return "\n".join(
         [
             "static void sine_and_cosine(double x, double *sine, double *cosine)",
