@@ -1,4 +1,4 @@
-"""``python -m benchmarks [run | compare | baseline | peers | house]``: see README.md here."""
+"""``python -m benchmarks [run | compare | baseline | peers | growth | house]``: see README.md here."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks import house
+from benchmarks import growth, house
 from benchmarks.compare import comparison, regressions
 from benchmarks.figures import NOISY, table
 from benchmarks.handwritten import compiler
@@ -19,9 +19,9 @@ def main() -> int:
     """Measure and print; 1 if a comparison finds a figure more than 15 % worse."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="What mbd costs, measured.")
     parser.add_argument(
-        "what", nargs="?", default="run", choices=("run", "compare", "baseline", "peers", "house"),
+        "what", nargs="?", default="run", choices=("run", "compare", "baseline", "peers", "growth", "house"),
         help="print the figures; compare them with the baseline; make them the baseline; compare with other systems; "
-        "or count lines, constants and imports of the source",
+        "write the page on how cost grows with bodies; or count lines, constants and imports of the source",
     )  # fmt: skip
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
     parser.add_argument("--repeats", type=int, default=7, help="of every measurement, minima count (default 7)")
@@ -29,9 +29,15 @@ def main() -> int:
     parser.add_argument(
         "--scenes", default="", metavar="S1,S4d", help="of 'peers': some only, which leaves the docs alone"
     )
+    parser.add_argument("--largest", type=int, default=growth.LARGEST, help="of 'growth': bodies at most")
     options = parser.parse_args()
     if options.what == "peers":
         return _peers(parser, [word for word in options.scenes.split(",") if word], options.json)
+    if options.what == "growth":
+        found = growth.measure(options.largest)
+        growth.write(found, DOCS)
+        print(growth.page(found))
+        return 0
     if options.what == "house":
         print(house.report(house.measure()))
         return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.testing.mechanisms import random_scene, random_tree
+from tests.comparisons import at_least, compared
 from tests.gait.walkers import simplest, simplest_start
 from tests.simulation.mechanisms import ball, falling
 from tests.simulation.test_many_runs import SCHEMES, same, starts_of
@@ -89,6 +91,33 @@ def test_a_run_that_fails_is_a_row_of_its_own():
         found.final(1)
     with pytest.raises(mbd.SimulationError, match="was refused"):
         found.run(1)
+
+
+@at_least(3)
+@settings(max_examples=12)
+@given(seed=st.integers(0, 200))
+def test_starts_that_break_their_constraints_are_refused_as_simulate_refuses_them(seed):
+    """Of starts moved at random off their rows and into surfaces; the sentence is made where somebody asks for it."""
+    model, rng = random_scene(seed, bodies=2), np.random.default_rng(seed)
+    base = mbd.assemble(model)
+    starts = [replace(base, q=base.q + off * rng.normal(size=len(base.q))) for off in (0.0, 1e-9, 1e-4, 0.3, 1.0)]
+    try:
+        found = mbd.batch(model, starts, dt=0.01, until=0.02)
+    except mbd.ModelError:  # no orientation, or an angle beyond all
+        return
+    for k, start in enumerate(starts):
+        words = ""
+        try:
+            mbd.simulate(model, start, dt=0.01, until=0.02, on_failure="return")
+        except mbd.MbdError as error:
+            words = str(error)
+        assert (found.outcome[k] == "refused") == bool(words)
+        if words:
+            compared()
+            assert np.isnan(found.q[k]).all() and np.isnan(found.time[k])
+            assert found.message(k) == words
+            with pytest.raises(mbd.SimulationError, match="was refused"):
+                found.final(k)
 
 
 @pytest.mark.parametrize(

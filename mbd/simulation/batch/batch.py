@@ -12,6 +12,7 @@ from mbd.arrays import Vector
 from mbd.bodies.values import flag, names_given, shown
 from mbd.errors import ModelError
 from mbd.integrators import HHT, Integrator
+from mbd.kernel import codes
 from mbd.progress import share_bar
 from mbd.results.names import scalars
 from mbd.simulation.arguments import check_arguments
@@ -135,5 +136,7 @@ def _table(runner: Runner, starts: Starts, results: tuple[str, ...], report: Cal
         found.not_made(~stop.done | runner.judged(lines, stop.ends, changes))
         return found
     found.take(ends)
-    found.take_alone([int(k) for k in np.flatnonzero(runner.judged(lines, ends, changes))], None)
+    refused = ends.status == codes.DOUBTFUL_START
+    found.refuse(refused)
+    found.take_alone([int(k) for k in np.flatnonzero(runner.judged(lines, ends, changes) & ~refused)], None)
     return found

@@ -108,13 +108,23 @@ class Batch:
         except KeyboardInterrupt:
             self.not_made(np.isin(np.arange(len(self)), list(runs)[done:]))
 
-    def not_made(self, runs: NDArray[np.bool_]) -> None:
-        """Runs that the batch never came to, or whose end nobody has judged, as it was interrupted."""
-        self.complete = False
-        self.outcome[runs], self.stopped_by[runs] = NOT_RUN, ""
+    def refuse(self, runs: NDArray[np.bool_]) -> None:
+        """Runs whose starts break their constraints, as `simulate` says too; in words where somebody asks for them."""
+        self.outcome[runs] = "refused"
+        self._empty(runs)
+
+    def _empty(self, runs: NDArray[np.bool_]) -> None:
+        """No numbers for these runs."""
+        self.stopped_by[runs] = ""
         self.steps[runs] = self.events[runs] = -1
         for numbers in (self.time, self.q, self.v, self.z, *self.results.values()):
             numbers[runs] = np.nan
+
+    def not_made(self, runs: NDArray[np.bool_]) -> None:
+        """Runs that the batch never came to, or whose end nobody has judged, as it was interrupted."""
+        self.complete = False
+        self.outcome[runs] = NOT_RUN
+        self._empty(runs)
 
     def _made(self, k: int) -> Alone:
         return self._runner.alone(self.start(k), self._runner.changes.at(k))
@@ -154,6 +164,8 @@ class Batch:
         k = self._number(k)
         if self.outcome[k] == NOT_RUN:
             raise SimulationError(f"run {k} was not made: the batch was interrupted; batch.run({k}) makes it")
+        if self.outcome[k] == "refused" and k not in self._alone:
+            self._put(k, self._made(k))
         if k in self._alone:
             state = self._alone[k].state
             if state is None:
@@ -180,6 +192,8 @@ class Batch:
         k = self._number(k)
         if self.outcome[k] == NOT_RUN:
             return "not run: interrupted"
+        if k not in self._alone and self.outcome[k] == "refused":
+            self._put(k, self._made(k))
         if k not in self._alone and not self.success[k]:
             self._alone[k] = self._made(k)
         if k in self._alone:
