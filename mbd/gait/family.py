@@ -80,8 +80,8 @@ class Member:
     def by_numbers(self, map_: ReturnMap, found: Measured, derivative: Matrix) -> Vector:
         """The derivative of the speed from that of the numbers of the map."""
         slope = _speed(map_, found.numbers[found.size :])[1]
-        told = np.flatnonzero(slope)  # lengths of steps that are not known are NaN
-        return np.asarray(slope[told] @ derivative[found.size :][told])
+        known = np.flatnonzero(slope)  # lengths of steps that are not known are NaN
+        return np.asarray(slope[known] @ derivative[found.size :][known])
 
     def __str__(self) -> str:
         return f"{self.kind} {self.value:g} {self.unit}"
