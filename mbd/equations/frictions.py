@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 
 from mbd.constraints.law import Equation
-from mbd.equations.cones import LEAST_SQUARE
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Effect, Friction, Row
@@ -15,6 +14,7 @@ from mbd.equations.laws import Laws
 from mbd.equations.states import with_states
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
+from mbd.joints.losses.isotropic import LEAST_SQUARE
 from mbd.tape.derivatives import substitute
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
