@@ -12,6 +12,9 @@ from mbd.equal import RANK_RTOL
 
 __all__ = ["Balanced", "balanced"]
 
+MAX_CONDITION = 1e6
+"""Product of the largest elements of a triangle and of its inverse up to which its rank is beyond doubt [-]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
@@ -45,8 +48,14 @@ def balanced(g: Matrix, R: NDArray[np.float64], driven: NDArray[np.bool_]) -> Ba
     count, m = len(g), R.shape[2]
     if not m or not count:
         return Balanced(effort, np.zeros((count, m)), residual)
-    scale = np.linalg.svd(R, compute_uv=False).max(axis=1, initial=0.0)
     upper, lower = R[:, ~driven, :], R[:, driven, :]
+    back = _left_inverse(upper)
+    if back is not None:  # the usual case: the balance where nothing drives determines λ
+        lam = -_applied(back, g[:, ~driven])
+        residual[:, ~driven] = g[:, ~driven] + _applied(upper, lam)
+        effort[:, driven] = g[:, driven] + _applied(lower, lam)
+        return Balanced(effort, lam, residual)
+    scale = np.linalg.svd(R, compute_uv=False).max(axis=1, initial=0.0)
     back, held = _inverse(upper, scale)
     lam = -_applied(back, g[:, ~driven])
     P = np.eye(m) - back @ upper
@@ -55,6 +64,19 @@ def balanced(g: Matrix, R: NDArray[np.float64], driven: NDArray[np.bool_]) -> Ba
     residual[:, ~driven] = g[:, ~driven] + _applied(upper, lam)
     effort[:, driven] = g[:, driven] + _applied(lower, lam)
     return Balanced(effort, lam, residual, int((m - held).max()), bool(np.any(moved > 0)))
+
+
+def _left_inverse(matrices: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """``(AᵀA)⁻¹ Aᵀ`` by A = Q U of each matrix (R, n, m), n ≥ m; None where one of them is near a loss of rank."""
+    n, m = matrices.shape[1:]
+    if n < m:
+        return None
+    Q, U = np.linalg.qr(matrices)
+    if not np.all(np.abs(np.diagonal(U, axis1=1, axis2=2)) > 0.0):
+        return None
+    inverse = np.linalg.inv(U)
+    sizes = np.abs(U).max(axis=(1, 2)) * np.abs(inverse).max(axis=(1, 2))
+    return np.asarray(inverse @ Q.transpose(0, 2, 1)) if np.all(sizes < MAX_CONDITION) else None
 
 
 def _inverse(matrices: NDArray[np.float64], scale: Vector) -> tuple[NDArray[np.float64], NDArray[np.intp]]:

@@ -20,7 +20,7 @@ def body_of(version, name):
 
 def named(version, owner, name):
     """The coordinate of a point: its path in the format 40000, its name before."""
-    path = f"/jointset/any/{name}"
+    path = f"/jointset/knee_joint/{name}"
     return f"<socket_{owner}>{path}</socket_{owner}>" if version == "40000" else f"<{owner}>{name}</{owner}>"
 
 
@@ -100,7 +100,7 @@ def test_what_is_not_kept_is_said(tmp_path):
             "fibula",
         ),
         ("<location>0.04 -0.08 0</location>", "<location>0.04 -0.08</location>", "location must be 3 numbers"),
-        ("any/knee</socket_coordinate>", "any/neck</socket_coordinate>", "coordinate 'neck'"),
+        ("knee_joint/knee</socket_coordinate>", "knee_joint/neck</socket_coordinate>", "coordinate 'neck'"),
         ("<max_isometric_force>5000", "<max_isometric_force>-5", "max_force -5 N"),
         (
             "<SimmSpline><x>-2 -1 0 1</x><y>0.04 0.03 0.05 0.04</y></SimmSpline>",

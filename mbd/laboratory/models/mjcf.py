@@ -49,7 +49,10 @@ def read_mjcf(path: Path, stops: bool, losses: bool) -> ImportedModel:
     except Exception as error:  # of any kind, such as ValueError with the compiler's words
         words = " ".join(str(error).split())[:300]
         raise ModelError(f"{path.name} is no model that MuJoCo compiles: {words}") from None
-    return _Reader(mujoco, source, path, stops, losses).read()
+    try:
+        return _Reader(mujoco, source, path, stops, losses).read()
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path.name}: a name in it is no text in UTF-8: {error}") from None
 
 
 class _Reader:

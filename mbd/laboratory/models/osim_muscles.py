@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -21,6 +22,7 @@ from mbd.laboratory.models.osim_elements import (
 from mbd.laboratory.models.osim_file import OsimFile, body_named, body_of_socket, coordinate_named
 from mbd.laboratory.models.osim_functions import Linear, function_of, is_left_out
 from mbd.laboratory.models.xml import Element
+from mbd.tape.functions import clip
 
 __all__ = ["is_muscle", "muscles_of"]
 
@@ -138,18 +140,22 @@ def _moving(file: OsimFile, element: Element, frame: Frame, muscle: str) -> ViaP
             continue
         _, name = _joint(file, element, coordinate)
         names += [name] if name not in names else []
-        functions.append(_Along(function, names.index(name)))
+        own = coordinate_named(file, element, coordinate.rpartition("/")[2])
+        functions.append(_Along(function, names.index(name), (own.low, own.high)))
     return ViaPoint(frame, place=tuple(functions), arguments=tuple(names) or ("t",))
 
 
 class _Along:
-    """A function of one of several arguments."""
+    """A function of one of several arguments, within its range: OpenSim stops points at the ends of it."""
 
-    def __init__(self, function: Any, place: int | None) -> None:
-        self.function, self.place = function, place
+    def __init__(self, function: Any, place: int | None, reach: tuple[float, float] = (-math.inf, math.inf)) -> None:
+        self.function, self.place, self.reach = function, place, reach
 
     def __call__(self, *q: Any) -> Any:
-        return self.function(0.0 * q[0] if self.place is None else q[self.place])
+        if self.place is None:
+            return self.function(0.0 * q[0])
+        low, high = self.reach
+        return self.function(clip(q[self.place], low, high) if low < high < math.inf else q[self.place])
 
 
 def _joint(file: OsimFile, element: Element, path: str) -> Any:
