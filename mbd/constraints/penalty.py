@@ -15,6 +15,7 @@ from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
 from mbd.constraints.rubbing import rub, slip_velocities
+from mbd.constraints.rules import condition_details, condition_faults, condition_of, contacts_of, mentions_of
 from mbd.constraints.unilateral import measure_of
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -60,6 +61,7 @@ class Penalty(Constraint):
     friction : μ ≥ 0, opposite to the velocity γ along the surface, ``f = −μ p γ/√(‖γ‖² + creep²)``: under a load T
         below μ p it creeps with ``creep T/√((μ p)² − T²)``. What truly sticks is a `Unilateral`
     creep : speed at which friction is 1/√2 of μ p [m/s]
+    only_while : name of a contact that must be closed, or a measure that must be positive, for it to begin to act
     """
 
     name: str
@@ -73,6 +75,7 @@ class Penalty(Constraint):
     effective_mass: float | None = None
     friction: float = 0.0
     creep: float = CREEP
+    only_while: str | Measure | None = None
 
     def __post_init__(self) -> None:
         name_of(self.name, "Penalty")
@@ -82,6 +85,7 @@ class Penalty(Constraint):
                 object.__setattr__(self, field, number(getattr(self, field), f"{field} of '{self.name}'"))
         if not among(self.release, ("gap", "pull")):
             raise ModelError(f"release of Penalty '{self.name}' is 'gap' or 'pull', got {self.release!r}")
+        object.__setattr__(self, "only_while", condition_of(self.only_while, self.name))
         law_of(self.law, f"Penalty '{self.name}'")
         contradictions = self._contradictions()
         if contradictions:
@@ -157,7 +161,7 @@ class Penalty(Constraint):
         gap = gap_of(self.measure, scope)
         rate = scope.rate(gap)
         push = self.force(gap, rate, scope, *hold(self.captured(rate)))
-        contact = Closing(gap, self.measure.unit, self.opens_on)
+        contact = Closing(gap, self.measure.unit, self.opens_on, only_while=self.only_while)
         drags = []
         if self.rubs:
             coefficient = scope.parameter(self.name, "mu", self.friction)
@@ -188,7 +192,8 @@ class Penalty(Constraint):
         """Where, how stiff, and what it loses."""
         loss = f"damping {self.damper:.6g}" if self.chi is None else f"chi {self.chi:.6g}"
         rubs = f", friction {self.friction:.6g}" if self.rubs else ""
-        return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}{rubs}"
+        condition = condition_details(self.only_while)
+        return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}{rubs}{condition}"
 
     def captured(self, gap_rate: Scalar) -> tuple[Scalar, ...]:
         """What is held from the instant of closing: the approach speed −ġ, where χ needs it."""
@@ -233,9 +238,14 @@ class Penalty(Constraint):
             pressed = pressed - power(maximum(-depth, 0.0), self.exponent)
         return pressed
 
+    @property
+    def others(self) -> tuple[str, ...]:
+        """The contact of `only_while`."""
+        return contacts_of(self.only_while)
+
     def mentions(self) -> list[Mention]:
-        """What its measure depends on."""
-        return self.measure.mentions()
+        """What its measures depend on."""
+        return [*self.measure.mentions(), *mentions_of(self.only_while)]
 
     def parameters(self) -> dict[str, float]:
         """`stiffness`, `damping` or `chi` and `slowest`, `mu` and `creep` where it rubs; and those of its measure."""
@@ -261,7 +271,7 @@ class Penalty(Constraint):
 
     def faults(self) -> list[str]:
         """A law that would not push, or would feed energy in."""
-        faults = self.measure.faults(self.name) + super().faults()
+        faults = self.measure.faults(self.name) + super().faults() + condition_faults(self.only_while, self.name)
         if self.exponent < 1.0:
             faults.append(f"'{self.name}': exponent {self.exponent:g} is below 1, endlessly stiff at touch; give n ≥ 1")
         if self.rubs and not (self.measure.has_tangents or self.measure.has_slip_velocities):

@@ -11,8 +11,11 @@ from mbd.constraints.expressions import is_expression
 from mbd.constraints.measure import Measure
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
+from mbd.forces.quantities import Mention
 
-__all__ = ["When", "condition_of", "releases_of"]
+__all__ = [
+    "When", "condition_details", "condition_faults", "condition_of", "contacts_of", "mentions_of", "releases_of",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -60,3 +63,27 @@ def condition_of(value: Any, what: str) -> str | Measure | None:
     if value is None or isinstance(value, str | Measure):
         return value
     raise ModelError(f"only_while of '{what}' is the name of a contact, or a measure, got {value!r}")
+
+
+def contacts_of(condition: str | Measure | None) -> tuple[str, ...]:
+    """The contact that an `only_while=` names."""
+    return (condition,) if isinstance(condition, str) else ()
+
+
+def mentions_of(condition: str | Measure | None) -> list[Mention]:
+    """What the measure of an `only_while=` depends on."""
+    return condition.mentions() if isinstance(condition, Measure) else []
+
+
+def condition_details(condition: str | Measure | None) -> str:
+    """What a page of text says of an `only_while=`."""
+    if condition is None:
+        return ""
+    return f", only while {condition.details} > 0" if isinstance(condition, Measure) else f", only while '{condition}'"
+
+
+def condition_faults(condition: str | Measure | None, name: str) -> list[str]:
+    """An `only_while=` that names its own contact."""
+    if condition != name:
+        return []
+    return [f"'{name}': only_while='{name}' names itself; name another contact"]

@@ -14,7 +14,15 @@ from mbd.constraints.contact_friction import friction_of, has_dry_part, resistan
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.law import Closing, Equation, Hold, Law, Rubbing
 from mbd.constraints.measure import Measure, gap_of
-from mbd.constraints.rules import When, condition_of, releases_of
+from mbd.constraints.rules import (
+    When,
+    condition_details,
+    condition_faults,
+    condition_of,
+    contacts_of,
+    mentions_of,
+    releases_of,
+)
 from mbd.constraints.user_measure import measure
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -167,10 +175,7 @@ class Unilateral(Constraint):
         rules = [f"'{rule.other}' closes{' (after the impact)' if rule.after_impact else ''}" for rule in self.releases]
         on_pull = ["on pull"] if self.opens_on == "pull" else []
         text += ", opens " + " or ".join((["as " + " or ".join(rules)] if rules else []) + on_pull)
-        if self.only_while is None:
-            return text
-        other = self.only_while
-        return text + (f", only while {other.details} > 0" if isinstance(other, Measure) else f", only while '{other}'")
+        return text + condition_details(self.only_while)
 
     def parameters(self) -> dict[str, float]:
         """'name.mu' where it slides with friction, or those of the loss; 'name.mu_spin'; and those of its measure."""
@@ -197,13 +202,11 @@ class Unilateral(Constraint):
     @property
     def others(self) -> tuple[str, ...]:
         """The contacts of its rules."""
-        names = [rule.other for rule in self.releases]
-        return (*names, self.only_while) if isinstance(self.only_while, str) else tuple(names)
+        return (*(rule.other for rule in self.releases), *contacts_of(self.only_while))
 
     def mentions(self) -> list[Mention]:
         """What its measures depend on."""
-        condition = self.only_while.mentions() if isinstance(self.only_while, Measure) else []
-        return [*self.measure.mentions(), *condition]
+        return [*self.measure.mentions(), *mentions_of(self.only_while)]
 
     def faults(self) -> list[str]:
         """An impossible restitution or friction, a rule that names itself."""
@@ -225,9 +228,7 @@ class Unilateral(Constraint):
             )
         if any(rule.other == self.name for rule in self.releases):
             faults.append(f"'{self.name}': release=When('{self.name}') names itself; name the contact that opens it")
-        if self.only_while == self.name:
-            faults.append(f"'{self.name}': only_while='{self.name}' names itself; name another contact")
-        return faults
+        return faults + condition_faults(self.only_while, self.name)
 
 
 def measure_of(value: object, what: str) -> Measure:

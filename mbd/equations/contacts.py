@@ -255,7 +255,8 @@ def _by_force(
     return Contact(
         word.name, word.kind, gap, rate, captured=tuple(holding.captured), anchors=holding.anchors, force=force,
         generalized=generalized, opens_on=at.opens_on, unit=f"{at.unit}/s" if fast else at.unit, drags=tuple(drags),
-        is_velocity=fast, undefined=_undefined(word), foot=_foot(law, scope, number),
+        only_while=_watched(at.only_while, scope), is_velocity=fast, undefined=_undefined(word),
+        foot=_foot(law, scope, number),
     )  # fmt: skip
 
 

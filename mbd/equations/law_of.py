@@ -93,8 +93,8 @@ def _closing_faults(law: Law, at: Closing, by_force: bool, scope: DerivationScop
     rules = ("gap", "pull") if by_force else ("pull", "when")
     if at.opens_on not in rules:
         yield f"opens_on is {' or '.join(map(repr, rules))}, got {at.opens_on!r}"
-    if by_force and (at.releases or at.only_while is not None or at.restitution):
-        yield "releases, only_while and restitution serve contacts by rows; leave them out"
+    if by_force and (at.releases or at.restitution):
+        yield "releases and restitution serve contacts by rows; leave them out"
     if not at.restitution >= 0.0:
         yield f"restitution {at.restitution:g} is negative"
     if by_force and _has_velocity(gradient(scope.real(at.gap), scope.inputs.v)):
