@@ -139,6 +139,7 @@ if TYPE_CHECKING:
     )
     from mbd.joints.losses import (
         AffineFriction as AffineFriction,
+        CompressibleDamper as CompressibleDamper,
         Coulomb as Coulomb,
         Dahl as Dahl,
         Dissipation as Dissipation,
@@ -252,8 +253,8 @@ _HOMES = {
     "mbd.gait.limit_cycle": "limit_cycle",
     "mbd.integrators": "HHT GeneralizedAlpha Newmark RadauIIA RungeKutta4 RungeKutta853",
     "mbd.joints": "Cylindrical Free Planar Prismatic Revolute Screw Spherical Translation Universal Weld",
-    "mbd.joints.losses": "AffineFriction Coulomb Dahl Dissipation LuGre PinFriction Quadratic Stribeck "
-    "Tabulated Valves Viscous",
+    "mbd.joints.losses": "AffineFriction CompressibleDamper Coulomb Dahl Dissipation LuGre PinFriction Quadratic "
+    "Stribeck Tabulated Valves Viscous",
     "mbd.description": "on_slope",
     "mbd.model": "Model",
     "mbd.parts.whole_body.human": "Human human",

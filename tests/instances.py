@@ -104,6 +104,11 @@ LOSSES: list[tuple[str, Callable[[], Loss]]] = [
     ("dahl", lambda: mbd.Dahl(3.0, 400.0)),
     ("lugre", lambda: mbd.LuGre(3.0, 2.0, 0.5, 400.0, 0.8) + mbd.Viscous(0.6)),
     ("lugre whose damping falls", lambda: mbd.LuGre(3.0, 2.0, 0.5, 400.0, 0.8, damping_rate=0.1)),
+    ("compressible damper", lambda: mbd.CompressibleDamper(3.0, 0.8, 400.0)),
+    (
+        "valves with compressible oil",
+        lambda: mbd.Valves(mbd.CompressibleDamper(3.0, 0.8, 400.0), mbd.CompressibleDamper(1.0, 0.1, 400.0)),
+    ),
     ("viscous and quadratic", lambda: mbd.Viscous(0.7) + mbd.Quadratic(0.4)),
 ]
 

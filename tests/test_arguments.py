@@ -28,6 +28,7 @@ WORDS = {
     mbd.RigidBody: ("body", 1.0, (1.0, 1.0, 1.0)),
     mbd.Link: ("link", 1.0, 1.0, 0.5),
     mbd.AffineFriction: (1.0, 0.1, 0.1),
+    mbd.CompressibleDamper: (10.0, 5.0, 1e4),
     mbd.Coulomb: (1.0,),
     mbd.Dahl: (1.0, 100.0),
     mbd.Dissipation: (lambda rate: rate * rate,),

@@ -112,6 +112,8 @@ EXAMPLES: dict[str, Any] = {
     "update": lambda time, values, state: None,
     "values": (0.0, 1.0, 2.0),
     "voltage": 1.0,
+    "viscous": 1.0,
+    "quadratic": 1.0,
 }
 """A right argument by the name of its parameter."""
 

@@ -10,7 +10,8 @@ GROUPS = {
     "Models and bodies": "Model Lagrangian Coordinate PointMass Link RigidBody Marker box cylinder disk rod segment "
     "sphere Domain on_slope human Human",
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Spherical Free Weld "
-    "Viscous Quadratic Coulomb Stribeck Dahl LuGre AffineFriction PinFriction Tabulated Valves Dissipation",
+    "Viscous Quadratic Coulomb Stribeck Dahl LuGre AffineFriction PinFriction Tabulated Valves CompressibleDamper "
+    "Dissipation",
     "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
     "Nonholonomic MaxwellStop HystereticStop Event Impulse Mode Transition SampledLaw Controller When touchdown "
     "rolling_touchdown profile_touchdown disk_touchdown sphere_touchdown Plane Ball height flexion "

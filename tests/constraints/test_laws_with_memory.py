@@ -130,3 +130,29 @@ def test_a_hysteretic_stop_follows_its_closed_forms_and_gives_back_less():
 def test_numbers_without_a_meaning_are_refused_by_name(make, told):
     with pytest.raises(mbd.ModelError, match=told):
         make(mbd.height(mbd.PointMass("body", 1.0).origin))
+
+
+def test_a_compressible_damper_flows_slowly_as_its_orifice_and_is_oil_when_fast():
+    """Steadily ``F = c v + b v²``; within times far below c/k it is the spring k."""
+    loss = mbd.CompressibleDamper(30.0, 80.0, 4e3)
+    model, start = moved(loss, lambda t: 0.5 * t)
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=1.0)
+    assert -run["rail loss.force"][-1] == pytest.approx(30.0 * 0.5 + 80.0 * 0.25, rel=1e-9)
+    model, start = moved(loss, lambda t: 0.01 * ramp(t / 1e-5))
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-6, until=1e-5)
+    assert -run["rail loss.force"][-1] == pytest.approx(40.0, rel=2e-2)
+
+
+def test_the_force_of_a_compressible_damper_lags_behind_its_rate():
+    """Linear oil is a Maxwell element, ``F = c ω A/√(1 + (ωc/k)²)`` with the phase arctan(ωc/k)."""
+    c, k, w = 30.0, 4e3, 40.0
+    model, start = moved(mbd.CompressibleDamper(c, 0.0, k), lambda t: 0.02 * mbd.sin(w * t))
+    run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=1.0)
+    late = run.time > 0.5
+    lag = np.arctan(w * c / k)
+    expected = 0.02 * w * c * np.cos(lag) * np.cos(w * run.time - lag)
+    np.testing.assert_allclose(-run["rail loss.force"][late], expected[late], atol=1e-5)
+    taken = {part.name: part.energy for part in run.energy.parts}["rail loss"]
+    assert np.max(taken) <= 1e-9
+    per_time = 0.5 * (0.02 * w * np.cos(lag)) ** 2 * c
+    assert -taken[-1] == pytest.approx(per_time * run.time[-1], rel=0.05)

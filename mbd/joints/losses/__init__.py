@@ -2,6 +2,7 @@
 
 from mbd.joints.losses.affine_friction import AffineFriction
 from mbd.joints.losses.base import DissipationFunction, Loss, LossSum
+from mbd.joints.losses.compressible_damper import CompressibleDamper
 from mbd.joints.losses.coulomb import Coulomb
 from mbd.joints.losses.dahl import Dahl
 from mbd.joints.losses.dissipation import Dissipation
@@ -14,6 +15,6 @@ from mbd.joints.losses.valves import Valves
 from mbd.joints.losses.viscous import Viscous
 
 __all__ = [
-    "AffineFriction", "Coulomb", "Dahl", "Dissipation", "DissipationFunction", "Loss", "LossSum", "LuGre",
-    "PinFriction", "Quadratic", "Stribeck", "Tabulated", "Valves", "Viscous",
+    "AffineFriction", "CompressibleDamper", "Coulomb", "Dahl", "Dissipation", "DissipationFunction", "Loss", "LossSum",
+    "LuGre", "PinFriction", "Quadratic", "Stribeck", "Tabulated", "Valves", "Viscous",
 ]  # fmt: skip
