@@ -117,7 +117,7 @@ MEANT = {
     "flexion extension rotation_angle": ("angle", "euler.zxy.1"),
     "abduction": ("adduction",),
     "com cog cm mass_center": ("center",),
-    "moment torque damping": ("torque", "net_moment", " loss.torque", " spring.torque", "reaction_torque"),
+    "moment torque damping": ("torque", " loss.torque", " spring.torque", "net_moment", "reaction_torque"),
     "force load": (" loss.force", " spring.force", "reaction_force", "tension", "torque", "multiplier"),
     "gap": ("residual",),
     "reaction": ("reaction_force",),
@@ -169,7 +169,7 @@ def _guesses(text: str, names: Sequence[str]) -> list[str]:
         for words, others in MEANT.items():
             if last.casefold() in words.split():
                 meant = (f"{owner}{'' if other[:1] in ('', ' ') else '.'}{other}" for other in others)
-                found += [each for each in meant if each in names][:2]
+                found += [each for each in meant if each in names][:3]
     own = [each for each in names if each.startswith(f"{owner}.")] if owner else []
     return (
         found

@@ -76,8 +76,9 @@ def _cones(model: Description) -> list[tuple[str, Cone]]:
 def _middle(cone: Cone) -> Vector3:
     """The middle of a cone in the parent's frame, on the side on which the child has its center."""
     child = cone.joint.child
-    away = [c - o for c, o in zip(child.body.center.offset, child.offset, strict=True)]
-    along = dot(rotate(child.rotation, cone.axis) if child.rotation is not None else cone.axis, tuple(away))
+    (cx, cy, cz), (ox, oy, oz) = child.body.center.offset, child.offset
+    axis = rotate(child.rotation, cone.axis) if child.rotation is not None else cone.axis
+    along = dot(axis, (cx - ox, cy - oy, cz - oz))
     x, y, z = cone.direction
     return (-x, -y, -z) if isinstance(along, float) and along < 0.0 else (x, y, z)
 
