@@ -69,8 +69,11 @@ def read_model(
         raise ModelError("a model of MuJoCo or OpenSim says itself how its bodies float; leave base= out")
     if suffix == ".xml" and repair:
         raise ModelError("a model of MuJoCo has possible inertias; leave repair= out")
-    if suffix == ".xml":
-        return read_mjcf(target, stops, losses)
-    if suffix == ".osim":
-        return read_osim(target, stops, repair)
-    return read_urdf(target, base, stops, losses, repair)
+    try:
+        if suffix == ".xml":
+            return read_mjcf(target, stops, losses)
+        if suffix == ".osim":
+            return read_osim(target, stops, repair)
+        return read_urdf(target, base, stops, losses, repair)
+    except ModelError as error:  # of a word that the file gave wrong values
+        raise error if target.name in str(error) else ModelError(f"{target.name}: {error}") from None
