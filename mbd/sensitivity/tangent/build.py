@@ -16,9 +16,11 @@ from mbd.kernel import build
 from mbd.kernel.schemes import contract
 from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.tangent import rules
+from mbd.sensitivity.tangent.interpreted import Table, interpreted
 from mbd.sensitivity.tangent.printer import tangent_text
+from mbd.trees.tree import Function
 
-__all__ = ["entry", "own_rules"]
+__all__ = ["entry", "own_rules", "plain_entry"]
 
 ENTRY = "mbd_tangent_kernel"
 HELD = (
@@ -77,10 +79,24 @@ def own_rules() -> Source:
 
 def text() -> str:
     """The kernel with derivatives in LLVM's words."""
+    return tangent_text(_trees(), ENTRY, HELD)
+
+
+def plain_entry() -> Callable[[Table], int]:
+    """The kernel with derivatives in Python, where there is no machine code."""
+    return _read(contract.SCHEMES)
+
+
+@lru_cache(maxsize=4)
+def _read(schemes: tuple[str, ...]) -> Callable[[Table], int]:
+    return interpreted(_trees(), HELD)
+
+
+def _trees() -> list[Function]:
+    """The kernel's functions, with the rules of this folder."""
     from mbd.kernel.stepping.advance import advance
 
     dispatched, names = contract.dispatch()
     own = Source("hooks", functions_of(dispatched), {**names, "advance": advance})
     instead = {"mbd.kernel.hooks": own, "mbd.kernel.tangent_rules": own_rules()}
-    found = translate(own, "advance", ["kernel"], build.APART, instead)
-    return tangent_text(found, ENTRY, HELD)
+    return translate(own, "advance", ["kernel"], build.APART, instead)

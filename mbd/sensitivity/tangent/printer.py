@@ -19,7 +19,7 @@ from mbd.kernel.records import TABLE
 from mbd.kernel.translation.llvm import HEAD, LLVM, TAGS, Body, Value, tags
 from mbd.trees import tree
 
-__all__ = ["LANES", "tangent_text"]
+__all__ = ["LANES", "TangentBody", "is_called_plain", "tangent_text"]
 
 LANES = 32
 """Derivatives of a real; the last is kept for that by the size of a step, which an event needs."""
@@ -139,7 +139,7 @@ def tangent_text(functions: Sequence[tree.Function], entry: str, held: Collectio
 
     held : functions that are called without derivatives, as ``module.function``
     """
-    bodies = [TangentBody(function, held) for function in functions if not _is(function, held)]
+    bodies = [TangentBody(function, held) for function in functions if not is_called_plain(function, held)]
     plain = [Body(function) for function in functions]
     calls = Counter(symbol for body in (*bodies, *plain) for symbol in body.called)
     needed = _reached(functions[-1].symbol, {_name(each): each.called for each in (*bodies, *plain)})
@@ -155,8 +155,9 @@ def _name(body: Body) -> str:
     return body.function.symbol + (".d" if isinstance(body, TangentBody) else "")
 
 
-def _is(function: tree.Function, names: Collection[str]) -> bool:
-    return ".".join(function.symbol.split(".")[: -len(function.arguments) or None]) in names
+def is_called_plain(function: tree.Function, held: Collection[str]) -> bool:
+    """Whether a function is called without derivatives; held : such functions, as ``module.function``."""
+    return ".".join(function.symbol.split(".")[: -len(function.arguments) or None]) in held
 
 
 def _reached(entry: str, calls: dict[str, list[str]]) -> set[str]:
@@ -353,7 +354,7 @@ class TangentBody(Body):
         return self.dual(best, tangent)
 
     def _Call(self, node: tree.Call) -> str:
-        if _is(node.function, self.held):
+        if is_called_plain(node.function, self.held):
             return super()._Call(node)
         kinds = list(node.function.arguments.values())
         name = node.function.symbol

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from mbd.arrays import Matrix
 from mbd.compile.mechanism import Mechanism
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.inputs import Inputs
+from mbd.sensitivity.tangent.interpreted import Pair
 from mbd.sensitivity.tangent.printer import LANES
 from mbd.tape.derivatives import jvps, live
 from mbd.tape.node import Node
@@ -56,10 +58,23 @@ class Derivative:
         size = first + count
         ends = np.searchsorted(lines + first, np.arange(size), side="right")
         room, numbers = np.zeros((max(size, 1), LANES)), np.zeros(max(len(lines), 1))
-        self._keep = function, ends, columns, numbers, room
+        self._function, self._keep = function, (ends, room)
+        self._lines, self._columns, self._numbers = lines + first, columns, numbers
+        self._size = size
         places = [each.ctypes.data for each in (ends, columns, numbers, room)]
         self._words = np.array([0 if function is None else function.address, size, *places], dtype=np.int64)
         self.address = int(self._words.ctypes.data)
+
+    def product(self, block: Pair, parameters: Pair) -> Matrix:
+        """The derivatives of its outputs, in Python."""
+        out = np.zeros((self._size, LANES))
+        if self._function is not None:
+            self._function(block.values, parameters.values, self._numbers)
+            columns = self._columns
+            inputs = block.of[np.maximum(columns, 0)]
+            inputs[columns < 0] = parameters.of[-1 - columns[columns < 0]]
+            np.add.at(out, self._lines, self._numbers[: len(columns), None] * inputs)
+        return out
 
 
 def _made(

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix
 from mbd.equations.equations import Guard
 from mbd.kernel.records import TABLE
-from mbd.sensitivity.tangent.build import entry
+from mbd.sensitivity.tangent.build import entry, plain_entry
+from mbd.sensitivity.tangent.interpreted import Table
 from mbd.sensitivity.tangent.printer import LANES
 from mbd.sensitivity.tangent.programs import balance_function, derivatives_of_modes, derivatives_of_programs
 from mbd.simulation.run.call_table import BOUND, PLACES
@@ -114,6 +115,14 @@ class TangentStepper(Stepper):
         code = np.array([each.address for each in self._programs], dtype=np.int64)
         self._words[PLACES["code"]] = code.ctypes.data
         return super()._advance_compiled()
+
+    def _advance_plain(self) -> int:
+        with np.errstate(all="ignore"):
+            return plain_entry()(Table(self.kernel, self._derivatives_of, self._programs))
+
+    def _derivatives_of(self, name: str) -> Lanes:
+        """Of an array; `shift1` lies in another."""
+        return self.tangent("block")[self.mechanism.layout.shift :] if name == "shift1" else self.tangent(name)
 
     def _enter(self, address: int) -> int:
         return int(entry()(address, self._words.ctypes.data))
