@@ -14,10 +14,9 @@ from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.outputs import with_sliding
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows, UnknownForm, refused
+from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.starts import directions, programs_of, restitutions_of, start_tangent
-from mbd.sensitivity.tangent.passing import is_compiled, tangent_run
-from mbd.sensitivity.walk import Walk
+from mbd.sensitivity.tangent.passing import tangent_run
 from mbd.trajectory import Trajectory
 
 __all__ = ["Along", "along"]
@@ -97,16 +96,7 @@ def along(run: Trajectory, wrt: Sequence[Any], names: Sequence[str], held: Colle
         slopes.append(_slopes(programs, motion, mode, rates, names))
 
     start, restitutions = start_tangent(rows, programs, wanted, held), restitutions_of(wanted)
-    try:
-        walk = Walk(rows, programs, restitutions)
-        walk.visit = visit
-        walked = walk.whole(start)
-        visit(len(run.time) - 1, walked.motion, walked.mode, walked.rates)
-    except UnknownForm:
-        if not is_compiled(rows):
-            raise
-        del seen[:], slopes[:], shifts[:]
-        walked = tangent_run(rows, programs, start, restitutions, visit)
+    walked = tangent_run(rows, programs, start, restitutions, visit)
     values = np.array([run[name][seen] for name in names]).reshape(len(names), len(seen)).T
     shape = (len(seen), len(names), len(wanted))
     begins = np.concatenate([[False], np.diff(run.time) == 0.0])  # the second row of an instant begins a new part

@@ -10,10 +10,9 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows, Source, UnknownForm
+from mbd.sensitivity.run_data import RunRows, Source
 from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
-from mbd.sensitivity.tangent.passing import AnotherRun, is_compiled, tangent_run
-from mbd.sensitivity.walk import Walk
+from mbd.sensitivity.tangent.passing import tangent_run
 from mbd.trajectory import Trajectory
 
 __all__ = ["Differentiated", "final_state_derivative", "passed"]
@@ -24,8 +23,8 @@ def final_state_derivative(
 ) -> tuple[Matrix, Vector]:
     """d(q, v) at the end of a run, and d t_end, by coordinates and speeds of its start and by parameters.
 
-    It reads a run that is there already, and runs nothing: a pass takes as long as one to two short runs, hardly more
-    for twenty directions than for one. So a Newton iteration on a map of a run, such as a return map, asks once for all
+    The run is made once more with derivatives, which takes as long as two to four runs, and not longer for thirty
+    directions than for one. So a Newton iteration on a map of a run, such as a return map, asks once for all
     of its unknowns: ``run = mbd.simulate(…, until="right foot")``, ``final_state_derivative(run, names, held=names)``.
 
     Parameters
@@ -70,8 +69,7 @@ def passed(
 ) -> tuple[Differentiated, list[Direction]]:  # fmt: skip
     """The pass over a run, and its directions.
 
-    The rows of the run serve where the forms of its steps and impacts are known; else it is made once more, by the
-    kernel with derivatives (`mbd.sensitivity.tangent`).
+    The run is made once more, to the bit, by the kernel with derivatives (`mbd.sensitivity.tangent`).
 
     source : what made the run, where that is known
     """
@@ -79,13 +77,4 @@ def passed(
     wanted = directions(rows, wrt)
     programs = programs_of(rows, wanted)
     start, restitutions = start_tangent(rows, programs, wanted, held), restitutions_of(wanted)
-    try:
-        walked = Walk(rows, programs, restitutions).whole(start)
-    except UnknownForm as why:
-        if not is_compiled(rows):
-            raise
-        try:
-            walked = tangent_run(rows, programs, start, restitutions)
-        except AnotherRun:
-            raise why from None
-    return Differentiated(rows, programs, walked), wanted
+    return Differentiated(rows, programs, tangent_run(rows, programs, start, restitutions)), wanted

@@ -10,19 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from mbd.arrays import Vector
 from mbd.equal import REST_SPEED
 from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError
 from mbd.results.record import EventRecord
-from mbd.sensitivity.balance import consistent_rates
-from mbd.sensitivity.motion import Mode, Motion, Rates
-from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import refused, sided
 
-__all__ = ["GRAZE", "Trigger", "refused_graze", "shift_of_end", "trigger"]
+__all__ = ["GRAZE", "Trigger", "refused_graze", "trigger"]
 
 Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped", "watched"]
 
@@ -84,51 +79,6 @@ def _fires(equations: Equations, e: int) -> bool:
     """Whether an event happens by its own guard: transitions that others cause follow from these."""
     taken = equations.guards[e].transition
     return taken is None or ("event", e) in taken.causes
-
-
-def shift_of_end(
-    programs: Programs, motion: Motion, mode: Mode, rates: Rates, fired: Trigger, slowest: float
-) -> Vector:
-    """∂h/∂(directions) (D,) of the step, whose size is the last direction of the motion.
-
-    slowest : approach speed up to which a contact closes without impact [m/s, rad/s]
-
-    Raises
-    ------
-    CapabilityError
-        for a graze, with the size of ġ.
-    """
-    c, equations = programs.columns, programs.equations
-    n_c, n_g, n_f = len(equations.contacts), len(equations.guards), len(equations.frictions)
-    k = fired.number
-    if fired.kind in ("pull", "slipped"):
-        there = consistent_rates(programs, motion, mode, rates)
-        if fired.kind == "pull":
-            change = there.of_lam[equations.contacts[k].rows[0]]
-        else:
-            row = equations.frictions[k].row
-            slopes = programs.watched(motion.at(mode, there.rate, there.lam))[1][2 * n_c + n_g + n_f + k]
-            change = slopes @ motion.tangent.stacked(c, there.of_rate, there.of_lam)
-            if equations.frictions[k].partner >= 0:
-                own = [row, equations.frictions[equations.frictions[k].partner].row]
-                change = change - there.lam[own] @ there.of_lam[own] / np.hypot(*there.lam[own])
-            else:
-                change = change - np.sign(there.lam[row]) * there.of_lam[row]
-        sizes = np.abs(change[:-1]).max(initial=0.0)
-        terms = max(abs(float(change[-1])), 1e-12 * float(sizes))
-    else:
-        place = {
-            "closed": k, "gap": k, "force": n_c + k, "press": n_c + k, "event": 2 * n_c + k,
-            "stuck": 2 * n_c + n_g + k, "watched": 2 * n_c + n_g + 2 * n_f + k,
-        }[fired.kind]  # fmt: skip
-        slopes = programs.watched(motion.at(mode, rates.rate, rates.lam))[1][place]
-        Z = motion.tangent.stacked(c, rates.of_rate, rates.of_lam)
-        change = slopes @ Z
-        terms = float(np.abs(slopes) @ np.abs(Z[:, -1]))
-    rate = float(change[-1])
-    if not abs(rate) > max(GRAZE * terms, slowest if fired.kind == "closed" else 0.0):
-        raise refused_graze(fired, motion.t, rate, terms)
-    return np.asarray(-change[:-1] / rate)
 
 
 def refused_graze(fired: Trigger, time: float, rate: float, terms: float) -> CapabilityError:

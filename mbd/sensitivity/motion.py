@@ -51,24 +51,6 @@ class Tangent:
             out[columns.lam] = lam
         return out
 
-    def widened(self) -> Tangent:
-        """With one more direction, in which nothing changes yet: the size of a step that an event ends."""
-
-        def wide(part: Matrix) -> Matrix:
-            return np.concatenate([part, np.zeros((*part.shape[:-1], 1))], axis=-1)
-
-        return Tangent(wide(self.t), wide(self.q), wide(self.y), wide(self.anchors), wide(self.p))
-
-    def combined(self, along: Vector) -> Tangent:
-        """Without the last direction, of which each other one takes the part `along` (D,)."""
-        t, q, y, anchors, p = (taken(part, along) for part in (self.t, self.q, self.y, self.anchors, self.p))
-        return Tangent(t, q, y, anchors, p)
-
-
-def taken(part: Matrix, along: Vector) -> Matrix:
-    """(…, D) of (…, D + 1): the last direction, times `along`, added to the others."""
-    return np.asarray(part[..., :-1] + part[..., -1:] * along)
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -99,18 +81,6 @@ class Rates:
     lam: Vector
     of_rate: Matrix
     of_lam: Matrix
-
-    def widened(self) -> Rates:
-        """With one more direction, in which nothing changes."""
-        n, rows = len(self.rate), len(self.lam)
-        return Rates(
-            self.rate, self.lam, np.hstack([self.of_rate, np.zeros((n, 1))]),
-            np.hstack([self.of_lam, np.zeros((rows, 1))]),
-        )  # fmt: skip
-
-    def combined(self, along: Vector) -> Rates:
-        """Without the last direction, of which each other one takes the part `along` (D,)."""
-        return Rates(self.rate, self.lam, taken(self.of_rate, along), taken(self.of_lam, along))
 
 
 def solved(A: Matrix, b: Matrix) -> Matrix:

@@ -24,7 +24,7 @@ from mbd.state import State
 from mbd.tape.node import Node
 from mbd.trajectory import Trajectory
 
-__all__ = ["refuse_sided_end", "refuse_sided_start", "with_both_sides"]
+__all__ = ["AT_ONCE", "refuse_sided_end", "refuse_sided_start", "sided_end", "with_both_sides"]
 
 AT_ONCE = 1e-10
 """Share of a run within which an event counts as one at its start or end [-]."""
@@ -133,10 +133,15 @@ def refuse_sided_end(
         watched = _Watched(programs, motion, mode, rates)
         names = [*watched.firing(within), *watched.stopping(within)]
     if names:
-        raise sided(
-            f"{_listed(names)} happens as the run ends, at t = {end:.9g} s, and a change decides whether before it",
-            "end the run earlier or later, or with the event",
-        )
+        raise sided_end(names, end)
+
+
+def sided_end(names: Sequence[str], end: float) -> OneSidedError:
+    """The error for events that happen as a run ends at this time."""
+    return sided(
+        f"{_listed(names)} happens as the run ends, at t = {end:.9g} s, and a change decides whether before it",
+        "end the run earlier or later, or with the event",
+    )
 
 
 def _is_any(programs: Programs) -> bool:

@@ -21,10 +21,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.linearization import along_places, row_changes
 from mbd.equations.programs import switched_balance
-from mbd.sensitivity.charts import Charts, based, chart_columns
+from mbd.sensitivity.charts import chart_columns
 from mbd.tape.derivatives import jvps
 from mbd.tape.node import Node
 
@@ -56,17 +55,15 @@ class Columns:
     rows: int
     anchors: int
     parameters: int
-    bases: int = 0
 
     @classmethod
     def of(cls, equations: Equations, layout: Layout, parameters: int) -> Columns:
         """Those of a mechanism with so many chosen parameters."""
-        sizes = layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters
-        return cls(*sizes, len(based(equations)))
+        return cls(layout.n_v, layout.n, layout.n_rows, layout.n_anchors, parameters)
 
     @cached_property
     def _starts(self) -> list[int]:
-        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters, self.bases]
+        lengths = [0, self.n_v, self.n, self.n, self.rows, 1, self.anchors, self.parameters]
         return [int(start) for start in np.cumsum(lengths)]
 
     def _part(self, number: int) -> slice:
@@ -101,10 +98,6 @@ class Columns:
         return self._part(6)
 
     @cached_property
-    def base(self) -> slice:
-        return self._part(7)
-
-    @cached_property
     def count(self) -> int:
         return self._starts[-1]
 
@@ -125,15 +118,11 @@ class State:
 
 @dataclass(frozen=True)
 class Sparse:
-    """A compiled program: its values, and of their derivatives those that are not always 0, by line and column.
-
-    systems : what is known of it in a mode (see `entries`)
-    """
+    """A compiled program: its values, and of their derivatives those that are not always 0, by line and column."""
 
     function: Function
     lines: NDArray[np.int64]
     columns: NDArray[np.int64]
-    systems: dict[Any, Any] = field(default_factory=dict)
 
 
 class Programs:
@@ -153,7 +142,6 @@ class Programs:
             key, Columns.of(self.equations, self.layout, len(self.places))
         )
         self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
-        self.charts = Charts(mechanism)
         self._block = np.zeros(self.layout.size)
         self._given: dict[str, list[Node]] = {}
 
@@ -196,23 +184,6 @@ class Programs:
         self._given[name] = list(nodes)
         return self._call(name, at, len(nodes))[1]
 
-    def many(self, name: str, blocks: Matrix, size: int) -> tuple[Matrix, Matrix]:
-        """Values (N, size) and derivatives (N, size, columns) of a program at many blocks (N, block)."""
-        slopes = np.zeros((len(blocks), size, self.columns.count))
-        if not size:
-            return np.zeros((len(blocks), 0)), slopes
-        program = self.sparse(name)
-        out = np.empty((len(blocks), size + len(program.lines)))
-        run_many(program.function, blocks, self.values, out)
-        slopes[:, program.lines, program.columns] = out[:, size:]
-        return out[:, :size], slopes
-
-    def accelerations(self, blocks: Matrix) -> Matrix:
-        """Outputs of the program `accelerations` at many blocks."""
-        out = np.empty((len(blocks), self.mechanism.sizes["accelerations"]))
-        run_many(self.mechanism.common["accelerations"], blocks, self.values, out)
-        return out
-
     def sparse(self, name: str) -> Sparse:
         """A program, made when it is called first."""
         mechanism = self.mechanism
@@ -222,7 +193,7 @@ class Programs:
             symbol = f"derivative_{len(mechanism.common)}"
             with mechanism.equations.tape.lock:
                 values = self._values(name)
-                columns = derivatives(self.equations, values, self.places, name in ("steps", "consistent"))
+                columns = derivatives(self.equations, values, self.places)
                 found = [
                     (i, j, column[i]) for i in range(len(values)) for j, column in enumerate(columns)
                     if not column[i].is_zero
@@ -285,10 +256,8 @@ def paired(equations: Equations) -> list[int]:
     return [k for k, friction in enumerate(equations.frictions) if friction.partner >= 0]
 
 
-def derivatives(
-    equations: Equations, values: Sequence[Node], places: Sequence[int], bases: bool = False
-) -> list[list[Node]]:
-    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors, these parameters; of charts if `bases`."""
+def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[int]) -> list[list[Node]]:
+    """Columns of ∂values by x, (v, z), (v̇, ż), λ, t, anchors, these parameters."""
     if not values:
         return [[] for _ in range(Columns.of(equations, Layout.of(equations), len(places)).count)]
     inputs, tape = Inputs.of(equations), equations.tape
@@ -296,21 +265,5 @@ def derivatives(
     parameters = [tape.input("p", k) for k in places]
     others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters)
     by_others = jvps(values, [{node: 1.0} for node in others])
-    if equations.chart is None:
-        return [*along_places(equations, values), *by_others]
-    by_places, by_bases = chart_columns(equations, values, bases)
-    return [*by_places, *by_others, *by_bases]
-
-
-def run_many(function: Function, blocks: Matrix, parameters: Vector, out: Matrix) -> None:
-    """A compiled function at many blocks (N, block), its outputs line by line."""
-    if function.address == 0:
-        for block, line in zip(blocks, out, strict=True):
-            function(block, parameters, line)
-        return
-    function(blocks[0], parameters, out[0])  # which checks sizes
-    run = PROTOTYPE(function.address)
-    block, line, values = blocks.ctypes.data, out.ctypes.data, parameters.ctypes.data
-    width, wide = blocks.strides[0], out.strides[0]
-    for k in range(1, len(blocks)):
-        run(block + k * width, values, line + k * wide)
+    by_places = along_places(equations, values) if equations.chart is None else chart_columns(equations, values)
+    return [*by_places, *by_others]

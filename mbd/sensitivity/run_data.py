@@ -9,25 +9,21 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbd import integrators
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanism import Mechanism
-from mbd.equations.switching_times import jumps_between
 from mbd.errors import CapabilityError, OneSidedError
 from mbd.integrators.base import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.results.record import EventRecord, Record
 from mbd.results.stored_states import StoredStates
-from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.motion import Mode
 from mbd.trajectory import Trajectory
 
-__all__ = ["HELD", "Rows", "RunRows", "Source", "UnknownForm", "refused", "sided", "unknown"]
+__all__ = ["HELD", "RunRows", "Source", "refused", "sided"]
 
-Rows = tuple[Vector, Matrix, Matrix, Matrix, Matrix]
-"""Times, q, y, rates and multipliers of rows that follow each other."""
 HELD = "mbd.sensitivities(…, controllers='held') leaves that out: what they wrote is then held as it was"
 """What may be asked for where controllers are refused."""
 
@@ -35,15 +31,6 @@ HELD = "mbd.sensitivities(…, controllers='held') leaves that out: what they wr
 def refused(why: str, instead: str = "") -> CapabilityError:
     """The error for a run whose derivatives are not known."""
     return CapabilityError(f"no derivatives of this run: {why}" + (f"; {instead}" if instead else ""))
-
-
-class UnknownForm(CapabilityError):
-    """What the pass over the rows of a run does not know; the kernel with derivatives may."""
-
-
-def unknown(why: str, instead: str = "") -> UnknownForm:
-    """The error for a run of a kind that the pass over its rows does not know."""
-    return UnknownForm(str(refused(why, instead)))
 
 
 def sided(why: str, instead: str = "") -> OneSidedError:
@@ -117,10 +104,10 @@ class RunRows:
         text = str(self.record.settings["integrator"])
         call = ast.parse(text, mode="eval").body
         if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
-            raise unknown(f"its integrator {text} is none of mbd's")
+            raise refused(f"its integrator {text} is none of mbd's")
         made = getattr(integrators, call.func.id, None)
         if made is None:
-            raise unknown(f"its integrator {text} is none of mbd's")
+            raise refused(f"its integrator {text} is none of mbd's")
         values = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
         found: Integrator = made(*(ast.literal_eval(each) for each in call.args), **values)
         return found
@@ -162,64 +149,11 @@ class RunRows:
         """What contacts hold at every row."""
         return StoredStates(self.record, self.mechanism.equations).anchors
 
-    @property
-    def is_adaptive(self) -> bool:
-        """Whether steps follow their error."""
-        return self.record.settings.get("dt") is None
-
-    def begins_late(self, time: float, row: int) -> bool:
-        """Whether the pass is beyond a row, at an instant that the run does not store."""
-        return time != float(self.ends[row])
-
-    def segment_end(self, row: int) -> int:
-        """The row with which even steps from a row end: the next one stored twice or at a sample, or the last."""
-        later = self._stops[np.searchsorted(self._stops, row, side="right") :]
-        return int(later[0]) if len(later) else len(self.record.time) - 1
-
-    def is_fixed(self, row: int) -> bool:
-        """Whether the instant of a row at which no event ends a step stays where it is."""
-        time = self.record.time
-        return row + 1 == len(time) or bool(time[row + 1] == time[row]) or row in self._samples
-
-    @cached_property
-    def _stops(self) -> NDArray[np.intp]:
-        """Rows whose instant is that of the row behind them, and those at samples."""
-        repeats = np.flatnonzero(np.diff(self.record.time) == 0.0)
-        return np.union1d(repeats, np.array(sorted(self._samples), dtype=np.intp))
-
-    @cached_property
-    def _samples(self) -> frozenset[int]:
-        """Rows at samples of controllers and where forces jump in time: steps end there whatever their grid is."""
-        time, found = self.record.time, set[int]()
-        for period in (each.period for each in self.controllers if each.period is not None):
-            sample = time[0] + np.round((time - time[0]) / period) * period
-            found.update(map(int, np.flatnonzero(np.abs(sample - time) <= 2e-12 * self.full)))
-        equations, near = self.mechanism.equations, 2e-12 * self.full
-        for vector in (self.record.parameters, *self.changes.values()):
-            for jump in jumps_between(equations, vector, float(time[0]), float(time[-1]), self.full):
-                first, last = np.searchsorted(time, (jump.right - near, jump.right + near))
-                found.update(range(int(first), int(last)))
-        return frozenset(found)
-
     @cached_property
     def changes(self) -> dict[int, Vector]:
         """Values of all parameters, by the row from which on they are those that controllers wrote."""
         size = len(self.record.parameters)
         return {row: np.array(values[:size]) for row, values in self.record.parameter_changes}
-
-    def between(self, first: int, last: int) -> Rows:
-        """Rows from the first to the last one."""
-        record, here = self.record, slice(first, last + 1)
-        return self.ends[here], record.q[here], self.y[here], self.rate[here], record.lam[here]
-
-    def step_to(self, row: int, motion: Motion, rates: Rates) -> Rows:
-        """The state of the pass, and a row of the run."""
-        record = self.record
-        return (
-            np.array([motion.t, self.ends[row]]), np.array([motion.q, record.q[row]]),
-            np.array([motion.y, self.y[row]]), np.array([rates.rate, self.rate[row]]),
-            np.array([rates.lam, record.lam[row]]),
-        )  # fmt: skip
 
     def mode(self, row: int) -> Mode:
         """What acts from a row on."""

@@ -426,8 +426,10 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         t1 = K.time + h
         status = tried_part(K, h, t1)
         if is_shortened(K, status):
-            status = tried_step(K, SHORTER * h, K.time + SHORTER * h)
-            h = K.step_taken
+            h *= SHORTER
+            status = tried_step(K, h, K.time + h)
+            if K.step_taken != h:
+                h = K.step_taken
             t1 = K.time + h
         if status != 0:
             return status
@@ -447,7 +449,8 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             status = tried_step(K, h, K.time + h)
             if status != 0:
                 return status
-            h = K.step_taken
+            if K.step_taken != h:
+                h = K.step_taken
             t1 = K.time + h
             within = True
             cut = False

@@ -26,7 +26,7 @@ ENTRY = "mbd_tangent_kernel"
 HELD = (
     "stepping.step_retry.tried_step", "stepping.advance.tried_part", "stepping.advance.find_event",
     "stepping.advance.begin_substeps", "stepping.advance.passes_events", "stepping.advance.has_spurious_reaction",
-    "stepping.starting.still_dependent", "contact.cone_steps.slides_on", "contact.cone_steps.shorter_turn",
+    "stepping.starting.still_dependent", "contact.cone_steps.slides_on",
     "contact.cone_steps.slides_at_first", "events.locate.jumps_over_stop", "singular.events.refuses",
     "events.locate.find_jump", "hooks.scheme_error", "stepping.restart.refresh_scales", "stepping.restart.weigh",
     "schemes.iteration.residual_size", "schemes.iteration.is_below_floors", "events.guards.is_quiet",

@@ -296,8 +296,8 @@ class _Printed:
             case tree.Element(_, index, _, _):
                 return f"{self.array(node)}[{self.value(index)}]"
             case tree.Convert(value, kind):
-                found = self.value(value)
-                return f"({found} != 0)" if kind == "bool" else f"int({found})" if kind == "int" else found
+                word = {"bool": "({} != 0)", "int": "int({})"}.get(kind, "{}")
+                return word.format(self.value(value))
             case tree.Operation(operator, left, right, kind):
                 return self.operation(operator, self.value(left), self.value(right), kind)
             case tree.Unary(operator, value, _):

@@ -11,7 +11,7 @@ from mbd.sensitivity.motion import Motion, Rates
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_start
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, sided
-from mbd.sensitivity.strikes import refuse_touching_by_chance
+from mbd.sensitivity.strikes import refuse_sided_impact
 
 __all__ = ["refuse_turning_points"]
 
@@ -72,5 +72,5 @@ def _fired(rows: RunRows, programs: Programs, row: int, motion: Motion, rates: R
     if place is not None and not abs(growth[place]) > max(GRAZE * terms[place], slowest):
         raise refused_graze(fired, motion.t, float(growth[place]), float(terms[place]))
     if fired.kind == "closed" and equations.contacts[k].kind != "penalty":
-        refuse_touching_by_chance(rows, programs, motion, mode, rows.events[row], k)
+        refuse_sided_impact(rows, programs, motion, mode, rows.events[row], k)
     return fired

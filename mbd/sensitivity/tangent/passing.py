@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,20 +13,23 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Guard
+from mbd.equations.switching_times import instant_slopes
 from mbd.errors import CapabilityError
+from mbd.integrators.stepping import own_scheme
 from mbd.kernel.records import TABLE
+from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.sensitivity.motion import Motion, Rates, Tangent
+from mbd.sensitivity.one_sided import AT_ONCE, sided_end
 from mbd.sensitivity.passed import Instant, Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.resets import after_reset
-from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.tangent.margins import refuse_turning_points
 from mbd.sensitivity.tangent.run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
-from mbd.simulation.run import stepper
 from mbd.simulation.simulate import INSTANT
 
-__all__ = ["AnotherRun", "is_compiled", "tangent_run"]
+__all__ = ["AnotherRun", "tangent_run"]
 
 OWN = ("contact", "impact", "locate", "store", "rest_speed")
 FOLLOWING = ("allowed", "longest", "driven")
@@ -40,9 +44,12 @@ class AnotherRun(CapabilityError):
     """The same run with derivatives is not the run."""
 
 
-def is_compiled(rows: RunRows) -> bool:
-    """Whether there is machine code of the model and of the scheme."""
-    return stepper.is_compiled(rows.mechanism, rows.integrator)
+def _require_known_steps(rows: RunRows) -> None:
+    """Refuse schemes of a user that are written in Python alone."""
+    if own_scheme(rows.integrator) is NO_SCHEME:
+        raise refused(
+            f"steps of {rows.integrator!r} are not differentiated", "take RungeKutta853(), RadauIIA() or HHT()"
+        )
 
 
 class Charted:
@@ -53,9 +60,9 @@ class Charted:
 
     def base(self, q: Vector) -> Matrix:
         """∂(q ⊕ x)/∂x (n_q, n_v) at x = 0."""
-        if self.programs.charts.is_vector:
+        if self.programs.mechanism.vector:
             return np.eye(len(q))
-        compose, units = self.programs.charts.compose, STEP * np.eye(self.programs.columns.n_v)
+        compose, units = self.programs.equations.configuration.compose, STEP * np.eye(self.programs.columns.n_v)
         parts = [
             sum(w * (compose(q, k * unit) - compose(q, -k * unit)) for k, w in ((1, 45.0), (2, -9.0), (3, 1.0)))
             for unit in units
@@ -82,6 +89,7 @@ def tangent_run(
     AnotherRun
         where round-off makes the same run with derivatives another one.
     """
+    _require_known_steps(rows)
     charted, layout, count = Charted(programs), rows.mechanism.layout, len(start.t)
     contacts = [contact.name for contact in programs.equations.contacts]
     of_e = np.array([restitutions.get(name, np.zeros(count)) for name in contacts]).reshape(len(contacts), count)
@@ -92,6 +100,7 @@ def tangent_run(
         run = _again(rows)
         run.every_row = visit is not None
         run.differentiated_reset = _reset(rows, programs, charted, start.p[:, some], run)
+        run.moved_with_jump = partial(_moved_with_jump, rows, programs, start.p[:, some], run)
         run.begin_tangents(programs.places)
         run.at_start()
         run.seed(start.p[:, some], of_q[:, some], start.y[:, some], start.anchors[:, some], of_e[:, some])
@@ -208,11 +217,38 @@ def _require_same(rows: RunRows, run: TangentRun) -> None:
     run.stepper.keep_row()
     run.collect()
     if [(each.kind, each.name) for each in run.events] != [(each.kind, each.name) for each in rows.run.events]:
+        _refuse_event_at_end(rows, run)
         raise AnotherRun("the same run with derivatives has other events, by round-off")
     q = rows.record.q[-1]
     off = float(np.max(np.abs(q - run.kernel.q[: len(q)]), initial=0.0))
     if run.stored != len(rows.record.time) or not off <= SAME * max(1.0, float(np.max(np.abs(q), initial=0.0))):
         raise AnotherRun("the same run with derivatives ends elsewhere, by round-off")
+
+
+def _refuse_event_at_end(rows: RunRows, run: TangentRun) -> None:
+    """Raise a `OneSidedError` where one of two runs has an event as it ends that the other has not."""
+    counts = len(rows.run.events), len(run.events)
+    last = (rows.run.events if counts[0] > counts[1] else run.events)[-1]
+    end, start = float(rows.record.time[-1]), float(rows.record.time[0])
+    if counts[0] != counts[1] and end - last.time <= AT_ONCE * (end - start):
+        raise sided_end([last.name], end)
+
+
+def _moved_with_jump(rows: RunRows, programs: Programs, of_p: Matrix, run: TangentRun) -> Matrix | None:
+    """What is added to δy where forces jump at an instant T(p): ``(ẏ⁻ − ẏ⁺) δT``, at a fixed time; None elsewhere."""
+    row, time = run.stored - 1, rows.record.time
+    if not 0 <= row < len(time) - 1 or time[row + 1] != time[row] or row + 1 in rows.events or not programs.places:
+        return None
+    now = np.array(run.kernel.params[: len(programs.values)])
+    slopes = instant_slopes(programs.equations, now, float(rows.ends[row]), rows.full, programs.places)
+    if not len(slopes) or not any(slope.any() for slope in slopes):
+        return None
+    if len(slopes) > 1:
+        raise refused(
+            f"forces jump at t = {time[row]:.9g} s for several reasons, whose instants parameters move apart: the run "
+            "has a derivative on one side only"
+        )
+    return np.outer(rows.rate[row] - rows.rate[row + 1], slopes[0] @ of_p)
 
 
 def _reset(rows: RunRows, programs: Programs, charted: Charted, of_p: Matrix, run: TangentRun) -> Any:

@@ -54,7 +54,7 @@ NOT_FOLLOWED = -3
 """Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
 FOLLOWED = 1e-12
 """Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
-ROUND_OFF = 0.1
+STALLED = 0.9
 """Part of the last correction of derivatives above which the next one is round-off [-]."""
 MOST_CORRECTIONS = 12
 """Corrections of derivatives with matrices that are not quite those of the solution [-]."""
@@ -259,7 +259,8 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
 
         K (δv̇, δλ) = −(δr + r_x Z δg, (δḣ + ḣ_x Z δg)/c_C)   δh + B (c_K δv̇ + Z δg) = 0   Z = K₀⁻¹ (0, 1)
 
-    solved exactly: δg by the Schur complement of `prepare_corrections`.
+    solved at once: δg by the Schur complement of `prepare_corrections`. Where coordinates do not add, and with friction
+    in a plane in space, K is nearly the derivative, and corrections follow.
     """
     if sharing(K):
         return NOT_FOLLOWED
@@ -291,21 +292,32 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
     if corrects and prepare_corrections(K, m, by_v, by_x) != 0:
         return NOT_FOLLOWED
     # rates and multipliers, then what they change where positions are corrected
-    call(K, K.residual_program, K.out)
-    for i in range(n):
-        K.rhs[i] = -derivative_of(K.out[i])
-    for k in range(m):
-        K.rhs[n + k] = right_hand_side(K, k, m, by_v, by_x)
-    solve_plain(K.kkt, n + m, K.pivots, K.rhs)
-    if corrects:
-        correct_positions(K, m, by_x)
-    for i in range(n):
-        K.block[K.o_a + i] += K.rhs[i]
-        K.block[K.o_v + i] += by_v * K.rhs[i]
-        if i < K.n_v:
-            K.block[K.o_x + i] += by_x * K.rhs[i]
-    for k in range(m):
-        K.block[K.o_lam + K.rows[k]] += K.rhs[n + k]
+    exact = K.vector == 1 and K.n_cones == 0  # is the matrix the derivative itself?
+    before = 1e300
+    for _ in range(MOST_CORRECTIONS):
+        call(K, K.residual_program, K.out)
+        for i in range(n):
+            K.rhs[i] = -derivative_of(K.out[i])
+        for k in range(m):
+            K.rhs[n + k] = right_hand_side(K, k, m, by_v, by_x)
+        solve_plain(K.kkt, n + m, K.pivots, K.rhs)
+        if corrects:
+            correct_positions(K, m, by_x)
+        change_of = 0.0
+        largest = 0.0
+        for i in range(n):
+            K.block[K.o_a + i] += K.rhs[i]
+            K.block[K.o_v + i] += by_v * K.rhs[i]
+            if i < K.n_v:
+                K.block[K.o_x + i] += by_x * K.rhs[i]
+            if not exact:
+                change_of = max(change_of, largest_derivative(K.rhs[i]))
+                largest = max(largest, largest_derivative(K.block[K.o_a + i]))
+        for k in range(m):
+            K.block[K.o_lam + K.rows[k]] += K.rhs[n + k]
+        if exact or change_of <= FOLLOWED * largest or change_of > STALLED * before:
+            break
+        before = change_of
     finish(K, h)
     return 0
 
@@ -611,7 +623,7 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
             for j in range(n):
                 change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
                 largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
-        if change <= FOLLOWED * largest or change > 0.9 * before:
+        if change <= FOLLOWED * largest or change > STALLED * before:
             break
         before = change
     status = complete(K, h, t1, m, False, False)

@@ -136,6 +136,7 @@ class TangentRun(Run):
     ends_exactly = True
     rows_at_once = 256  # derivatives of more would not stay in the caches of processors
     every_row = False
+    moved_with_jump: Callable[[], Matrix | None]
     differentiated_reset: Callable[[Guard, dict[str, tuple[Any, Lanes]], Any, Any], tuple[Lanes, Lanes]]
 
     def at_state(self) -> dict[str, tuple[Any, Lanes]]:
@@ -172,6 +173,9 @@ class TangentRun(Run):
             if 0 <= k < count:
                 self.of_rows[stored + k] = rows[k, :, :DIRECTIONS].copy()
         super().collect()
+        change = self.moved_with_jump() if count else None
+        if change is not None:
+            self.stepper.tangent("y")[: len(change), : change.shape[1]] += change
         self.of_times[known:] = [line for _, line in zip(self.events[known:], lines, strict=True)]
 
     def reset(self, guard: Guard) -> None:
