@@ -318,8 +318,8 @@ class _Printed:
                 if not self.plain:
                     given = "None" if inputs is None else self.value(inputs)
                     return f"{record}.evaluate({self.value(number)}, {given}, {target})"
-                given = f"{record}.block" if inputs is None else self.value(inputs)
-                return f"{record}.code[{self.value(number)}]({given}, {record}.params, {target})"
+                block = f"{record}.block" if inputs is None else self.value(inputs)
+                return f"{record}.code[{self.value(number)}]({block}, {record}.params, {target})"
         raise TypeError(node)
 
     def call(self, node: tree.Call) -> str:

@@ -95,10 +95,10 @@ def _made(
             if not entry.is_zero:
                 made.append((line, place, entry))
     made.sort(key=lambda each: each[0])
-    lines, columns, entries = ([each[k] for each in made] for k in range(3))
-    if entries:
-        mechanism.common.add({symbol: entries}, True)
-    function = mechanism.common[symbol] if entries else None
+    if made:
+        mechanism.common.add({symbol: [entry for _, _, entry in made]}, True)
+    function = mechanism.common[symbol] if made else None
+    lines, columns = ([each[k] for each in made] for k in (0, 1))
     return function, np.array(lines, dtype=np.int64), np.array(columns, dtype=np.int64)
 
 

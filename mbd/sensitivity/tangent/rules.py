@@ -14,6 +14,7 @@ from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK
 from mbd.kernel.contact.islands import saddle_entry
 from mbd.kernel.events.guards import guard_value, watch
+from mbd.kernel.events.transitions import is_due
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import Integers, Kernel, Reals
 from mbd.kernel.schemes.iteration import finish
@@ -145,7 +146,10 @@ def metric_place(K: Kernel) -> int:
 
 
 def follow_candidate(K: Kernel, h: float, t1: float) -> int:
-    """The candidate once more, with its derivatives."""
+    """The candidate once more, with its derivatives; the end of a step of the grid that a timer ends moves with it."""
+    if K.n_machines > 0 and is_due(K, t1):
+        t1 = without_tangent(t1) + derivative_of(K.due_time)
+        h = without_tangent(h) + derivative_of(K.due_time - K.time)
     keep_candidate(K)
     K.near_singular = int(without_tangent(K.starts[step_place(K)]))
     status = try_step(K, h, t1)
