@@ -1,4 +1,4 @@
-"""Scenes in space with contacts that a judge once called bad, each for another reason, keep the laws or end by name."""
+"""Scenes that a judge once called bad, each for another reason, keep the laws; those in space may end by name."""
 
 from __future__ import annotations
 
@@ -31,3 +31,18 @@ LONG = 2010515
 def test_settled_scenes_stay_settled(number):
     told = verdict(number)
     assert told["kind"] != "bad", told["reasons"]
+
+
+DRIVEN = {
+    10006949: "a block on a table slips where its limit is reached, though multipliers lag",
+    10011109: "a block on a table at which index 3 found no end of a step",
+    10022587: "a foot that rises from a hill, comes down and rises again within one step",
+    10022922: "a start from rest about a hinge that lies in the frame of its link",
+    10027540: "balanced wheels at whose knot of a table nothing acts",
+}
+
+
+@pytest.mark.parametrize("number", DRIVEN)
+def test_driven_scenes_stay_settled(number):
+    told = verdict(number)
+    assert told["kind"] == "ok", told

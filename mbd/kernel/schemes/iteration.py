@@ -150,8 +150,11 @@ def weigh_by_accelerations(K: Motion) -> bool:
     for unit in range(2):
         largest = 0.0
         for i in range(K.n_v):
+            inertia = 0.0  # all of it: a body turns about a point that stays, where its frame may be
+            for j in range(K.n_v):
+                inertia += abs(K.acc[i * K.n + j] * K.block[K.o_a + j])
             if K.unit[i] == unit:
-                largest = max(largest, abs(K.acc[i * K.n + i] * K.block[K.o_a + i]))
+                largest = max(largest, inertia)
         for i in range(K.n_v):
             size = largest
             if unit == 1 and K.acc[i * K.n + i] == 0.0:
