@@ -315,3 +315,22 @@ def test_a_restitution_is_refused_as_an_unknown_with_what_serves():
     with pytest.raises(mbd.UnknownNameError, match="'floor.restitution' is a number of the model.*wrt="):
         mbd.optimize(model, {"floor.restitution": (0.5, 0.1, 0.9)}, start=start, dt=0.01, until=0.7,
                      maximize="fall.displacement", progress=False)  # fmt: skip
+
+
+@pytest.mark.parametrize("until", ["floor", "landing"])
+def test_an_event_at_the_gap_of_a_contact_happens_with_it(until):
+    """A fall from x: √(2 x/g) and −√(2 g x), of which e comes back."""
+    model = mbd.Model("ball")
+    ball = mbd.PointMass("ball", mass=2.0)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, ball.origin, axis="y"))
+    model.constrain(
+        mbd.Unilateral("floor", mbd.height(ball.origin), restitution=0.5),
+        mbd.Event("landing", mbd.height(ball.origin), direction=-1),
+    )
+    start = mbd.assemble(model, {"fall.displacement": 1.3})
+    found = mbd.sensitivities(
+        model, start, dt=0.01, until=until, wrt=["fall.displacement"], of=["time", "fall.displacement.rate"]
+    )
+    assert found["time", "fall.displacement"] == pytest.approx(math.sqrt(0.5 / 9.81 / 1.3), rel=1e-9)
+    speed = 0.5 * math.sqrt(0.5 * 9.81 / 1.3)
+    assert found["fall.displacement.rate", "fall.displacement"] == pytest.approx(speed, rel=1e-9)

@@ -41,6 +41,10 @@ def refuse_turning_points(
         again = before in rows.events or (
             prior >= 0 and time[prior] == time[before] and (prior in rows.events or prior == 0)
         )
+        if again and (own := _of_own_gap(rows, programs, row)) is not None:
+            found.append(own)
+            instants.append((own.name, known[before][0]))
+            continue
         if again:
             raise sided(
                 f"{rows.events[row][0].name!r} happens at t = {time[before]:.9g} s right after another event or the "
@@ -52,6 +56,19 @@ def refuse_turning_points(
     last = len(time) - 1
     refuse_sided_end(rows, programs, end[0], rows.mode(last), end[1], instants)
     return found
+
+
+def _of_own_gap(rows: RunRows, programs: Programs, row: int) -> Trigger | None:
+    """The event of a row whose guard is the gap of a contact that has just closed: it always happens with that."""
+    equations, now = programs.equations, rows.record.time[row]
+    gaps = [
+        contact.gap for contact in equations.contacts
+        if any(e.name == contact.name and e.kind == "closed" and e.time == now for e in rows.run.events)
+    ]  # fmt: skip
+    for number, guard in enumerate(equations.guards):
+        if guard.name == rows.events[row][0].name and any(guard.value is gap for gap in gaps):
+            return Trigger("event", number, guard.name)
+    return None
 
 
 def _fired(rows: RunRows, programs: Programs, row: int, motion: Motion, rates: Rates) -> Trigger:
