@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 import mbd
+from mbd.laboratory.least_activation import least_activation
 
 
 def arm(strength=1.0):
@@ -90,3 +92,23 @@ def test_what_is_missing_is_named():
         mbd.muscle_forces(model, MOTION)["bicep.force"]
     given = mbd.muscle_forces(bare, MOTION, muscles=model.forces)
     assert given["biceps.force"] == pytest.approx(mbd.muscle_forces(model, MOTION)["biceps.force"])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_activations_are_those_of_scipy(seed):
+    """Of random moments that 12 muscles give about 3 joints, by sequential quadratic programming."""
+    rng, m, j = np.random.default_rng(seed), 12, 3
+    moment, wanted = rng.normal(size=(4, j, m)) * 20.0, rng.normal(size=(4, j)) * 30.0
+    found, reserves = least_activation(moment, wanted, 1.0, np.arange(4.0))
+    for k in range(4):
+        A = np.concatenate([moment[k], np.eye(j)], axis=1)
+        optimum = minimize(
+            lambda z: float(np.sum(z[:m] ** 3) + np.sum(z[m:] ** 2)), np.full(m + j, 0.1), method="SLSQP",
+            jac=lambda z: np.concatenate([3.0 * z[:m] ** 2, 2.0 * z[m:]]), bounds=[(0.0, 1.0)] * m + [(None, None)] * j,
+            constraints=[{"type": "eq", "fun": lambda z, A=A, w=wanted[k]: A @ z - w, "jac": lambda z, A=A: A}],
+            options={"ftol": 1e-12, "maxiter": 500},
+        )  # fmt: skip
+        assert found[k] == pytest.approx(optimum.x[:m], abs=1e-4)
+        assert reserves[k] == pytest.approx(optimum.x[m:], abs=1e-4)
+        ours = np.sum(found[k] ** 3) + np.sum(reserves[k] ** 2)
+        assert ours <= optimum.fun * (1.0 + 1e-9)
