@@ -314,12 +314,12 @@ class _Printed:
             case tree.Call():
                 return self.call(node)
             case tree.Evaluate(kernel, number, inputs, out):
-                record, target = self.value(kernel), self.value(out)
+                table, target = self.value(kernel), self.value(out)
                 if not self.plain:
                     given = "None" if inputs is None else self.value(inputs)
-                    return f"{record}.evaluate({self.value(number)}, {given}, {target})"
-                block = f"{record}.block" if inputs is None else self.value(inputs)
-                return f"{record}.code[{self.value(number)}]({block}, {record}.params, {target})"
+                    return f"{table}.evaluate({self.value(number)}, {given}, {target})"
+                block = f"{table}.block" if inputs is None else self.value(inputs)
+                return f"{table}.code[{self.value(number)}]({block}, {table}.params, {target})"
         raise TypeError(node)
 
     def call(self, node: tree.Call) -> str:
