@@ -57,6 +57,8 @@ def law_of(word: Constraint, holding: Holding, contacts: Sequence[Constraint]) -
         by_state = other is not law.while_closed and isinstance(other, str) and state_of(other, holding.scope.modes)
         if isinstance(other, str) and other not in known and not by_state:
             faults.append(nearest(other, known, "contact"))
+    if at is not None and at.only_while == word.name:
+        faults.append(f"only_while='{word.name}' names itself; name another contact")
     if faults:
         raise ModelError([f"{title}: {fault}" for fault in faults])
     return law

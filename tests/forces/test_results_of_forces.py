@@ -118,5 +118,5 @@ def test_losses_and_springs_of_joints_give_their_power_and_energy(cut):
     np.testing.assert_allclose(run["rail spring.force"], -5.0 * run["rail.displacement"], rtol=1e-12)
     units = run.to_dataframe(["wrist loss.angle.torque", "rail spring.force"]).attrs["units"]
     assert list(units.values())[-2:] == ["N m", "N"]
-    with pytest.raises(mbd.UnknownNameError, match="did you mean 'shoulder.net_moment' or 'shoulder loss.torque'"):
+    with pytest.raises(mbd.UnknownNameError, match="did you mean 'shoulder loss.torque' or 'shoulder spring.torque'"):
         run["shoulder.torque"]
