@@ -16,15 +16,13 @@ from collections.abc import Callable
 from mbd.compile.cache import default_cache
 from mbd.compile.llvm import tag_key
 
-__all__ = ["build", "is_allowed", "start_build"]
+__all__ = ["build", "is_allowed", "keep", "start_build"]
 
 LONGEST = 600.0
 """Seconds after which a build that has not ended is taken for dead, and another may begin."""
 
 PAUSE = 0.5
 """Seconds between two looks at whether another process has built the kernel."""
-
-COMMAND = "from mbd.kernel.first_build import build; build()"
 
 
 def is_allowed() -> bool:
@@ -35,12 +33,13 @@ def is_allowed() -> bool:
     return directory is not None and LEVEL not in os.environ
 
 
-def start_build(then: Callable[[], None]) -> None:
-    """Build the optimized kernel in a process that outlives this one; call `then`, from a thread, when it is there."""
+def start_build(then: Callable[[], None], module: str = __name__, function: str = "build") -> None:
+    """Call a function that builds, in a process that outlives this one; call `then`, from a thread, when it is done."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    command = f"from {module} import {function}; {function}()"
     try:
         process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+            [sys.executable, "-c", command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
     except OSError:  # no further processes: the next run tries again
@@ -57,7 +56,12 @@ def build() -> None:
     """Build the optimized kernel for the cache, or wait for the process that does."""
     from mbd.kernel.build import kernel_text, object_of, tag
 
-    store, key = default_cache(), tag_key(tag())
+    keep(tag(), lambda: object_of(kernel_text()))
+
+
+def keep(tag: str, make: Callable[[], bytes]) -> None:
+    """Put what `make` compiles into the cache, or wait for the process that does."""
+    store, key = default_cache(), tag_key(tag)
     assert store.directory is not None
     store.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
     mark = store.directory / f"{key}.building"
@@ -73,7 +77,7 @@ def build() -> None:
         try:
             if hasattr(os, "nice"):
                 os.nice(10)  # beside the run that waits for nothing
-            store.store(key, object_of(kernel_text()), lasting=True)
+            store.store(key, make(), lasting=True)
         finally:
             mark.unlink(missing_ok=True)
         break

@@ -15,6 +15,7 @@ from mbd.compile.cache import default_cache
 from mbd.compile.host import Host
 from mbd.compile.llvm import tag_key
 from mbd.kernel import build, first_build, shipped
+from mbd.sensitivity.tangent import build as tangent
 
 SCRIPT = """
 import time, mbd
@@ -70,6 +71,15 @@ def test_two_processes_build_the_kernel_once(monkeypatch, tmp_path):
         thread.join(10.0)
     assert made == ["text"] and default_cache().load(tag_key(build.tag()), lasting=True) == b"machine code"
     assert not list((tmp_path / "cache").glob("*.building"))
+
+
+def test_the_kernel_of_derivatives_is_kept_like_the_other(monkeypatch, tmp_path):
+    monkeypatch.setenv("MBD_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(os, "nice", lambda steps: 0, raising=False)
+    monkeypatch.setattr(tangent, "text", lambda: "text")
+    monkeypatch.setattr(build, "object_of", lambda text, level: f"{text} at level {level}".encode())
+    tangent.keep_optimized()
+    assert [path.read_bytes().endswith(b"text at level 2") for path in (tmp_path / "cache").glob("kernel-*")] == [True]
 
 
 V3 = ",".join(f"+{name}" for name in shipped.LEVEL_3)

@@ -20,7 +20,7 @@ from mbd.sensitivity.tangent.interpreted import Table, interpreted
 from mbd.sensitivity.tangent.printer import tangent_text
 from mbd.trees.tree import Function
 
-__all__ = ["entry", "own_rules", "plain_entry"]
+__all__ = ["entry", "keep_optimized", "own_rules", "plain_entry"]
 
 ENTRY = "mbd_tangent_kernel"
 HELD = (
@@ -52,12 +52,16 @@ def entry() -> Callable[[int, int], int]:
 
 @lru_cache(maxsize=4)
 def _loaded(schemes: tuple[str, ...]) -> Callable[[int, int], int]:
-    from mbd.compile.llvm import Machine, cached_object
+    from mbd.compile.cache import default_cache
+    from mbd.compile.llvm import Machine, cached_object, tag_key
+    from mbd.kernel.first_build import is_allowed, start_build
 
-    digest = hashlib.sha256(build.source_digest().encode())
-    for name in ("build", "printer", "rules"):
-        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
-    code = cached_object(f"tangent kernel {LEVEL} {digest.hexdigest()}", _object, lasting=True)
+    first = schemes == build.LISTED and is_allowed()
+    if first and default_cache().load(tag_key(_tag(LEVEL)), lasting=True) is None:
+        code = cached_object(_tag(0), lambda: _said("; a faster one follows in the background", 0))
+        start_build(_loaded.cache_clear, __name__, "keep_optimized")
+    else:
+        code = cached_object(_tag(LEVEL), lambda: _said("", LEVEL), lasting=True)
     _machines.append(Machine())
     address = _machines[-1].load(code, [ENTRY])[0]
     return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)(address)
@@ -67,9 +71,24 @@ _machines: list[Any] = []
 """What holds these kernels."""
 
 
-def _object() -> bytes:
-    print("mbd: building the kernel of derivatives, once for this machine …", file=sys.stderr, flush=True)
-    return build.object_of(text(), level=LEVEL)
+def _tag(level: int) -> str:
+    """What the kernel of a level of optimization is called in the cache; all levels give the same bits."""
+    digest = hashlib.sha256(build.source_digest().encode())
+    for name in ("build", "printer", "rules"):
+        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
+    return f"tangent kernel {level} {digest.hexdigest()}"
+
+
+def _said(then: str, level: int) -> bytes:
+    print(f"mbd: building the kernel of derivatives, once for this machine{then} …", file=sys.stderr, flush=True)
+    return build.object_of(text(), level=level)
+
+
+def keep_optimized() -> None:
+    """The optimized kernel for the cache, in a process of its own (see `mbd.kernel.first_build`)."""
+    from mbd.kernel.first_build import keep
+
+    keep(_tag(LEVEL), lambda: build.object_of(text(), level=LEVEL))
 
 
 def own_rules() -> Source:
