@@ -130,7 +130,9 @@ def muscle_forces(
         raise ModelError(f"reserve is the moment that costs as much as a full activation, > 0 N m; got {reserve!r}")
     own = [force.name for force in model.forces if isinstance(force, Muscle)]
     bare = model.without(*own) if own else model
-    moments = inverse_dynamics(bare, motion, joints, plates=plates, parameters=parameters)
+    of_muscles = {name for muscle in acting for name in muscle.parameters()}
+    others = {name: value for name, value in (parameters or {}).items() if name not in of_muscles}
+    moments = inverse_dynamics(bare, motion, joints, plates=plates, parameters=others)
     crossed = _crossed(bare, acting, moments, parameters or {})
     arms, strength, passive, length = crossed.arms, crossed.strength, crossed.passive, crossed.length
     driven = moments.driven

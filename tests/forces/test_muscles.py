@@ -155,6 +155,31 @@ def test_a_muscle_at_rest_carries_its_weight(curves):
     assert muscle.fiber_at(length, 0.3) == pytest.approx(run["muscle.fiber_length"][-1], rel=1e-6)
 
 
+def test_a_muscle_without_damping_is_the_limit_of_small_damping():
+    """OpenSim's muscles of De Groote have no damping unless a file gives some."""
+    ends = []
+    for damping in 0.0, 1e-9:
+        model = mbd.Model("hanging")
+        load = mbd.PointMass("load", mass=20.0)
+        model.connect(mbd.Translation("rail", model.ground.origin, load.origin, axes="y"))
+        points = (model.ground.point(0.0, 1.0), load.origin)
+        muscle = mbd.Muscle("muscle", points, 800.0, 0.1, 0.2, 0.2, 0.3, damping=damping)
+        model.apply(muscle)
+        fibers = {"muscle.activation": 0.3, "muscle.fiber_length": muscle.fiber_at(0.3, 0.3)}
+        start = mbd.assemble(model, {"rail.y": 0.7, **fibers})
+        ends.append(mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.1)["muscle.fiber_length"])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-8)
+
+
+def test_a_slack_muscle_has_no_length_of_fibers_at_rest():
+    ground = mbd.Model("slack").ground
+    muscle = mbd.Muscle("muscle", (ground.point(0.0, 1.0), ground.point(0.0, 0.0)), 800.0, 0.1, 0.2)
+    with pytest.raises(mbd.ModelError, match="slack at length 0.1 m"):
+        muscle.fiber_at(0.1, 0.5)
+    with pytest.raises(mbd.ModelError, match="length of 'muscle' must be finite"):
+        muscle.fiber_at(math.nan, 0.5)
+
+
 def test_activation_follows_the_published_equation():
     """Held still, so that only the activation moves: against scipy's solution of the equation."""
     from scipy.integrate import solve_ivp
@@ -255,3 +280,13 @@ def test_polynomials_are_fitted_to_lengths():
         mbd.PolynomialPath.fitted([hip, knee], q[:5], length[:5], 3)
     with pytest.raises(mbd.ModelError, match="whole numbers"):
         mbd.PolynomialPath([hip, knee], {(1,): 0.1})
+
+
+@pytest.mark.parametrize(
+    ("coordinates", "degree", "told"),
+    [(np.zeros((5, 1)), 1.5, "degree"), (np.zeros((5, 1)), -1, "degree"), (np.full((5, 1), np.nan), 1, "finite")],
+)
+def test_a_fit_of_a_path_names_what_is_wrong(coordinates, degree, told):
+    model = forearm()
+    with pytest.raises(mbd.ModelError, match=told):
+        mbd.PolynomialPath.fitted(model.joints[0], coordinates, np.zeros(5), degree)

@@ -112,3 +112,12 @@ def test_activations_are_those_of_scipy(seed):
         assert reserves[k] == pytest.approx(optimum.x[m:], abs=1e-4)
         ours = np.sum(found[k] ** 3) + np.sum(reserves[k] ** 2)
         assert ours <= optimum.fun * (1.0 + 1e-9)
+
+
+def test_parameters_of_muscles_may_differ_from_the_model():
+    """Muscles of half the strength, by parameters, pull as those that are described with it."""
+    names = ("flexor", "extensor", "biceps", "triceps", "brachialis", "anconeus")
+    given = {f"{name}.max_force": 2000.0 for name in names}
+    found, described = mbd.muscle_forces(arm(8.0), MOTION, parameters=given), mbd.muscle_forces(arm(4.0), MOTION)
+    for name in names:
+        np.testing.assert_allclose(found[f"{name}.force"], described[f"{name}.force"], rtol=1e-9, atol=1e-9)

@@ -242,8 +242,8 @@ class Muscle(Force):
         optimal = self._number(scope, "fiber_length")
         force = self._load(scope) * fiber / along - self._curves.passive(fiber / optimal)
         active = self._activation(scope) * self._curves.active(fiber / optimal)
-        damped = self.damping != 0.0
-        velocity = self._curves.velocity(active, self._number(scope, "damping"), force, damped)
+        damping = self._number(scope, "damping") if self.damping != 0.0 else 0.0
+        velocity = self._curves.velocity(active, damping, force, damped=self.damping != 0.0)
         return velocity * self._number(scope, "max_velocity") * optimal
 
     def _force(self, scope: Scope) -> Any:
@@ -293,12 +293,24 @@ class Muscle(Force):
         Parameters
         ----------
         length : l_MT of the path [m], a state's ``state["name.length"]``
-        activation : a
+        activation : a ≥ 0 [-]
+
+        Returns
+        -------
+        float
+            [m]
+
+        Raises
+        ------
+        ModelError
+            for a path so short that its tendon is slack.
         """
         from math import sqrt as root
 
         from scipy.optimize import brentq
 
+        length = number(length, f"length of '{self.name}'")
+        activation = number(activation, f"activation of '{self.name}'")
         thickness, optimal = self.fiber_length * float(sin(self.pennation)), self.fiber_length
 
         def apart(fiber: float) -> float:
@@ -310,7 +322,10 @@ class Muscle(Force):
         low = max(0.05 * optimal, thickness * (1.0 + 1e-9))
         high = max(root(length * length + thickness * thickness), 2.0 * low)
         if not apart(low) < 0.0 < apart(high):
-            return low
+            raise ModelError(
+                f"Muscle '{self.name}' is slack at length {length:.3g} m with activation {activation:.3g}: fibers and "
+                f"a tendon of {self.tendon_length:.3g} m have no equilibrium there; give the length of a stretched path"
+            )
         return float(brentq(apart, low, high, xtol=1e-15, rtol=1e-14))
 
 

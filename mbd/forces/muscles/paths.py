@@ -180,21 +180,37 @@ class PolynomialPath(Path):
         object.__setattr__(self, "terms", tuple(found))
 
     @classmethod
-    def fitted(cls, joints: Sequence[Joint], coordinates: Matrix, length: Vector, degree: int) -> PolynomialPath:
+    def fitted(
+        cls, joints: Joint | Sequence[Joint], coordinates: Matrix, length: Vector, degree: int
+    ) -> PolynomialPath:
         """The polynomial of a degree that is nearest to measured or computed lengths, by least squares.
 
         Parameters
         ----------
+        joints : k joints, each with one coordinate
         coordinates : (R, k) of the joints [rad or m]
         length : (R,) l [m]
-        degree : largest sum of powers
+        degree : largest sum of powers, from 0 to 20
+
+        Raises
+        ------
+        ModelError
+            for tables of other shapes or with numbers that are not finite, and for more terms than postures.
         """
+        if isinstance(joints, Joint):
+            joints = (joints,)
+        if not isinstance(degree, int | np.integer) or isinstance(degree, bool) or not 0 <= degree <= 20:
+            raise ModelError(
+                f"degree of PolynomialPath.fitted is a whole number from 0 to 20, got {shown(degree)[:80]}"
+            )
         q, l_MT = np.asarray(coordinates, dtype=float), np.asarray(length, dtype=float)
         if q.ndim != 2 or q.shape[1] != len(joints) or l_MT.shape != (len(q),):
             raise ModelError(
                 f"PolynomialPath.fitted needs coordinates (R, {len(joints)}) and as many lengths (R,), got {q.shape} "
                 f"and {l_MT.shape}"
             )
+        if not (np.isfinite(q).all() and np.isfinite(l_MT).all()):
+            raise ModelError("PolynomialPath.fitted: coordinates and lengths must be finite; leave gaps out")
         powers = [p for p in np.ndindex(*(degree + 1,) * len(joints)) if sum(p) <= degree]
         if len(powers) > len(q):
             raise ModelError(
