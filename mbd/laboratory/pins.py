@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import is_
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -19,8 +20,8 @@ from mbd.trajectory import Trajectory
 
 __all__ = ["Pin", "pin_moments", "without_pins"]
 
-KNOWN: WeakKeyDictionary[Any, tuple[tuple[int, ...], tuple[Any, tuple[Pin, ...]]]] = WeakKeyDictionary()
-"""Models without the friction of their pins, made once for the same joints."""
+KNOWN: WeakKeyDictionary[Any, tuple[tuple[Joint, ...], Any, tuple[Pin, ...]]] = WeakKeyDictionary()
+"""Joints of models, and these without the friction of their pins, made once for the same joints."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,10 @@ def without_pins(model: Any) -> tuple[Any, tuple[Pin, ...]]:
     joints = getattr(model, "joints", ())
     if not any(loss.needs_reaction for joint in joints for _, _, loss in joint.losses()):
         return model, ()
-    key = tuple(map(id, joints))
-    if model in KNOWN and KNOWN[model][0] == key:
-        return KNOWN[model][1]
+    known, other, found = KNOWN.get(model, ((), None, ()))
+    if len(known) == len(joints) and all(map(is_, known, joints)):
+        vars(other).update({**vars(model), "joints": other.joints})  # the rest of the model may have changed since
+        return other, found
     pins: list[Pin] = []
     bare: list[Joint] = []
     for joint in joints:
@@ -68,8 +70,8 @@ def without_pins(model: Any) -> tuple[Any, tuple[Pin, ...]]:
         bare.append(replace(joint, loss=left) if own else joint)
     other = copy.copy(model)
     other.joints = bare
-    KNOWN[model] = key, (other, tuple(pins))
-    return KNOWN[model][1]
+    KNOWN[model] = tuple(joints), other, tuple(pins)
+    return other, tuple(pins)
 
 
 def pin_moments(

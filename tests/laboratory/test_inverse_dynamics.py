@@ -406,3 +406,19 @@ def test_pins_rub_by_the_force_that_they_carry(loop):
         assert found["pin.moment"][moving] == pytest.approx(run["other.torque"][moving], abs=1e-6)
         rubbing = found["drive.net_moment"] - run["motor.torque"] + 0.05 * run["drive.rate"]
         assert np.abs(rubbing[moving]) == pytest.approx(np.abs(run["drive.friction"][moving]), abs=1e-6)
+
+
+def test_a_model_that_changes_has_other_moments_with_friction_in_its_pins():
+    def pendulum(gravity):
+        model = mbd.Model("pendulum", gravity=gravity)
+        rod = mbd.Link("rod", mass=1.5, length=0.35, center=0.16, inertia=0.016)
+        model.connect(mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.PinFriction(0.1, 0.01)))
+        return model
+
+    time = np.linspace(0.0, 1.0, 41)
+    motion = {"time": time, "pin.angle": 0.3 * np.sin(2.0 * time)}
+    model = pendulum((0.0, -9.81, 0.0))
+    mbd.inverse_dynamics(model, motion)
+    model.gravity = (0.0, -1.62, 0.0)
+    expected = mbd.inverse_dynamics(pendulum((0.0, -1.62, 0.0)), motion)["pin.moment"]
+    np.testing.assert_array_equal(mbd.inverse_dynamics(model, motion)["pin.moment"], expected)
