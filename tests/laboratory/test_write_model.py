@@ -142,3 +142,39 @@ def test_what_a_format_lacks_is_named(tmp_path):
     alike.connect(mbd.Revolute("one", alike.ground.origin, a.origin), mbd.Revolute("two", a.origin, b.origin))
     with pytest.raises(mbd.ModelError, match="alike without blanks"):
         mbd.write_model(alike, tmp_path / "m.osim")
+
+
+@pytest.mark.parametrize("suffix", [".urdf", ".osim"])
+def test_stops_are_written_or_listed(suffix, tmp_path):
+    """Of a slider along one axis of a `Translation`, and of a joint that closes a loop, which no file has."""
+    model = mbd.Model("loop")
+    a, b, c = (mbd.Link(name, mass=1.0, length=1.0, center=0.5, inertia=0.1) for name in "abc")
+    sled = mbd.RigidBody("sled", 1.0, (0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+    slider = mbd.Translation("slider", model.ground.origin, sled.origin, axes="x")
+    closing = mbd.Revolute("closing", c.end, model.ground.point(1.0, 0.0))
+    model.connect(
+        mbd.Revolute("first", model.ground.origin, a.start), mbd.Revolute("second", a.end, b.start),
+        mbd.Revolute("third", b.end, c.start), closing, slider,
+    )  # fmt: skip
+    model.constrain(
+        mbd.Unilateral("near", mbd.extension(slider, offset=-0.5)),
+        mbd.Unilateral("far", mbd.flexion(slider, offset=-0.7)),
+        *(mbd.Unilateral(f"{j.name} stop", mbd.flexion(j, offset=-3.0)) for j in model.joints if j is not slider),
+    )
+    report = mbd.write_model(model, tmp_path / f"loop{suffix}")
+    assert "0.7" in (tmp_path / f"loop{suffix}").read_text()
+    left = "; ".join(report.left_out)
+    assert "'near'" not in left and "'far'" not in left
+    (cut,) = [line.split("'")[1] for line in report.left_out if "closes a loop" in line]
+    assert f"'{cut} stop'" in left
+
+
+def test_the_activation_of_a_muscle_comes_back(tmp_path):
+    model = mbd.Model("arm")
+    arm = mbd.RigidBody("arm", 1.0, (0.01, 0.01, 0.01, 0.0, 0.0, 0.0))
+    model.connect(mbd.Revolute("elbow", model.ground.origin, arm.origin))
+    points = (model.ground.point(0.0, 0.3), arm.point(0.02, -0.05))
+    model.apply(mbd.Muscle("biceps", points, 600.0, 0.1, 0.2, excitation=0.4, damping=0.0))
+    mbd.write_model(model, tmp_path / "arm.osim")
+    (muscle,) = mbd.read_model(tmp_path / "arm.osim").muscles.values()
+    assert (muscle.excitation, muscle.damping) == (0.4, 0.0)

@@ -12,8 +12,6 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.bodies.base import Frame
 from mbd.bodies.marker import Marker
-from mbd.constraints.measures import JointMeasure
-from mbd.constraints.unilateral import Unilateral
 from mbd.errors import ModelError
 from mbd.forces.muscles import Muscle
 from mbd.forces.muscles.paths import PointPath
@@ -27,7 +25,7 @@ from mbd.joints.translation import Translation
 from mbd.joints.universal import Universal
 from mbd.joints.weld import Weld
 from mbd.laboratory.models.report import ImportReport
-from mbd.laboratory.models.written_tree import WrittenJoint, inertial_of, place_of, tree_to_write, turned_to
+from mbd.laboratory.models.written_tree import WrittenJoint, inertial_of, place_of, stops_of, tree_to_write, turned_to
 
 __all__ = ["osim_of"]
 
@@ -48,7 +46,7 @@ def osim_of(model: Any) -> tuple[str, ImportReport]:
     report = ImportReport()
     values = dict(model.parameters)
     tree, report.left_out[:] = tree_to_write(model)
-    ranges, stopped = _ranges(model)
+    ranges, stopped = _ranges(model, tree)
     names = _names(model)
     bodies, joints = list[str](), list[str]()
     for each in tree:
@@ -218,6 +216,9 @@ def _muscle(muscle: Muscle, names: dict[str, str], values: dict[str, float]) -> 
         )
     if muscle.is_delayed and tag == KINDS["de groote"]:
         times += f"<activation_dynamics_smoothing>{number('smoothing')}</activation_dynamics_smoothing>"
+    active = ""
+    if isinstance(muscle.excitation, float):
+        active = f"<default_activation>{number('excitation')}</default_activation>"
     flags = f"<ignore_tendon_compliance>{str(not muscle.is_elastic).lower()}</ignore_tendon_compliance>"
     flags += f"<ignore_activation_dynamics>{str(not muscle.is_delayed).lower()}</ignore_activation_dynamics>"
     return (
@@ -227,18 +228,16 @@ def _muscle(muscle: Muscle, names: dict[str, str], values: dict[str, float]) -> 
         f"<tendon_slack_length>{number('tendon_length')}</tendon_slack_length>"
         f"<pennation_angle_at_optimal>{number('pennation')}</pennation_angle_at_optimal>"
         f"<max_contraction_velocity>{number('max_velocity')}</max_contraction_velocity>"
-        f"<fiber_damping>{number('damping')}</fiber_damping>{times}{flags}"
+        f"<fiber_damping>{number('damping')}</fiber_damping>{times}{flags}{active}"
         f"<GeometryPath><PathPointSet><objects>{''.join(points)}</objects></PathPointSet></GeometryPath></{tag}>"
     )
 
 
-def _ranges(model: Any) -> tuple[dict[str, tuple[float, float]], set[str]]:
-    """Ranges of joints with a stop on both sides, and the names of these stops."""
+def _ranges(model: Any, tree: list[WrittenJoint]) -> tuple[dict[str, tuple[float, float]], set[str]]:
+    """Ranges of the joints that are written with a stop on both sides, and the names of these stops."""
     ends: dict[str, dict[float, tuple[float, str]]] = {}
-    for word in model.constraints:
-        measure = getattr(word, "measure", None)
-        if isinstance(word, Unilateral) and isinstance(measure, JointMeasure) and abs(measure.sign) == 1.0:
-            ends.setdefault(measure.joint.name, {})[measure.sign] = (measure.sign * measure.offset, word.name)
+    for name, measure in stops_of(model, tree):
+        ends.setdefault(measure.joint.name, {})[measure.sign] = (measure.sign * measure.offset, name)
     whole = {name: own for name, own in ends.items() if len(own) == 2}
     names = {each[1] for own in whole.values() for each in own.values()}
     return {name: (own[1.0][0], own[-1.0][0]) for name, own in whole.items()}, names

@@ -9,8 +9,6 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.constraints.measures import JointMeasure
-from mbd.constraints.unilateral import Unilateral
 from mbd.errors import ModelError
 from mbd.joints.cylindrical import Cylindrical
 from mbd.joints.free import Free
@@ -22,7 +20,15 @@ from mbd.joints.translation import Translation
 from mbd.joints.universal import Universal
 from mbd.joints.weld import Weld
 from mbd.laboratory.models.report import ImportReport
-from mbd.laboratory.models.written_tree import Inertial, Place, WrittenJoint, inertial_of, place_of, tree_to_write
+from mbd.laboratory.models.written_tree import (
+    Inertial,
+    Place,
+    WrittenJoint,
+    inertial_of,
+    place_of,
+    stops_of,
+    tree_to_write,
+)
 
 __all__ = ["urdf_of"]
 
@@ -55,7 +61,7 @@ def urdf_of(model: Any) -> tuple[str, ImportReport]:
         root += " ground"
     names, frames = {model.ground.name: root}, {model.ground.name: (np.zeros(3), UP)}
     links, joints = [_link(root, None)], list[str]()
-    limits, stopped = _limits(model)
+    limits, stopped = _limits(model, tree)
     for each in tree:
         body = each.child.body
         names[body.name], frames[body.name] = body.name, place_of(each.child, values)
@@ -67,7 +73,8 @@ def urdf_of(model: Any) -> tuple[str, ImportReport]:
         for number, (word, axis, name) in enumerate(steps):
             last = number == len(steps) - 1
             link = body.name if last else f"{body.name} carrier {number + 1}"
-            joints.append(_joint(name, word, parent, link, at, axis, each.joint, limits.get(name), last))
+            limit = limits.get(each.joint.name) if len(steps) == 1 else None
+            joints.append(_joint(name, word, parent, link, at, axis, each.joint, limit, last))
             links.append(_link(link, inertial if last else None))
             parent, at = link, (np.zeros(3), np.eye(3))
         if kind is not None:
@@ -105,17 +112,17 @@ def _steps(each: WrittenJoint) -> tuple[list[Step], str | None]:
     return steps, f"{type(joint).__name__} {name!r} as {', '.join(repr(s[2]) for s in steps)}"
 
 
-def _limits(model: Any) -> tuple[dict[str, tuple[float, float]], set[str]]:
-    """Ranges of joints by stops on their coordinate, and the names of these stops."""
+def _limits(model: Any, tree: list[WrittenJoint]) -> tuple[dict[str, tuple[float, float]], set[str]]:
+    """Ranges of the joints that are written by stops on their coordinate, and the names of these stops."""
     low: dict[str, float] = {}
     high: dict[str, float] = {}
-    names = set()
-    for word in model.constraints:
-        measure = getattr(word, "measure", None)
-        if isinstance(word, Unilateral) and isinstance(measure, JointMeasure) and abs(measure.sign) == 1.0:
-            side, value = (low, measure.offset) if measure.sign > 0.0 else (high, -measure.offset)
-            side[measure.joint.name] = value
-            names.add(word.name)
+    names = set[str]()
+    for name, measure in stops_of(model, tree):
+        joint, names = measure.joint.name, {*names, name}
+        if measure.sign > 0.0:
+            low[joint] = max(measure.offset, low.get(joint, -LARGEST))
+        else:
+            high[joint] = min(-measure.offset, high.get(joint, LARGEST))
     whole = {name: (low.get(name, -LARGEST), high.get(name, LARGEST)) for name in {*low, *high}}
     return whole, names
 
@@ -169,7 +176,7 @@ def _text(values: Any) -> str:
 
 
 def _link(name: str, found: Inertial | None) -> str:
-    if found is None or found.mass == 0.0:
+    if found is None or (found.mass == 0.0 and not found.inertia.any()):
         return f"  <link name={quoteattr(name)}/>"
     J = found.inertia
     elements = {"ixx": J[0, 0], "ixy": J[0, 1], "ixz": J[0, 2], "iyy": J[1, 1], "iyz": J[1, 2], "izz": J[2, 2]}

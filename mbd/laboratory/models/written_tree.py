@@ -9,6 +9,8 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Body, Frame
+from mbd.constraints.measures import JointMeasure
+from mbd.constraints.unilateral import Unilateral
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.joints.prismatic import Prismatic
@@ -17,7 +19,7 @@ from mbd.joints.revolute import Revolute
 from mbd.joints.weld import Weld
 from mbd.topology.plan import uncut
 
-__all__ = ["Inertial", "Place", "WrittenJoint", "inertial_of", "place_of", "tree_to_write", "turned_to"]
+__all__ = ["Inertial", "Place", "WrittenJoint", "inertial_of", "place_of", "stops_of", "tree_to_write", "turned_to"]
 
 Place = tuple[Vector, Matrix]
 """Origin and axes (columns) of a frame in those of its body."""
@@ -78,6 +80,17 @@ def tree_to_write(model: Any) -> tuple[list[WrittenJoint], list[str]]:
         f"joint {each.joint.name!r}, added for a body that floats" for each in found if each.joint in plan.floating
     ]
     return found, left
+
+
+def stops_of(model: Any, tree: list[WrittenJoint]) -> list[tuple[str, JointMeasure]]:
+    """Names and measures of the stops on coordinates of the joints that are written."""
+    written = {each.joint.name for each in tree}
+    stops = [(word.name, word.measure) for word in model.constraints if isinstance(word, Unilateral)]
+    return [
+        (name, measure)
+        for name, measure in stops
+        if isinstance(measure, JointMeasure) and abs(measure.sign) == 1.0 and measure.joint.name in written
+    ]
 
 
 def inertial_of(body: Body, parameters: dict[str, float]) -> Inertial:
