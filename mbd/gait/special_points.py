@@ -22,7 +22,7 @@ from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 __all__ = ["KINDS", "TESTS", "SpecialPoint", "polished", "special_points"]
 
 ITERATIONS = 40
-"""Evaluations of a margin between two points at most."""
+"""Evaluations of a test function or a margin between two points at most."""
 
 CLOSE, SECANTS = 1e-3, 8
 """Change of the parameter, over its range, from which on derivatives are found with least errors [-], and how often."""

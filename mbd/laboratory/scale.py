@@ -118,7 +118,8 @@ def _bent_knees(lengths: Mapping[str, Any], recording: Recording | None) -> list
             continue
         (a, b), (c, d) = (tuple(recording.markers[name] for name in pair) for pair in pairs if pair is not None)
         thigh, shank = np.nanmedian(b - a, axis=0), np.nanmedian(d - c, axis=0)
-        bend = np.degrees(np.arccos(thigh @ shank / (np.linalg.norm(thigh) * np.linalg.norm(shank))))
+        cosine = thigh @ shank / (np.linalg.norm(thigh) * np.linalg.norm(shank))
+        bend = np.degrees(np.arccos(min(float(cosine), 1.0)))
         if bend > STRAIGHT:
             found.append(
                 f"scale: the {side} knee is bent by {bend:.0f}° in the static trial; lengths between markers hold all "

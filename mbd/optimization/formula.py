@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import shown
-from mbd.errors import MbdError, ModelError, UnknownNameError, nearest
+from mbd.errors import MbdError, ModelError
 from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Tape
@@ -90,13 +90,3 @@ def formula(given: Any, what: str, check: Callable[[str], None]) -> Formula:
         ) from None
     title = getattr(given, "__name__", "")
     return Formula(what if title in ("", "<lambda>") else title, tape, output, tuple(named))
-
-
-def known_names(names: Mapping[str, Any] | set[str], kind: str) -> Callable[[str], None]:
-    """A check that refuses all other names."""
-
-    def check(name: str) -> None:
-        if name not in names:
-            raise UnknownNameError(nearest(str(name), names, kind, "There are"))
-
-    return check

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbd.joints.anatomy import ANATOMY, angles_of
+from mbd.results.units import EFFORTS
 
 __all__ = ["long_name"]
 
@@ -21,9 +22,6 @@ WORDS = {
 
 ANGLES = {angle.name for part in ANATOMY for angles, _ in angles_of(part) for angle in angles}
 """Angles of joints of the body."""
-
-VECTORS = ("force", "torque", "net_moment", "net_force", "reaction_force", "reaction_torque")
-"""Vectors that are no places."""
 
 
 FRAMES = {"": "in axes of the child", "parent": "in axes of the parent", "ground": "in axes of the ground"}
@@ -57,7 +55,7 @@ def long_name(name: str) -> str:
     if not stem:
         return "time" if name == "t" else name.replace("_", " ")
     owner, _, kind = stem.rpartition(".")
-    if last in ("x", "y", "z") and owner and kind in VECTORS:
+    if last in ("x", "y", "z") and owner and kind in EFFORTS:
         return f"{WORDS[kind].format(owner)} along {last}"
     turning = _of_orientation(name)
     if turning:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.results.facts import Facts
 
-__all__ = ["unit", "unit_of"]
+__all__ = ["EFFORTS", "unit", "unit_of"]
 
 ENDINGS = {
     "angle": "rad", "displacement": "m", "length": "m", "speed": "m/s", "reaction_force": "N", "reaction_torque": "N m",

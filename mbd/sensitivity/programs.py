@@ -2,10 +2,10 @@
 
 Each program lists values and, row by row, those of their derivatives by the columns
 
-    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters | bases of charts
+    x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters
 
-that are not always zero. Where coordinates do not add, x is the increment from the q of the block, and only `steps` and
-`consistent` depend on the base (`mbd.sensitivity.charts`).
+that are not always zero. Where coordinates do not add, x is the increment from the q of the block
+(`mbd.sensitivity.charts`).
 
 =============  =============================================================================================
 `steps`        r (n), h (R), ḣ (R): the balance over all rows, penalties behind their switches, frictions behind slips
@@ -19,7 +19,6 @@ that are not always zero. Where coordinates do not add, x is the increment from 
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -41,9 +40,6 @@ from mbd.tape.derivatives import jvps
 from mbd.tape.node import Node
 
 __all__ = ["Columns", "Programs", "Sparse", "State"]
-
-PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
-"""Of compiled functions, for calls with addresses."""
 
 
 @dataclass(frozen=True)

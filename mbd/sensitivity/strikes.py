@@ -17,9 +17,6 @@ from mbd.sensitivity.run_data import RunRows, refused
 
 __all__ = ["captured", "refuse_sided_impact"]
 
-ACCOUNTED = 1e-7
-"""Misfit of velocities after an impact up to which its rows are the right ones [-]."""
-
 
 def _partners(rows: RunRows, programs: Programs, mode: Mode, closing: set[str]) -> Struck:
     """Who takes part in an impact of Poisson's law or the sequential one."""

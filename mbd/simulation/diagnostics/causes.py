@@ -410,7 +410,12 @@ CAUSES = (
 
 def cause_of(x: Words, status: int) -> str:
     """The sentence about a failure, with its cure."""
-    return next(cause for cause in CAUSES if status in cause.status and cause.when(x)).text(x)
+    found = next((cause for cause in CAUSES if status in cause.status and cause.when(x)), None)
+    return (
+        f"{x.integrator} returned the status {status}, which is none of mbd.kernel.codes"
+        if not found
+        else found.text(x)
+    )
 
 
 def last_events(events: Sequence[EventRecord]) -> str:

@@ -30,7 +30,7 @@ def stepper_of(
 ) -> Stepper:
     """A stepper for a run, as if it were new: one that an earlier run of this kind has left, where there is one."""
     key = _key(kind, manager, integrator, dt, options)
-    found: Stepper | None = None if key is None else _idle(mechanism).pop(key, None)
+    found: Stepper | None = None if key is None else mechanism.idle.pop(key, None)
     if found is None:
         found = kind(mechanism, manager, integrator, parameters, dt, options)
         found.key = key
@@ -44,14 +44,10 @@ def leave(stepper: Stepper) -> None:
     """Keep the stepper of a run that is over, of whose arrays nobody holds a part any more."""
     if stepper.key is None or not stepper.reusable:
         return
-    idle = _idle(stepper.mechanism)
+    idle = stepper.mechanism.idle
     if len(idle) >= KEPT:
         idle.clear()
     idle[stepper.key] = stepper
-
-
-def _idle(mechanism: Mechanism) -> dict[Hashable, Stepper]:
-    return mechanism.idle
 
 
 def _key(
