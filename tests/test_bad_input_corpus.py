@@ -9,6 +9,8 @@ import inspect
 import math
 import re
 import warnings
+from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,9 @@ ROD = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
 SWING.connect(mbd.Revolute("pivot", SWING.ground.origin, ROD.start, loss=mbd.Viscous(0.1)))
 SWING.constrain(mbd.Event("below", mbd.measure(lambda a: a, "pivot.angle", unit="rad"), direction=1, reset=KICK))
 
+BENT = mbd.PolynomialPath((HINGE,), {(0,): 0.3, (1,): -0.05})
+MUSCLE = mbd.Muscle("flexor", BENT, max_force=1000.0, fiber_length=0.1, tendon_length=0.2)
+
 EXAMPLES: dict[str, Any] = {
     "a": ORIGIN,
     "anatomy": "left hip",
@@ -50,6 +55,7 @@ EXAMPLES: dict[str, Any] = {
     "direction": (1.0, 0.0, 0.0),
     "effective_mass": 1.0,
     "failure": "absent.npz",
+    "fiber_length": 0.1,
     "form": "box",
     "forward": mbd.Viscous(1.0),
     "frame": END,
@@ -59,11 +65,13 @@ EXAMPLES: dict[str, Any] = {
     "inertia": (1.0, 1.0, 1.0),
     "integrator": mbd.HHT(),
     "joint": HINGE,
+    "joints": (HINGE,),
     "kinetic": lambda theta_rate: theta_rate**2,
     "length": 1.0,
     "limit": 1.0,
     "loss": 1.0,
     "mass": 1.0,
+    "max_force": 1000.0,
     "measure": ANGLE,
     "model": MODEL,
     "motion": {"time": [0.0, 0.1, 0.2], "hinge.angle": [0.0, 0.1, 0.3]},
@@ -101,6 +109,8 @@ EXAMPLES: dict[str, Any] = {
     "static": 0.6,
     "stiffness": 1.0,
     "subject": ANGLE,
+    "tendon_length": 0.2,
+    "terms": {(1,): -0.05},
     "time": (0.0, 1.0, 2.0),
     "torque": 1.0,
     "until": 0.0,
@@ -118,6 +128,8 @@ EXAMPLES: dict[str, Any] = {
 """A right argument by the name of its parameter."""
 
 OWN: dict[tuple[str, str], Any] = {
+    ("Muscle", "path"): BENT, ("muscle_forces", "muscles"): (MUSCLE,),
+    ("write_model", "path"): str(Path(mkdtemp()) / "arm.urdf"),
     ("SampledLaw", "arguments"): ("hinge.angle",), ("Transition", "on"): "foot",
     ("Mode", "transitions"): (
         mbd.Transition("swing", "stance", after=0.1), mbd.Transition("stance", "swing", after=0.1),
@@ -182,6 +194,8 @@ RESULTS = {
 }  # fmt: skip
 """Values that are handed to users, who make none."""
 RESULTS |= {"ImportReport", "ImportedModel", "InverseDynamics", "InverseKinematics", "PlateRecord", "Recording"}
+RESULTS |= {"MuscleForces", "NormativeBand"}
+RESULTS |= {"margin_of_stability", "read_band"}  # of runs that stand, of files: tests/laboratory
 RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
@@ -216,7 +230,11 @@ def right(name: str) -> dict[str, Any]:
         elif each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD):
             assert each.name in EXAMPLES, f"mbd.{name}: give an example of {each.name!r} in EXAMPLES"
             found[each.name] = EXAMPLES[each.name]
-    if "model" in found and name not in {"simulate", "batch", *GAITS}:  # whose runs are longer
+    if (
+        "model" in found
+        and "backend" in inspect.signature(WORDS[name]).parameters
+        and name not in {"simulate", "batch", *GAITS}
+    ):  # whose runs are longer
         found["backend"] = "python"
     return found | ({"dt": 0.1} if (name, "dt") in OWN else {})
 

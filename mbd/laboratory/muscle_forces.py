@@ -163,7 +163,7 @@ def muscle_forces(
 
 def _muscles(model: Any, given: Any) -> list[Muscle]:
     if not hasattr(model, "forces"):
-        raise ModelError("muscles pull on bodies, which a Lagrangian does not have")
+        raise ModelError(f"model must be a Model, on whose bodies muscles pull, not {shown(model)}")
     if given is None:
         found = [force for force in model.forces if isinstance(force, Muscle)]
         if not found:
