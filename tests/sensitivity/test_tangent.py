@@ -15,6 +15,7 @@ from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.tangent.build import own_rules
 from mbd.sensitivity.tangent.printer import LANES, tangent_text
+from mbd.sensitivity.tangent.run import TangentRun
 from mbd.testing.mechanisms import random_scene
 from tests.gait.test_gaits_with_modes import walker as walker_with_modes
 from tests.sensitivity.differences import differences, off
@@ -177,3 +178,23 @@ def test_a_floating_box_that_strikes_and_slides_by_nonsmooth_steps(scheme):
     """With a quaternion, corners and friction in a plane."""
     found = judged(*box(0.3), scheme, ways=2, parameters=["gravity.y"], dt=2.5e-3, until=0.25, contact="nonsmooth")
     assert found is not None and np.all(found[0] <= np.maximum(1e-7, 2.0 * found[1])), found
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit])
+def test_an_interruption_is_no_failure_of_the_derivatives(raised, monkeypatch):
+    """Ctrl-C ends searches and fits that go on where a run has no derivative."""
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
+    model.connect(mbd.Revolute("hip", model.ground.origin, rod.start))
+    start, calls = mbd.assemble(model, {"hip.angle": 0.3}), []
+    collect = TangentRun.collect
+
+    def interrupted(run):
+        calls.append(run)
+        if len(calls) == 3:
+            raise raised
+        collect(run)
+
+    monkeypatch.setattr(TangentRun, "collect", interrupted)
+    with pytest.raises(raised):
+        mbd.sensitivities(model, start, mbd.HHT(), dt=1e-3, until=2.0, wrt=["rod.mass"])

@@ -208,8 +208,10 @@ def _repeated(rows: RunRows, controller: Any) -> Any:
 
 
 def _require_same(rows: RunRows, run: TangentRun) -> None:
-    """Go to the end; raise where the run with derivatives is another than the run."""
+    """Go to the end; raise where the run with derivatives is another than the run, or somebody interrupts it."""
     problem, _ = run.march()
+    if run.interrupted:  # a march ends in order then, of which nothing is of use here
+        raise run.cause or KeyboardInterrupt
     if problem:
         raise AnotherRun(f"the same run with derivatives failed: {problem}")
     run.collect()
