@@ -162,3 +162,21 @@ def test_a_wrong_observation_is_named(name, function, arguments, words):
 
     with pytest.raises((ModelError, TraceError), match=words):
         observed()
+
+
+@pytest.mark.parametrize("name", ["manager", "turns", "opening"])
+def test_resets_know_observations_of_every_name(name):
+    """Also of names under which a mechanism keeps something of its own."""
+    model, read = mbd.Model("pendulum"), []
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
+    model.connect(mbd.Revolute("hip", model.ground.origin, rod.start))
+    model.observe(name, lambda angle: 2.0 * angle, "hip.angle")
+
+    def reset(named):
+        read.append((named[name], named["hip.angle"]))
+        return {}
+
+    model.constrain(mbd.Event("look", mbd.measure(lambda t: t - 0.05, "t"), reset=reset))
+    mbd.simulate(model, mbd.assemble(model, {"hip.angle": 0.3}), dt=0.01, until=0.1)
+    ((value, angle),) = read
+    assert value == 2.0 * angle

@@ -37,7 +37,8 @@ class Named(Mapping[str, float]):
     def __getitem__(self, name: str) -> float:
         run = self._run
         mechanism, v = run.mechanism, run.kernel
-        known = mechanism.named.get(name)
+        key = f"value of {name}"  # what else is kept there has names of its own
+        known = mechanism.named.get(key)
         if known is None and name not in mechanism.equations.output_names():
             given = {**run.model.parameters, **run.changed}.get(name)
             if given is not None:
@@ -45,7 +46,7 @@ class Named(Mapping[str, float]):
         if known is None:
             with mechanism.equations.tape.lock:
                 output = mechanism.equations.output(name)
-                known = mechanism.named[name] = scalar_function([output], mechanism.layout, "named")
+                known = mechanism.named[key] = scalar_function([output], mechanism.layout, "named")
         layout, flags = mechanism.layout, v.closed[: v.n_contacts]
         block = mechanism.block(
             run.now, v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors], run.manager.penalties(flags)
