@@ -128,6 +128,7 @@ def test_a_band_lies_behind_the_curves_with_its_source(tmp_path):
         ("%,knee angle low\n0,1\n100,2", "needs the columns low and high"),
         ("%,knee low,knee high\n0,1,2\n100,1,2", "called like 'knee angle low'"),
         ("%,knee angle low,knee angle high\n0,1,x\n100,2,3", "line 2: 3 numbers"),
+        ("%,knee angle low,knee angle high\n0\n100,2,3", "line 2: 3 numbers"),
         ("%,knee angle low,knee angle high\n0,4,1\n100,2,3", "low ≤ high"),
     ],
 )

@@ -119,9 +119,12 @@ def _of_csv(text: str, name: str) -> dict[tuple[str, str], Band]:
     table = np.zeros((len(rows) - 1, len(titles)))
     for line, row in enumerate(rows[1:], 2):
         try:
-            table[line - 2] = [float(cell) for cell in row]
+            numbers = [float(cell) for cell in row]
         except ValueError:
-            raise ModelError(f"{name}, line {line}: {len(titles)} numbers are expected, got {row!r}") from None
+            numbers = []
+        if len(numbers) != len(titles):
+            raise ModelError(f"{name}, line {line}: {len(titles)} numbers are expected, got {row!r}")
+        table[line - 2] = numbers
     found = {}
     for key, parts in columns.items():
         if {"low", "high"} <= set(parts):
