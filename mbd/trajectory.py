@@ -71,7 +71,8 @@ class Trajectory:
 
         def __getattr__(self, name: str) -> Any:
             """Asked for what is no attribute: results go by their names."""
-            known = () if name.startswith("_") or "record" not in self.__dict__ else self.columns.names
+            hidden = name.startswith("_") or name == "columns" or "record" not in self.__dict__
+            known = () if hidden else self.columns.names
             near = next((each for each in known if each.startswith(f"{name}.") or each.split()[0] == name), None)
             hint = "" if near is None else f"; results are asked for by name, such as run[{near!r}]"
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
