@@ -178,3 +178,44 @@ def test_the_activation_of_a_muscle_comes_back(tmp_path):
     mbd.write_model(model, tmp_path / "arm.osim")
     (muscle,) = mbd.read_model(tmp_path / "arm.osim").muscles.values()
     assert (muscle.excitation, muscle.damping) == (0.4, 0.0)
+
+
+@pytest.mark.parametrize("names", [("base", "base"), ("pelvis", "base"), ("base", "thigh")])
+def test_a_robot_that_was_read_is_written_without_a_link_or_joint_more(names, tmp_path):
+    """The root link is held to the ground by a joint of mbd's own, which must be no second 'base' in the file."""
+    link, joint = names
+    inertial = (
+        '<inertial><origin xyz="0.1 0 -0.2" rpy="0.3 0 0.2"/><mass value="3"/>'
+        '<inertia ixx="0.3" iyy="0.2" izz="0.2"/></inertial>'
+    )
+    text = (
+        f'<robot name="r"><link name="{link}">{inertial}</link><link name="shank">{inertial}</link>'
+        f'<joint name="{joint}" type="revolute"><parent link="{link}"/><child link="shank"/>'
+        '<origin xyz="0.1 0.2 -0.4" rpy="0.2 0.1 0.3"/><axis xyz="0 1 0"/><limit lower="-1" upper="2"/></joint></robot>'
+    )
+    (tmp_path / "one.urdf").write_text(text, encoding="utf-8")
+    first = mbd.read_model(tmp_path / "one.urdf")
+    assert "as the root link" in str(mbd.write_model(first.model, tmp_path / "two.urdf"))
+    second = mbd.read_model(tmp_path / "two.urdf")
+    assert list(second.bodies) == [link, "shank"] and list(second.joints) == [joint]
+    assert list(second.model.joints) != [] and len(second.model.joints) == 2
+    motion = {"time": np.arange(6.0), f"{joint}.angle": np.sin(np.arange(6.0))}
+    moments = [mbd.inverse_dynamics(each.model, motion)[f"{joint}.moment"] for each in (first, second)]
+    np.testing.assert_allclose(moments[1], moments[0], atol=1e-12)
+
+
+def test_a_body_welded_to_the_ground_askew_is_the_root_link_in_axes_of_the_ground(tmp_path):
+    model = mbd.Model("askew")
+    socket, shank = (
+        mbd.RigidBody("socket", 1.0, INERTIA, (0.1, 0.0, 0.2)),
+        mbd.RigidBody("shank", 2.0, INERTIA, (0.0, -0.2, 0.1)),
+    )
+    wall = model.ground.point(0.3, 1.0, -0.2).turned(0.7, (1.0, 2.0, 0.5))
+    model.connect(mbd.Weld("wall", wall, socket.point(0.0, 0.1, 0.3).turned(-0.4, (0.0, 1.0, 1.0))))
+    model.connect(mbd.Revolute("knee", socket.point(0.1, -0.3, 0.0), shank.origin, axis=(1.0, 0.0, 1.0)))
+    mbd.write_model(model, tmp_path / "askew.urdf")
+    read = mbd.read_model(tmp_path / "askew.urdf").model
+    motion = {"time": np.arange(6.0), "knee.angle": np.sin(np.arange(6.0))}
+    found, again = (mbd.inverse_dynamics(each, motion) for each in (model, read))
+    np.testing.assert_allclose(again["knee.moment"], found["knee.moment"], atol=1e-12)
+    np.testing.assert_allclose(again["shank.center"], found["shank.center"], atol=1e-12)

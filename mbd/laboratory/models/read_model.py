@@ -27,7 +27,8 @@ def read_model(
     springs. Soft limits become rigid stops, soft equations between joints rigid couplings, and coordinates count from
     the posture of the file. Armature becomes a `Rotor`. Contacts, actuators and tendons are left out, and listed.
 
-    A robot of a ``.urdf`` stands on the ground by its root link; 'base' is the joint between them. Limits become
+    A robot of a ``.urdf`` stands on the ground by its root link; 'base' is the joint between them,
+    or 'base ground' where a joint of the file is called so. Limits become
     `Unilateral` stops 'elbow upper stop', damping and friction `Viscous` and `Coulomb` losses, mimics `Bilateral`
     couplings. Shapes, transmissions and the like are left out, and listed.
 

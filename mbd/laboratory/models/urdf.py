@@ -58,11 +58,14 @@ def read_urdf(path: Path, base: str, stops: bool, losses: bool, repair: bool) ->
         )
     ground = model.ground.origin.turned(-0.5 * math.pi, (1.0, 0.0, 0.0))  # z of the file is up
     origin = bodies[roots[0]].origin
-    model.connect(Free("base", ground, origin) if base == "floating" else Weld("base", ground, origin))
+    called, held_by = {_plain(joint.get("name")) for joint in links}, "base"
+    while held_by in called:
+        held_by += " ground"
+    model.connect(Free(held_by, ground, origin) if base == "floating" else Weld(held_by, ground, origin))
     joints, held = dict[str, Joint](), list[Constraint]()
     for each in links:
         name = _plain(each.get("name"))
-        if name in joints or name == "base":
+        if name in joints:
             raise each.wrong("has a name that another joint has")
         joints[name] = _joint(each, name, bodies, losses, report)
         held += _stops(each, joints[name], report) if stops else []

@@ -56,11 +56,21 @@ def urdf_of(model: Any) -> tuple[str, ImportReport]:
     report = ImportReport()
     values = dict(model.parameters)
     tree, report.left_out[:] = tree_to_write(model)
-    root = "world"
-    while root in model.bodies:
-        root += " ground"
-    names, frames = {model.ground.name: root}, {model.ground.name: (np.zeros(3), UP)}
-    links, joints = [_link(root, None)], list[str]()
+    held = [each for each in tree if each.parent.body.name == model.ground.name]
+    if len(held) == 1 and isinstance(held[0].joint, Weld):  # as `mbd.read_model` holds the root link of a file
+        (each,), links = held, list[str]()
+        root, place = each.child.body.name, _ground_on(each, values)
+        names, frames = {model.ground.name: root, root: root}, {model.ground.name: (np.zeros(3), UP), root: place}
+        links.append(_link(root, _in_frame(inertial_of(each.child.body, values), place)))
+        tree.remove(each)
+        report.understood.append(f"{root!r}, which {each.joint.name!r} holds to the ground, as the root link")
+    else:
+        root = "world"
+        while root in model.bodies:
+            root += " ground"
+        names, frames = {model.ground.name: root}, {model.ground.name: (np.zeros(3), UP)}
+        links = [_link(root, None)]
+    joints = list[str]()
     limits, stopped = _limits(model, tree)
     for each in tree:
         body = each.child.body
@@ -79,7 +89,7 @@ def urdf_of(model: Any) -> tuple[str, ImportReport]:
             parent, at = link, (np.zeros(3), np.eye(3))
         if kind is not None:
             report.understood.append(kind)
-    report.understood.insert(0, f"{len(tree)} bodies, {len(joints)} joints")
+    report.understood.insert(0, f"{len(frames) - 1} bodies, {len(joints)} joints")
     report.left_out += _left_out(model, stopped)
     lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(model.name)}>", *links, *joints, "</robot>"]
     return "\n".join(lines) + "\n", report
@@ -150,6 +160,13 @@ def _losses(joint: Any) -> tuple[float, float] | None:
         return None
     damping = sum(float(part.coefficient) for part in parts if isinstance(part, Viscous))
     return damping, sum(float(part.torque) for part in parts if isinstance(part, Coulomb))
+
+
+def _ground_on(each: WrittenJoint, parameters: dict[str, float]) -> Place:
+    """The axes of the file, as the body has them that is welded to the ground."""
+    (p, R), (p0, R0) = place_of(each.parent, parameters), place_of(each.child, parameters)
+    turned = R0 @ R.T
+    return p0 - turned @ p, turned @ UP
 
 
 def _in_frame(found: Inertial, frame: Place) -> Inertial:
