@@ -22,6 +22,7 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
+from mbd.notes import doubt
 
 __all__ = ["Description", "all_are", "on_slope", "served"]
 
@@ -40,8 +41,15 @@ def on_slope(slope: float, g: float = 9.81) -> Vector3:
     ----------
     slope : γ [rad], positive where +x goes down
     g : [m/s²]
+
+    Warns (`mbd.MbdWarning`) of a slope beyond the vertical, which was hardly meant.
     """
     gamma, size = number(slope, "slope"), number(g, "g")
+    if abs(gamma) > 0.5 * math.pi:
+        doubt(
+            f"a slope of {gamma:g} rad is beyond the vertical; angles are in radians, and {gamma:g}° is "
+            f"math.radians({gamma:g}) = {math.radians(gamma):.4g}"
+        )
     return (size * math.sin(gamma), -size * math.cos(gamma), 0.0)
 
 

@@ -436,3 +436,43 @@ def test_what_other_programs_call_otherwise_is_explained(made, kind, said):
     run = mbd.simulate(model, start, dt=1e-2, until=0.1)
     with pytest.raises(kind, match=said):
         made(model, start, run)
+
+
+def test_gravity_with_the_wrong_sign_and_a_slope_in_degrees_are_doubted():
+    model, _ = pendulum()
+    model.gravity = (0.0, 9.81, 0.0)
+    with pytest.warns(mbd.MbdWarning, match=r"pulls upwards; .* gravity=\(0.0, -9.81, 0.0\)"):
+        model.check()
+    with pytest.warns(mbd.MbdWarning, match=r"3 rad is beyond the vertical; .* math.radians\(3\) = 0.05236"):
+        mbd.on_slope(3.0)
+
+
+def forearm(**muscle: Any) -> tuple[mbd.Model, mbd.Muscle]:
+    """An arm that hangs from its elbow, and a muscle of 600 N on it."""
+    model, arm = mbd.Model("forearm"), mbd.Link("forearm", mass=1.5, length=0.35, center=0.16, inertia=0.016)
+    model.connect(mbd.Revolute("elbow", model.ground.origin, arm.start))
+    points = (model.ground.point(0.02, 0.30), arm.point(0.03, -0.04))
+    biceps = mbd.Muscle("biceps", points, max_force=600.0, excitation=0.3, **muscle)
+    model.apply(biceps)
+    return model, biceps
+
+
+def test_a_muscle_that_begins_slack_is_told() -> None:
+    """Left to itself it begins at its optimal length, with a tendon shorter than slack, whose curve then pushes."""
+    model, biceps = forearm(fiber_length=0.14, tendon_length=0.2)
+    start = mbd.assemble(model, position={"elbow.angle": 0.3})
+    run = mbd.simulate(model, start, dt=1e-3, until=0.05)
+    [note] = run.stats["notes"]
+    assert run["biceps.force"][0] == pytest.approx(-101.0, abs=1.0)
+    assert "'biceps' begins out of equilibrium and pushes with 101 N" in note
+    fibers = biceps.fiber_at(start["biceps.length"], activation=0.3)
+    start = mbd.assemble(model, position={"elbow.angle": 0.3, "biceps.fiber_length": fibers})
+    assert not mbd.simulate(model, start, dt=1e-3, until=0.05).stats["notes"]
+
+
+@pytest.mark.parametrize("tendon", ["elastic", "rigid"])
+def test_a_muscle_in_centimetres_puts_its_run_in_doubt(tendon: str) -> None:
+    model, _ = forearm(fiber_length=14.0, tendon_length=20.0, tendon=tendon)
+    start = mbd.assemble(model, position={"elbow.angle": 0.3})
+    with pytest.warns(mbd.MbdWarning, match=r"path is 0.33 m long and its tendon alone 20 m; lengths are in metres"):
+        mbd.simulate(model, start, dt=1e-3, until=0.01)

@@ -28,8 +28,16 @@ SLOW = 2.0
 
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    parts = (_lengths, _masses, _turned, _twice, _grips, _periods, _awaited)
+    parts = (_weights, _lengths, _masses, _turned, _twice, _grips, _periods, _awaited)
     return [sentence for part in parts for sentence in part(model)]
+
+
+def _weights(model: Any) -> list[str]:
+    """Gravity straight up, whose sign was forgotten."""
+    x, y, z = getattr(model, "gravity", (0.0, 0.0, 0.0))
+    if not (x == z == 0.0 and y > 0.0):
+        return []
+    return [f"gravity (0, {y:g}, 0) pulls upwards; y points up, so that weight is gravity=(0.0, {-y:g}, 0.0)"]
 
 
 def _lengths(model: Any) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.assembly.doubtful import WIDE, degrees
 from mbd.equations.equations import Contact
+from mbd.forces.muscles import Muscle
 from mbd.kernel.codes import PULL
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
@@ -44,6 +45,9 @@ OVERSHOT = 1e-8
 
 LOOKED_AT = 8
 """Impacts of a contact from which the step that resolves them is found."""
+
+PUSHING = 0.02
+"""Share of its largest force with which a muscle may push before a run tells so [-]."""
 
 TELLING = 1e-4
 """Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
@@ -142,7 +146,8 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
             held = _pulled(record, number, contact)
             notes, doubts = notes + held, doubts + held
         doubts += blind
-    return notes, doubts
+    slack, short = _pushing(run, columns)
+    return notes + slack + short, doubts + short
 
 
 def _doubts(run: RunData) -> list[str]:
@@ -152,6 +157,27 @@ def _doubts(run: RunData) -> list[str]:
     if known is None:
         known = named["doubts of the description"] = doubts(run.model)
     return known
+
+
+def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]:
+    """Muscles that push as the run begins: out of equilibrium, or on a path shorter than their tendon alone."""
+    slack, short = [], []
+    muscles = [force for force in getattr(run.model, "forces", ()) if isinstance(force, Muscle)]
+    for name, muscle in ((each.name, each) for each in muscles):
+        asked = [columns.node(f"{name}.{field}") for field in ("force", "length", "max_force", "tendon_length")]
+        force, length, most, tendon = (float(x[0]) for x in columns.evaluate(asked, columns.part(np.array([0]), asked)))
+        if length < tendon:
+            short.append(
+                f"muscle {name!r} pushes: its path is {length:.3g} m long and its tendon alone {tendon:.3g} m; "
+                "lengths are in metres, and fibers and tendon together are about as long as the path"
+            )
+        elif force < -PUSHING * most and muscle.is_elastic:
+            slack.append(
+                f"muscle {name!r} begins out of equilibrium and pushes with {-force:.3g} N until its fibers have taken "
+                f"up the slack; position={{'{name}.fiber_length': muscle.fiber_at(state['{name}.length'], "
+                f"activation)}} of mbd.assemble begins in equilibrium"
+            )
+    return slack, short
 
 
 def _left_singular(run: RunData) -> bool:
