@@ -16,12 +16,12 @@ from mbd.tape.node import Node
 
 __all__ = ["ExplicitSolution", "explicit_solution"]
 
-LARGEST = 64
+MAX_UNKNOWNS = 64
 """Unknowns above which a system is not eliminated on the tape."""
-MOST_OPERATIONS = 12000
+MAX_OPERATIONS = 12000
 """Operations of an elimination with one solution above which making its code takes longer than it is likely to save."""
 
-KEPT = 1e-4
+MIN_PIVOT_SHARE = 1e-4
 """Part of its terms that a pivot must keep, as `LOSS_AT_ONCE` of `mbd.kernel.algebra.ordered` [-]."""
 
 
@@ -42,7 +42,7 @@ def explicit_solution(
 ) -> ExplicitSolution | None:
     """The programs of a mode with these active rows; None where pivots must be searched for, or that takes less."""
     n, n_rows, m = equations.n_v + equations.n_z, len(equations.rows), len(rows)
-    if not m or n + m > LARGEST:
+    if not m or n + m > MAX_UNKNOWNS:
         return None
     tape, places = equations.tape, dict[int, int]()
 
@@ -60,7 +60,7 @@ def explicit_solution(
     def eliminated(right: list[list[Node]]) -> Factors | None:
         corner = [tape.zero] * m
         matrix = [M[i] + right[i] for i in range(n)] + [line + corner for line in B]
-        return factors(matrix, n, MOST_OPERATIONS, massless, KEPT)
+        return factors(matrix, n, MAX_OPERATIONS, massless, MIN_PIVOT_SHARE)
 
     turned = [[line[i] for line in B] for i in range(n)]
     first = eliminated(R)

@@ -14,9 +14,9 @@ from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import ReturnMap, Values
 from mbd.state import State
 
-__all__ = ["free_samples", "told_of_samples"]
+__all__ = ["free_samples", "explain_samples"]
 
-MAX_STRIDES, NEAR = 12, 0.03
+MAX_STRIDES, MAX_MISSING = 12, 0.03
 """Strides up to which a whole number of samples is looked for, and the part of one that may be missing [-]."""
 RETURNS = 8
 """Returns over which the samples of one are counted [-]."""
@@ -28,7 +28,7 @@ def free_samples(model: Any) -> list[SampledLaw]:
     return [law for law in machines if isinstance(law, SampledLaw) and not law.restart_on]
 
 
-def told_of_samples(outcome: Outcome, map_: ReturnMap, state: State, values: Values) -> Outcome:
+def explain_samples(outcome: Outcome, map_: ReturnMap, state: State, values: Values) -> Outcome:
     """The outcome of a search that found no gait, with what samples at instants of their own have to do with it."""
     laws = free_samples(map_.model)
     if not laws or outcome.good:
@@ -41,7 +41,7 @@ def told_of_samples(outcome: Outcome, map_: ReturnMap, state: State, values: Val
         name = f"{law.name}.period"
         period = float({**getattr(map_.model, "parameters", {}), **map_.plain(values)}.get(name, law.period))
         count = lasts / period
-        whole = [n for n in range(1, MAX_STRIDES + 1) if abs(n * count - round(n * count)) <= NEAR]
+        whole = [n for n in range(1, MAX_STRIDES + 1) if abs(n * count - round(n * count)) <= MAX_MISSING]
         cures = [f"{name!r} = {lasts / max(round(count), 1):.6g} s"]
         cures += [f"strides={whole[0]}"] if whole and whole[0] != map_.strides else []
         texts.append(

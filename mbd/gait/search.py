@@ -18,7 +18,7 @@ from mbd.gait.newton import FixedPoint, fixed_point
 from mbd.gait.outcome import Outcome
 from mbd.gait.reflection import in_space
 from mbd.gait.return_map import Arrival, ReturnMap, Values
-from mbd.gait.samples import told_of_samples
+from mbd.gait.samples import explain_samples
 from mbd.gait.section import Chart, Section, section_of
 from mbd.state import State
 
@@ -148,7 +148,7 @@ def fallen_first(found: LimitCycle, start: State, values: Values) -> LimitCycle:
         return found
     fall = found.map.fall(start, values)
     if fall is None:
-        return replace(found, outcome=told_of_samples(found.outcome, found.map, found.state, values))
+        return replace(found, outcome=explain_samples(found.outcome, found.map, found.state, values))
     return replace(found, outcome=fall, attempts=(fall, *found.attempts))
 
 

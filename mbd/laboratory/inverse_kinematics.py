@@ -26,9 +26,9 @@ from mbd.state import State
 
 __all__ = ["inverse_kinematics"]
 
-LEAST_APART = 0.02
+MIN_DISTANCE = 0.02
 """Distance of two markers on a body from which on their distances are compared with the model's [m]."""
-LIKELY = (0.1, 10.0)
+UNIT_RATIOS = (0.1, 10.0)
 """Distances of markers on a body over those of the model that may be in the same unit [-]."""
 
 
@@ -151,10 +151,10 @@ def _in_meters(model: Any, recording: Recording, points: Mapping[str, Any]) -> N
                 continue
             apart = math.dist(frame.offset, second.offset)
             seen = np.linalg.norm(recording.markers[name] - recording.markers[other], axis=1)
-            if apart > LEAST_APART and np.isfinite(seen).any():
+            if apart > MIN_DISTANCE and np.isfinite(seen).any():
                 ratios.append(float(np.nanmedian(seen)) / apart)
     ratio = float(np.median(ratios)) if ratios else 1.0
-    if not LIKELY[0] < ratio < LIKELY[1]:
+    if not UNIT_RATIOS[0] < ratio < UNIT_RATIOS[1]:
         raise ModelError(
             f"markers: they lie {ratio:.3g} times as far from each other on a body as in the model; are they in "
             "meters? mbd.read turns the units of files into meters"

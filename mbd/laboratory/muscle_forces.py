@@ -26,7 +26,7 @@ from mbd.tape.derivatives import gradient
 
 __all__ = ["MuscleForces", "muscle_forces"]
 
-ARMLESS = 1e-9
+MIN_MOMENT = 1e-9
 """Moment of all muscles together about a coordinate below which they do not act there [N m]."""
 
 
@@ -136,7 +136,7 @@ def muscle_forces(
     crossed = _crossed(bare, acting, moments, parameters or {})
     arms, strength, passive, length = crossed.arms, crossed.strength, crossed.passive, crossed.length
     driven = moments.driven
-    about = np.flatnonzero(driven & (np.abs(arms * strength[:, np.newaxis]).sum(axis=2).max(axis=0) > ARMLESS))
+    about = np.flatnonzero(driven & (np.abs(arms * strength[:, np.newaxis]).sum(axis=2).max(axis=0) > MIN_MOMENT))
     if not len(about):
         raise ModelError("the muscles act about no driven coordinate of the model; check their paths, or joints=")
     wanted = moments.effort[:, about] - np.einsum("kjm,km->kj", arms[:, about], passive)

@@ -26,7 +26,7 @@ from mbd.progress import run_bar
 from mbd.simulation.arguments import check_arguments, end_of
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run.control import reset_faults
-from mbd.simulation.run.idle import leave
+from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.strategy import chosen
 from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
@@ -151,7 +151,7 @@ def simulate(
     if wrt is not None and not problem:
         _differentiate(trajectory, wrt, model, scheme)
     if dt is not None and not problem:
-        leave(run.stepper)
+        keep_idle(run.stepper)
     return trajectory
 
 

@@ -22,7 +22,7 @@ GRIPPING = 10.0
 """Coefficient of friction above which it may be given in percent [-]."""
 
 
-SLOW = 2.0
+SLOWEST_SAMPLING = 2.0
 """Time between samples of a controller above which it may be a frequency [s]."""
 
 
@@ -119,7 +119,7 @@ def _periods(model: Any) -> list[str]:
         f"'{word.name}' samples once in {period:g} s; period is the time between samples, and {period:g} Hz is "
         f"period={1.0 / period:.3g}"
         for word in words
-        if (period := getattr(word, "period", None)) is not None and period > SLOW
+        if (period := getattr(word, "period", None)) is not None and period > SLOWEST_SAMPLING
     ]
 
 

@@ -13,9 +13,9 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["leave", "stepper_of"]
+__all__ = ["keep_idle", "stepper_of"]
 
-KEPT = 8
+MAX_IDLE = 8
 """Steppers of a mechanism that are kept at most [-]."""
 
 
@@ -40,12 +40,12 @@ def stepper_of(
     return found
 
 
-def leave(stepper: Stepper) -> None:
+def keep_idle(stepper: Stepper) -> None:
     """Keep the stepper of a run that is over, of whose arrays nobody holds a part any more."""
     if stepper.key is None or not stepper.reusable:
         return
     idle = stepper.mechanism.idle
-    if len(idle) >= KEPT:
+    if len(idle) >= MAX_IDLE:
         idle.clear()
     idle[stepper.key] = stepper
 

@@ -31,7 +31,7 @@ LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
 """Coefficient of a row below which another does not depend on it [-]."""
-SMALL = 1 << 16
+MAX_KEPT_NUMBERS = 1 << 16
 """Numbers in the arrays of a run up to which they are kept for another one [-]."""
 SUBSTEPS = 4
 """Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
@@ -57,14 +57,14 @@ def follows(equations: Equations) -> int:
     return 2 if any(contact.opens_on == "when" for contact in rubbing) else 0
 
 
-class Fresh:
+class InitialArrays:
     """The record and the arrays of a stepper before a run, of which only numbers other than 0 are kept.
 
     is_small : whether the arrays are short enough to be worth it
     """
 
     def __init__(self, kernel: Kernel, rooms: list[Any]) -> None:
-        self.is_small = sum(map(len, rooms)) <= SMALL
+        self.is_small = sum(map(len, rooms)) <= MAX_KEPT_NUMBERS
         if self.is_small:
             self._values = dict(vars(kernel))
             self._places = [np.flatnonzero(room) for room in rooms]
@@ -128,7 +128,7 @@ class Stepper:
         self._table: CallTable | None = None
         self._provisional = False  # whether addresses in the table may have changed
         self.resumed_at = float("nan")  # the instant whose row was stored as a run was taken up again
-        self._fresh = Fresh(self.kernel, self.shelves.rooms) if self.compiled else None
+        self._fresh = InitialArrays(self.kernel, self.shelves.rooms) if self.compiled else None
         assert layout.n == self.kernel.n
 
     @property
