@@ -22,6 +22,7 @@ from mbd.laboratory.kinematics_result import InverseKinematics, stops_of
 from mbd.laboratory.marker_program import MarkerProgram, marker_program, point_names
 from mbd.laboratory.nearest_posture import Problem, nearest_postures
 from mbd.laboratory.recording import Recording
+from mbd.notes import doubt
 from mbd.state import State
 
 __all__ = ["inverse_kinematics"]
@@ -30,6 +31,8 @@ MIN_DISTANCE = 0.02
 """Distance of two markers on a body from which on their distances are compared with the model's [m]."""
 UNIT_RATIOS = (0.1, 10.0)
 """Distances of markers on a body over those of the model that may be in the same unit [-]."""
+FAR = 0.05
+"""Distance of a marker from its place, more than skin moves over bones, above which names or units may differ [m]."""
 
 
 def inverse_kinematics(
@@ -103,9 +106,13 @@ def inverse_kinematics(
     first = _first(problem, recording)
     begin = _begin(model, mechanism, problem, recording, points, first, start, parameters, values)
     found = nearest_postures(problem, recording.time, begin, first, values, mechanism)
-    return InverseKinematics.of(
+    result = InverseKinematics.of(
         mechanism, values, recording.time, found, problem, list(points), list(followed), cutoff, notes
     )
+    far = _far(result, {name: size[name] for name in points})
+    doubt(*far, of=model)
+    result.notes += tuple(far)
+    return result
 
 
 def _pairs(
@@ -159,6 +166,24 @@ def _in_meters(model: Any, recording: Recording, points: Mapping[str, Any]) -> N
             f"markers: they lie {ratio:.3g} times as far from each other on a body as in the model; are they in "
             "meters? mbd.read turns the units of files into meters"
         )
+
+
+def _far(found: InverseKinematics, weights: Mapping[str, float]) -> list[str]:
+    """A sentence on markers that stay far from where the model has them, by names, units or axes that differ."""
+    away = {
+        name: float(np.sqrt(np.nanmean(found.residual[name] ** 2)))
+        for name, weight in weights.items()
+        if weight >= 1.0 and np.isfinite(found.residual[name]).any()
+    }
+    far = [name for name, size in away.items() if size > FAR]
+    if not far:
+        return []
+    worst = max(far, key=lambda name: away[name])
+    return [
+        f"inverse_kinematics: marker {worst!r} is {away[worst]:.2g} m from its place on the model (rms; {len(far)} of "
+        f"{len(away)} markers are beyond {FAR:g} m): names, units, sizes of segments or axes differ; up= and forward= "
+        "of mbd.read say how a file has them"
+    ]
 
 
 def _followed(equations: Equations, recording: Recording, coordinates: Mapping[str, Any] | None) -> dict[str, Vector]:

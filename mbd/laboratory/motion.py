@@ -31,6 +31,8 @@ CLOSED = 1e-11
 """Residual of rows up to which coordinates that were not given are completed, over the largest row [-]."""
 MAX_CORRECTIONS = 30
 """Newton corrections of one frame of a loop."""
+SECONDS_APART = 2.0
+"""Time between frames above which it may be in milliseconds [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +173,7 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
             differentiated |= acceleration is None
             acceleration = second if acceleration is None else acceleration
         v[k], a[k] = rate, acceleration
-    doubt(*_in_degrees(equations, columns), of=model)
+    doubt(*_in_degrees(equations, columns), *_in_milliseconds(time), of=model)
     remarks = (f"channels that are no coordinates are not used: {_few(unused)}",) if unused else ()
     q, v, a = (np.ascontiguousarray(table.T) for table in (q, v, a))
     motion = Motion(time, q, v, a, None, remarks, differentiated)
@@ -193,6 +195,14 @@ def _in_degrees(equations: Equations, columns: Mapping[str, _Column]) -> list[st
                 "angles are in radians: numpy.radians(…) converts degrees, a file says 'knee.angle [deg]'"
             )
     return found
+
+
+def _in_milliseconds(time: Vector) -> list[str]:
+    """A sentence on frames that are seconds apart, as those of cameras are in milliseconds."""
+    apart = float(np.median(np.diff(time))) if len(time) > 2 else 0.0
+    if not apart > SECONDS_APART:
+        return []
+    return [f"motion: frames are {apart:g} s apart; times are in seconds, and {apart:g} ms is {apart / 1e3:g} s"]
 
 
 def _times(given: Mapping[str, Any]) -> Vector:

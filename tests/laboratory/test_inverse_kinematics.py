@@ -234,3 +234,37 @@ def test_a_frame_of_a_person_with_forty_markers_takes_at_most_a_millisecond():
     started = time.process_time()
     mbd.inverse_kinematics(model, recording)
     assert time.process_time() - started < 1.0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda elbow, wrist: (wrist, elbow),
+        lambda *both: [p / 1e3 for p in both],
+        lambda *both: [p[:, [0, 2, 1]] for p in both],
+    ],
+)
+def test_markers_that_stay_far_from_the_model_are_told(wrong):
+    """Exchanged, in other units, with z up: one marker to a body, so that no distance on a body tells."""
+    arm, elbow = mbd.Model("arm"), mbd.Link("upper", mass=2.0, length=0.3, center=0.13, inertia=0.016)
+    lower = mbd.Link("lower", mass=1.2, length=0.25, center=0.11, inertia=0.007)
+    arm.connect(mbd.Revolute("shoulder", arm.ground.origin, elbow.start), mbd.Revolute("elbow", elbow.end, lower.start))
+    mbd.Marker("ELB", elbow, (0.0, -0.3))
+    mbd.Marker("WRI", lower, (0.0, -0.25))
+    time = np.linspace(0.0, 1.0, 21)
+    first, second = 0.4 * np.sin(5.0 * time), 0.4 * np.sin(5.0 * time) + 0.9
+    places = [0.3 * np.column_stack([np.sin(first), -np.cos(first), 0.0 * time])]
+    places.append(places[0] + 0.25 * np.column_stack([np.sin(second), -np.cos(second), 0.0 * time]))
+    assert not mbd.inverse_kinematics(arm, mbd.Recording(time, dict(zip(("ELB", "WRI"), places, strict=True)))).notes
+    recording = mbd.Recording(time, dict(zip(("ELB", "WRI"), wrong(*places), strict=True)))
+    with pytest.warns(mbd.MbdWarning, match=r"m from its place on the model \(rms; . of 2 markers") as told:
+        found = mbd.inverse_kinematics(arm, recording)
+    assert found.notes == (str(told[0].message),)
+
+
+def test_times_in_milliseconds_are_doubted():
+    arm, rod = mbd.Model("arm"), mbd.Link("upper", mass=2.0, length=0.3, center=0.13, inertia=0.016)
+    arm.connect(mbd.Revolute("shoulder", arm.ground.origin, rod.start))
+    time = np.arange(20) * 10.0
+    with pytest.warns(mbd.MbdWarning, match="frames are 10 s apart; times are in seconds, and 10 ms is 0.01 s"):
+        mbd.inverse_dynamics(arm, {"time": time, "shoulder.angle": 0.3 * np.sin(0.005 * time)})
