@@ -219,3 +219,17 @@ def test_a_body_welded_to_the_ground_askew_is_the_root_link_in_axes_of_the_groun
     found, again = (mbd.inverse_dynamics(each, motion) for each in (model, read))
     np.testing.assert_allclose(again["knee.moment"], found["knee.moment"], atol=1e-12)
     np.testing.assert_allclose(again["shank.center"], found["shank.center"], atol=1e-12)
+
+
+@pytest.mark.parametrize("suffix", [".urdf", ".osim"])
+def test_a_planar_model_is_written_with_inertias_that_others_accept(suffix, tmp_path):
+    """Links of the plane have a moment about z alone, which no body in space has."""
+    model = mbd.Model("arm")
+    arm = mbd.Link("arm", mass=1.0, length=0.3, center=0.15, inertia=0.01)
+    model.connect(mbd.Revolute("elbow", model.ground.origin, arm.start))
+    report = mbd.write_model(model, tmp_path / f"arm{suffix}")
+    assert "moments of 'arm' about x and y" in "; ".join(report.approximated)
+    read = mbd.read_model(tmp_path / f"arm{suffix}").model
+    motion = {"time": np.linspace(0.0, 1.0, 9), "elbow.angle": np.linspace(0.0, 1.0, 9) ** 3}
+    found = mbd.inverse_dynamics(_with_gravity(read, model.gravity), motion)["elbow.moment"]
+    np.testing.assert_allclose(found, mbd.inverse_dynamics(model, motion)["elbow.moment"], rtol=1e-12, atol=1e-12)

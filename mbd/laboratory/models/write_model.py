@@ -23,7 +23,8 @@ def write_model(model: Any, path: str | Path) -> ImportReport:
     Numbers keep all digits, so that `mbd.read_model` gives a model with the same mass matrix and bias. In a ``.urdf``
     stops on coordinates become limits, viscous and dry friction of joints dynamics; joints of several coordinates
     become chains. An ``.osim`` has stops as clamped ranges, markers, and muscles on points. Springs, other forces,
-    contacts, rows and joints that close loops are left out, and listed.
+    contacts, rows and joints that close loops are left out, and listed. Links of the plane, which have no moments about
+    x and y, get half of that about z.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def osim_of(model: Any) -> tuple[str, ImportReport]:
     bodies, joints = list[str](), list[str]()
     for each in tree:
         body = each.child.body
-        found = inertial_of(body, values)
+        found = inertial_of(body, values, report)
         J = found.inertia
         tensor = _text((J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]))
         bodies.append(

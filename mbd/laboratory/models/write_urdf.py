@@ -61,7 +61,7 @@ def urdf_of(model: Any) -> tuple[str, ImportReport]:
         (each,), links = held, list[str]()
         root, place = each.child.body.name, _ground_on(each, values)
         names, frames = {model.ground.name: root, root: root}, {model.ground.name: (np.zeros(3), UP), root: place}
-        links.append(_link(root, _in_frame(inertial_of(each.child.body, values), place)))
+        links.append(_link(root, _in_frame(inertial_of(each.child.body, values, report), place)))
         tree.remove(each)
         report.understood.append(f"{root!r}, which {each.joint.name!r} holds to the ground, as the root link")
     else:
@@ -75,7 +75,7 @@ def urdf_of(model: Any) -> tuple[str, ImportReport]:
     for each in tree:
         body = each.child.body
         names[body.name], frames[body.name] = body.name, place_of(each.child, values)
-        inertial = _in_frame(inertial_of(body, values), frames[body.name])
+        inertial = _in_frame(inertial_of(body, values, report), frames[body.name])
         steps, kind = _steps(each)
         at = _seen(place_of(each.parent, values), frames[each.parent.body.name])
         parent = names[each.parent.body.name]
@@ -193,7 +193,7 @@ def _text(values: Any) -> str:
 
 
 def _link(name: str, found: Inertial | None) -> str:
-    if found is None or (found.mass == 0.0 and not found.inertia.any()):
+    if found is None or found.mass == 0.0:
         return f"  <link name={quoteattr(name)}/>"
     J = found.inertia
     elements = {"ixx": J[0, 0], "ixy": J[0, 1], "ixz": J[0, 2], "iyy": J[1, 1], "iyz": J[1, 2], "izz": J[2, 2]}

@@ -17,6 +17,7 @@ from mbd.joints.prismatic import Prismatic
 from mbd.joints.reversed import Reversed
 from mbd.joints.revolute import Revolute
 from mbd.joints.weld import Weld
+from mbd.laboratory.models.report import ImportReport
 from mbd.topology.plan import uncut
 
 __all__ = ["Inertial", "Place", "WrittenJoint", "inertial_of", "place_of", "stops_of", "tree_to_write", "turned_to"]
@@ -93,11 +94,21 @@ def stops_of(model: Any, tree: list[WrittenJoint]) -> list[tuple[str, JointMeasu
     ]
 
 
-def inertial_of(body: Body, parameters: dict[str, float]) -> Inertial:
-    """The numbers of a body."""
+def inertial_of(body: Body, parameters: dict[str, float], report: ImportReport) -> Inertial:
+    """The numbers of a body.
+
+    A body of the plane has a moment about z alone, which other programs refuse. About x and y it gets half of that, as
+    a lamina has, which enters no motion in the plane; the report tells.
+    """
     found: Any = body.mass_properties(_Numbers(parameters))
-    rows = [[float(x) for x in row] for row in found.inertia]
-    return Inertial(float(found.mass), np.array([float(x) for x in found.center]), np.array(rows))
+    inertia = np.array([[float(x) for x in row] for row in found.inertia])
+    moment = inertia[2, 2]
+    if moment != 0.0 and np.array_equal(inertia, np.diag([0.0, 0.0, moment])):
+        inertia = np.diag([0.5 * moment, 0.5 * moment, moment])
+        report.approximated.append(
+            f"moments of {body.name!r} about x and y, of which it has none: half of that about z"
+        )
+    return Inertial(float(found.mass), np.array([float(x) for x in found.center]), inertia)
 
 
 def place_of(frame: Frame, parameters: dict[str, float]) -> Place:
