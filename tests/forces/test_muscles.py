@@ -290,3 +290,10 @@ def test_a_fit_of_a_path_names_what_is_wrong(coordinates, degree, told):
     model = forearm()
     with pytest.raises(mbd.ModelError, match=told):
         mbd.PolynomialPath.fitted(model.joints[0], coordinates, np.zeros(5), degree)
+
+
+def test_damping_below_that_of_the_curves_is_refused_as_a_parameter_too():
+    model = forearm(curves="millard")
+    start = start_of(model, 0.5, 0.1)
+    with pytest.raises(mbd.ModelError, match="damping 0.001 is below 0.01"):
+        mbd.simulate(model, start, dt=1e-3, until=0.01, parameters={"biceps.damping": 0.001})

@@ -117,7 +117,7 @@ class Muscle(Force):
         ]
         if (self.activation_time == 0.0) != (self.deactivation_time == 0.0):
             wrong.append(f"Muscle '{self.name}': activation_time and deactivation_time are both 0 or both positive")
-        if self.is_elastic and self.damping < self._curves.least_damping:
+        if self.is_elastic and self.damping == 0.0 < self._curves.least_damping:
             wrong.append(
                 f"Muscle '{self.name}': with curves={self.curves!r} and an elastic tendon damping must be "
                 f"{self._curves.least_damping:g} at least, got {self.damping:g}; the paper takes 0.1"
@@ -170,7 +170,8 @@ class Muscle(Force):
             times = ("activation_time", "deactivation_time")
             found |= {f"{self.name}.{field}": positive(unit="s") for field in times}
         found[f"{self.name}.pennation"] = Domain(0.0, 1.5, unit="rad")
-        found[f"{self.name}.damping"] = at_least_zero()
+        least = self._curves.least_damping if self.is_elastic else 0.0
+        found[f"{self.name}.damping"] = Domain(low=least) if least else at_least_zero()
         found[f"{self.name}.excitation"] = Domain(0.0, 1.0)
         return found
 
