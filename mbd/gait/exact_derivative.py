@@ -20,6 +20,7 @@ from mbd.gait.return_map import ReturnMap, Values
 from mbd.gait.section import Chart
 from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.tangent_names import place_names
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
@@ -41,6 +42,8 @@ def exact_derivative(map_: ReturnMap, chart: Chart, c: Vector, values: Values) -
             map_.model, state, map_.integrator, dt=map_.dt, until=(map_.section, map_.longest), contact="events",
             parameters=map_.plain(values), progress=False, on_failure="return", backend=map_.backend,
         )  # fmt: skip
+        if stopped(run):
+            raise KeyboardInterrupt
         arrival = map_(state, values, strides=1)
         if not run.success or not arrival.outcome.good:
             return None

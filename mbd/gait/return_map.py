@@ -27,6 +27,7 @@ from mbd.gait.outcome import Outcome, fall_of
 from mbd.gait.section import Section
 from mbd.integrators import Integrator
 from mbd.results.facts import Facts
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.repeated import End, RepeatedRun
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -376,6 +377,8 @@ class ReturnMap:
                 until=(self.section, self.longest), contact="events", parameters=self.plain(values), progress=False,
                 on_failure="return", backend=self.backend,
             )  # fmt: skip
+            if stopped(run):
+                raise KeyboardInterrupt
             return fall_of(run, next((name for name in self.feet if name in state.mode.closed), ""))
         except MbdError:
             return None

@@ -101,6 +101,9 @@ class RepeatedRun:
         except ModelError as error:
             return End(None, (), frozenset(), "", str(error))
         problem, message = run.march()
+        if run.interrupted:  # a march ends in order then, and what repeats it is to end too
+            run.interrupted = False
+            raise run.cause or KeyboardInterrupt
         run.collect()
         final = replace(run.state(), moved={})
         return End(final, tuple(run.events), _before(start, run.events, run.now), self._stop(message), problem)

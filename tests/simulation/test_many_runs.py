@@ -12,6 +12,7 @@ import mbd
 from mbd.kernel import codes
 from mbd.simulation.repeated import RepeatedRun
 from mbd.simulation.run.many import ManyRuns, start_line
+from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import REST_SPEED, laid_out
 from mbd.testing.mechanisms import random_scene
 from tests.cases.walkers import kneed, standing
@@ -138,3 +139,20 @@ def test_repeated_runs_that_a_reset_ends_are_the_same_together():
     for one, value in zip(repeated.many([start] * 3, values), values, strict=True):
         other = repeated(start, value)
         assert same(one.state, other.state) and one.stopped_by == other.stopped_by == "heel strike"
+
+
+def test_an_interruption_ends_what_repeats_a_run(monkeypatch):
+    """A run that Python drives ends in order as somebody interrupts it; searches must not take that for a failure."""
+    model = ball()
+    start = mbd.assemble(model, position={"fall.displacement": 1.0})
+    run, march = RepeatedRun(model, start, mbd.HHT(), 0.01, ("floor", 1.0), {}), Run._march
+    whole = run(start)
+
+    def interrupted(run):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Run, "_march", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run(start)
+    monkeypatch.setattr(Run, "_march", march)
+    assert (run(start).stopped_by, run(start).time) == (whole.stopped_by, whole.time)
