@@ -8,6 +8,7 @@ from functools import cache
 from mbd.analysis.spectrum import spectrum
 from mbd.errors import UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
+from mbd.integrators.extension import extension_of
 
 __all__ = [
     "DAMPED", "EVERY", "SCHEMES", "has_own_forces", "holds_positions_only", "is_explicit", "is_undamped", "scheme",
@@ -46,7 +47,7 @@ def holds_positions_only(integrator: Integrator) -> bool:
 
 def has_own_forces(integrator: Integrator) -> bool:
     """Whether multipliers at the end of a step follow from the state there, and remember nothing of earlier ones."""
-    return integrator.between != "hermite"  # accelerations as accurate as positions
+    return extension_of(integrator.between).uses_accelerations
 
 
 @cache

@@ -370,7 +370,7 @@ def pull_round_off(K: ContactRows, f: int, lam: Reals) -> float:
     return ROUGH * EPS * max(pull_of_both(K, f, lam), largest_force(K))
 
 
-def change_of_margin(K: Switching, f: int) -> float:
+def change_of_margin(K: Guards, f: int) -> float:
     """Most by which limit − |λ_T| of a sticking friction may have changed in the step, by its own multipliers."""
     row = K.friction_row[f]
     change = K.lam1[row] - K.lam[row]

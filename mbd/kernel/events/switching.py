@@ -133,7 +133,7 @@ def loss_in(K: ContactForces, c: int) -> float:
     return loss
 
 
-def loss_elsewhere(K: Switching) -> float:
+def loss_elsewhere(K: ContactForces) -> float:
     """What friction in joints, and contacts that were closed before, took in an impact.
 
     Where an impulse of the user's acts in the same problem, rows that always hold take their part of it, −½ Λ B·Δv.
