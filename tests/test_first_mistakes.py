@@ -476,3 +476,11 @@ def test_a_muscle_in_centimetres_puts_its_run_in_doubt(tendon: str) -> None:
     start = mbd.assemble(model, position={"elbow.angle": 0.3})
     with pytest.warns(mbd.MbdWarning, match=r"path is 0.33 m long and its tendon alone 20 m; lengths are in metres"):
         mbd.simulate(model, start, dt=1e-3, until=0.01)
+
+
+def test_a_delay_in_milliseconds_is_doubted() -> None:
+    model, pin = pendulum()
+    outputs, read = {"drive.torque": lambda q: -q}, ["pin.angle"]
+    model.apply(mbd.Motor("drive", pin, 0.0), mbd.SampledLaw("law", 0.01, outputs, read, delay=3.0))
+    with pytest.warns(mbd.MbdWarning, match=r"'law' puts its outputs out 3 s after .* 3 ms is 0.003"):
+        model.check()

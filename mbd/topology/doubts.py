@@ -113,13 +113,18 @@ def _grips(model: Any) -> list[str]:
 
 
 def _periods(model: Any) -> list[str]:
-    """Controllers that hardly ever sample, because their period was meant as a frequency."""
+    """Controllers that hardly ever sample, whose period was meant as a frequency, or answer late, in milliseconds."""
     words = [*getattr(model, "controllers", ()), *getattr(model, "machines", ())]
     return [
         f"'{word.name}' samples once in {period:g} s; period is the time between samples, and {period:g} Hz is "
         f"period={1.0 / period:.3g}"
         for word in words
         if (period := getattr(word, "period", None)) is not None and period > SLOWEST_SAMPLING
+    ] + [
+        f"'{word.name}' puts its outputs out {delay:g} s after each sample; delay is in seconds, and {delay:g} ms is "
+        f"{delay / 1e3:g}"
+        for word in words
+        if (delay := getattr(word, "delay", 0.0)) > SLOWEST_SAMPLING
     ]
 
 
