@@ -129,9 +129,11 @@ def _fall(run: Trajectory) -> str:
         return ""
     height = whole @ (-gravity / size)
     reach = np.ptp(height, axis=0)
+    if not reach[0] > EQUAL_RTOL * max(extent, float(np.max(reach))):  # flat from the start, but for round-off
+        return ""
     if sunk := _sunk(run, float(reach[0])):
         return sunk
-    if not reach[0] > 0.0 or reach[-1] >= FALLEN * reach[0]:
+    if reach[-1] >= FALLEN * reach[0]:
         return ""
     top = points[int(np.argmax(height[:, 0]))]
     when = float(run.time[np.argmax(reach < FALLEN * reach[0])])

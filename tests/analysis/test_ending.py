@@ -63,6 +63,20 @@ def test_a_rod_on_end_falls_and_a_hanging_one_does_not():
     assert not any(text.startswith("fell") for text in ending(standing(0.0)))
 
 
+@pytest.mark.parametrize("inclination", [0.0, 0.3])
+def test_two_blocks_at_one_height_but_for_round_off_have_none_to_fall_from(inclination):
+    model = mbd.Model("blocks", gravity=mbd.on_slope(inclination))
+    blocks = [mbd.PointMass(name, mass=1.0) for name in ("one", "two")]
+    for k, block in enumerate(blocks):
+        model.connect(mbd.Translation(f"place {k}", model.ground.origin, block.origin))
+        model.constrain(mbd.Unilateral(f"floor {k}", mbd.touchdown(block.origin), friction=0.5))
+    start = mbd.assemble(
+        model, position={"place 0.y": -1e-17}, velocity={"place 0.x.rate": 1.0}, closed=["floor 0", "floor 1"]
+    )
+    run = mbd.simulate(model, start, dt=1e-2, until=0.2, backend="python")
+    assert not any(text.startswith("fell") for text in ending(run))
+
+
 def test_walkers_walk():
     run = Script.load("compass-gait").run(None, {})
     (walks, closed) = ending(run)
