@@ -42,7 +42,8 @@ class LimitCycle:
     Attributes
     ----------
     name : of the model; section, mirror, strides : as asked
-    state : just after the event, time 0; it repeats itself up to sides and the way that the walker went
+    state : just after the event, time 0; it repeats itself up to sides and the way that the walker went. It has the
+        gait's values of parameters, so that ``mbd.simulate(model, gait.state)`` walks the gait
     outcome : 'walks', or why there is none, with its time; attempts : what runs beside it came to
     period : of one application of the map [s]; distance : that it leads on [m]
     steps : (foot, time of its touchdown [s], length [m]) in order

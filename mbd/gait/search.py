@@ -171,9 +171,10 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
         left = given.member.size * abs(given.member.misfit(map_, chart, zero, found, values))
         residual[given.member.unit] = max(residual.get(given.member.unit, 0.0), left)
     way = arrival.travel if arrival is not None else np.zeros(len(map_.fixed))
+    state = replace(point.state, parameters=map_.plain(values))
     return LimitCycle(
         getattr(map_.model, "name", ""), map_.section, None if map_.mirror is None else map_.mirror.sides, map_.strides,
-        point.state, point.outcome, tuple(point.attempts), arrival.period if arrival and good else float("nan"),
+        state, point.outcome, tuple(point.attempts), arrival.period if arrival and good else float("nan"),
         _distance(map_.forward * way, arrival) if good else float("nan"), arrival.steps if arrival and good else (),
         residual, tuple(point.residuals), multipliers, derivative, dict(values), map_.dt, map_.runs, chart, map_, way,
         given,

@@ -371,3 +371,13 @@ def test_a_gait_shows_itself(tmp_path):
     assert (tmp_path / "gait.png").stat().st_size > 10_000
     mode = gait.modes[0]
     assert set(mode) > {"left hip.angle", "right hip.angle.rate"}
+
+
+def test_the_state_of_a_gait_has_its_parameters():
+    """A run from it is the gait, with values that the model does not have, here those of a slope."""
+    gait = symmetric("f2-compass-gait-3deg")
+    changed = gait.at({"slope": gait.parameters["slope"] + 0.002})
+    for one in (gait, changed):
+        assert dict(one.state.parameters) == one.map.plain(one.parameters)
+        run = mbd.simulate(one.map.model, one.state, one.map.integrator, dt=one.dt, until=one.period)
+        assert run["left hip.angle"][-1] == pytest.approx(one.state["right hip.angle"], abs=1e-9)
