@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.values import is_number, number, shown
+from mbd.bodies.values import is_number, named_number_faults, number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.muscles import Muscle
@@ -128,6 +128,8 @@ def muscle_forces(
     acting = _muscles(model, muscles)
     if not is_number(reserve) or number(reserve, "reserve") <= 0.0:
         raise ModelError(f"reserve is the moment that costs as much as a full activation, > 0 N m; got {reserve!r}")
+    if faults := named_number_faults(parameters, "parameters"):
+        raise ModelError(faults)
     own = [force.name for force in model.forces if isinstance(force, Muscle)]
     bare = model.without(*own) if own else model
     of_muscles = {name for muscle in acting for name in muscle.parameters()}
