@@ -79,7 +79,7 @@ def test_explicit_steps_with_rows_are_those_with_a_search_for_pivots(motion, how
     straight = motion(scheme)
     assert straight.stats["compiled"]
     assert any(code.rates is not None for code in modes_of(straight))
-    name, value = {"too many unknowns": ("LARGEST", 0), "no pivot large enough": ("KEPT", 1e300)}[how]
+    name, value = {"too many unknowns": ("MAX_UNKNOWNS", 0), "no pivot large enough": ("MIN_PIVOT_SHARE", 1e300)}[how]
     monkeypatch.setattr(explicit_solution, name, value)
     searched = motion(scheme)
     assert all(code.rates is None for code in modes_of(searched)) == (how == "too many unknowns")
