@@ -23,7 +23,7 @@ from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.equations.magnitudes import magnitudes
 from mbd.kernel.algebra.redundancy import LEAST_SHARE
-from mbd.kernel.stepping.restart import MOST_LOADS
+from mbd.kernel.stepping.restart import MAX_LOADS
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
@@ -120,7 +120,7 @@ class Balance:
         """The same in one mode; `mine` are the places of the results."""
         held = self.rows_in(mode)
         slides = bool(np.any(np.abs(rows.phase) == 1)) or self.rubs
-        turns = MOST_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
+        turns = MAX_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):
             M, f, R, B, _, _, bias, limits = self.terms_at(replace(rows, lam=lam))

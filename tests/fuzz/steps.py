@@ -65,7 +65,7 @@ def motion(
     fastest = 3.0 * np.max(np.abs(rated)) if rated else 0.0
     accelerations = [_around(np.abs(np.diff(told[n]))[steps]) for n in told.values if n.endswith(".acceleration")]
     part = max(0.05, share / 3.0)  # corrections onto rows move everything by twice what one position errs
-    leaps = part * np.max(accelerations, axis=0) if accelerations else 0.0
+    jumps = part * np.max(accelerations, axis=0) if accelerations else 0.0
     for name in [name for name in told.values if f"{name}.rate" in told and f"{name}.acceleration" in told]:
         q, v, a = told.coordinate(name)
         change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
@@ -73,7 +73,7 @@ def motion(
         off = np.diff(q)[steps] - h * (v[steps] + v[steps + 1]) / 2.0
         if smooth:
             off = off + h**2 * np.diff(a)[steps] / 12.0
-        limit = 6.0 * h**2 * (change + leaps) + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast) + tol
+        limit = 6.0 * h**2 * (change + jumps) + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast) + tol
         if not smooth:  # bodies are lifted out of surfaces
             limit = limit + h * (10.0 * _range(v)[steps] + fastest)
         elif not rates:
@@ -81,7 +81,7 @@ def motion(
         there.small("a coordinate is the integral of its rate", name, off, limit)
         if smooth and rates:
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-            limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast) + tol / h
+            limit = 2.0 * h * (change + tied * jumps) + 1e-7 * (1.0 + fast) + tol / h
             there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * uncertain)
 
     for name in spins if smooth and rates else []:
@@ -89,7 +89,7 @@ def motion(
         change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
         fast = np.maximum(np.abs(v[steps]), np.abs(v[steps + 1]))
         off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-        limit = 2.0 * h * (change + tied * leaps) + 1e-7 * (1.0 + fast) + tol / h
+        limit = 2.0 * h * (change + tied * jumps) + 1e-7 * (1.0 + fast) + tol / h
         there.small("an angular velocity is the integral of its rate", name, off, limit, told=2 * uncertain)
     for owner in [name.removesuffix(".orientation.w") for name in told.values if name.endswith(".orientation.w")]:
         turning = told.attitude(owner)
@@ -103,7 +103,7 @@ def motion(
             step = step - h[:, None] ** 2 * (a[steps + 1] - a[steps]) / 12.0
         change = np.linalg.norm(_around(np.abs(np.diff(a, axis=0)).max(axis=1)[steps])[:, None], axis=1)
         fast = np.maximum(np.linalg.norm(v[steps], axis=1), np.linalg.norm(v[steps + 1], axis=1))
-        limit = 6.0 * h**2 * (change + leaps) + 2.0 * bend + 1e-8 * (1.0 + h * fast) + tol
+        limit = 6.0 * h**2 * (change + jumps) + 2.0 * bend + 1e-8 * (1.0 + h * fast) + tol
         if not smooth:
             limit = limit + h * 10.0 * _range(np.linalg.norm(v, axis=1))[steps] + h * fastest
         elif not rates:

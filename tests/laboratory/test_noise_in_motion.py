@@ -26,7 +26,7 @@ def motion(count, step, rng):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_scatter_told_is_that_of_the_moments(seed):
-    """Within a third, for motions of 60 to 400 frames; nothing is told of the same motion without noise."""
+    """Within a third, for motions of 60 to 400 frames; the same motion without noise gives no warning."""
     rng = np.random.default_rng(seed)
     true = motion(int(rng.integers(60, 400)), rng.uniform(0.005, 0.012), rng)
     with warnings.catch_warnings():

@@ -108,7 +108,7 @@ def two_pushed_feet(seed: int) -> tuple[mbd.Model, mbd.State]:
 def test_of_redundant_corners_none_slides_where_others_hold_it():
     """One foot tips; the three corners of the other hold it with any of many loads: which is decided once.
 
-    Before, the corners stuck and slipped by turns from 0.26838720 s on, 3140 times in 4.4e-5 s.
+    Before, the corners stuck and slipped alternately from 0.26838720 s on, 3140 times in 4.4e-5 s.
     """
     model, start = two_pushed_feet(2)
     run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.2683876)

@@ -19,7 +19,7 @@ from mbd.kernel.stepping.mass_ratios import LOSS
 from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.stepping.scales import still_energy
 
-__all__ = ["leaps"]
+__all__ = ["peaks_within"]
 
 HALVINGS = 12
 """How often the part of the way around the largest accelerations is halved."""
@@ -37,7 +37,7 @@ NOT_FOUND = -1.0
 """Of accelerations that cannot be found."""
 
 
-def leaps(K: Switching, h: float, at_y: int) -> bool:
+def peaks_within(K: Switching, h: float, at_y: int) -> bool:
     """Whether accelerations within the step are `BEYOND` those at its ends, and decide on the motion if they last.
 
     The new state is in K.inside, its velocities from `at_y` on; K.q1, K.y1 and the block are overwritten.

@@ -20,7 +20,7 @@ from mbd.kernel.schemes.iteration import BENT, BYSTANDER, LOOK_TWICE, is_small
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.charts import whole_step
 from mbd.kernel.stepping.growth import is_unstable, leave_rows_alone, note_unforeseen, outgrows
-from mbd.kernel.stepping.poles import leaps
+from mbd.kernel.stepping.poles import peaks_within
 from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.stepping.scales import still_energy
 
@@ -81,7 +81,7 @@ def bends(K: Equations, h: float) -> bool:
 
 
 def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bool) -> int:
-    """The same of a candidate that a glance does not clear, which is left as it was; if not rough, `leaps` alone."""
+    """The same of a candidate that a glance does not clear, left as it was; `peaks_within` alone if not rough."""
     rough = K.failure_size
     blocked = K.failure_index
     at_y = carry(K.q1, K.inside, 0, K.n_q, True)
@@ -97,7 +97,7 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
         status = UNSTABLE
     elif coarse and gains(K, h, t1, at_y, at_D):
         status = GAINED
-    elif leaps(K, h, at_y):
+    elif peaks_within(K, h, at_y):
         status = LEAPT
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)

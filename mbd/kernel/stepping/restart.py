@@ -36,7 +36,7 @@ ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
 SETTLED_LOADS = 1e-6
 """Relative change of the last of these above which there are no such multipliers: friction locks the motion [-]."""
-MOST_LOADS = 30
+MAX_LOADS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
 
@@ -274,7 +274,7 @@ def consistent(K: Balance, t: float, q: Reals, y: Reals) -> int:
     status = solve_rows(K, m, False)
     if K.loaded > 0 or together:  # R follows multipliers: of degree one, so that to solve again is Newton's method
         change = 0.0
-        for _ in range(MOST_LOADS):
+        for _ in range(MAX_LOADS):
             if status != 0:
                 break
             change = evaluate_loaded(K, K.impulse)
@@ -312,7 +312,7 @@ def minimum_norm_multipliers(K: Balance, lam: Reals) -> None:
 
     Frictions that hold together share by their limits, which follow their loads: they are found by turns.
     """
-    for turn in range(MOST_LOADS):
+    for turn in range(MAX_LOADS):
         change = evaluate_loaded(K, lam)
         if turn == 0:
             find_dependence(K, stepping_rows(K))

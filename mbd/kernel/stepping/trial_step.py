@@ -139,7 +139,7 @@ def brief_step(K: Balance, h: float, t1: float) -> int:
                 K.rate1[i] = 0.5 * (K.rate1[i] + K.jump[i])
         else:
             K.rate1[: K.n] = K.jump[: K.n]
-    if unsettled or not holds_rows(K, K.n_active) or (K.vector == 0 and leaps(K)):
+    if unsettled or not holds_rows(K, K.n_active) or (K.vector == 0 and rows_turn_around(K)):
         K.failure_time = t1
         K.failure_size = 0.0
         return NOT_CONVERGED
@@ -172,7 +172,7 @@ def settled(K: Balance) -> bool:
     return change <= SETTLED * largest
 
 
-def leaps(K: Motion) -> bool:
+def rows_turn_around(K: Motion) -> bool:
     """Whether velocities miss the rows by as much as they are: these have another direction at the candidate.
 
     That of a thin disk's lowest point turns around as the disk comes to lie flat.

@@ -57,7 +57,7 @@ FOLLOWED = 1e-12
 """Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
 STALLED = 0.9
 """Part of the last correction of derivatives above which the next one is round-off [-]."""
-MOST_CORRECTIONS = 12
+MAX_CORRECTIONS = 12
 """Corrections of derivatives with matrices that are not quite those of the solution [-]."""
 
 
@@ -298,7 +298,7 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
     # rates and multipliers, then what they change where positions are corrected
     exact = K.vector == 1 and K.n_cones == 0  # is the matrix the derivative itself?
     before = 1e300
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(MAX_CORRECTIONS):
         call(K, K.residual_program, K.out)
         for i in range(n):
             K.rhs[i] = -derivative_of(K.out[i])
@@ -612,7 +612,7 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
         K.kkt[i] = without_tangent(K.kkt[i])
     o_D = stage_place(K, CHANGES)
     before = 1e300
-    for iteration in range(MOST_CORRECTIONS):
+    for iteration in range(MAX_CORRECTIONS):
         evaluate_stages(K, h, t1, m, 1.0, c, c * c, False)
         if K.vector == 0 and m == 0:
             exchange_masses(K, h, t1)

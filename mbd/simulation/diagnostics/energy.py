@@ -248,8 +248,8 @@ class EnergyWatch(EnergyFindings):
             sudden = bool(run.parameter_changes) or any(event.kind in ("closed", "event") for event in run.events)
             return bool(risen.any()) or not (kinds or sudden)
         swing = kinetic[0] + _swing(kinetic) + _swing(potential)
-        leaps = rise[1:] > LEAP * swing[:-1]
-        return bool(np.any(leaps[3:] & risen[4:]))
+        large_rise = rise[1:] > LEAP * swing[:-1]
+        return bool(np.any(large_rise[3:] & risen[4:]))
 
 
 def _telling_gain(run: RunData) -> float:

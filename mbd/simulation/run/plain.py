@@ -18,7 +18,7 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.stepping.mass_ratios import LOSS
-from mbd.kernel.stepping.restart import MOST_LOADS, fill_block, refresh_scales, take_consistent
+from mbd.kernel.stepping.restart import MAX_LOADS, fill_block, refresh_scales, take_consistent
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.user_calls import call_user
 from mbd.state import Mode, State
@@ -167,7 +167,7 @@ class MechanismSystem(System):
         """Multipliers of the rows `given_rows` into the block; (n, m) what those of `rows` bring along through them."""
         lam, kept, dependent = self.mechanism.layout.lam, list(rows), list(given_rows)
         places = [lam + k for k in dependent]
-        for _ in range(MOST_LOADS):  # frictions that hold together share by their limits, which follow the loads
+        for _ in range(MAX_LOADS):  # frictions that hold together share by their limits, which follow the loads
             terms = self.mechanism.terms_of(block, self.parameters)
             part = shares(self.mechanism.equations.rows, terms, kept, dependent)
             before, block[places] = block[places], part @ block[[lam + k for k in kept]]
@@ -180,7 +180,7 @@ class MechanismSystem(System):
         rows, penalties = self.active(mode)
         n, m, picked, given_rows = self.mechanism.layout.n, len(rows), list(rows), list(self._given_rows(mode))
         lam = np.zeros(self.mechanism.layout.n_rows)
-        for _ in range(MOST_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method
+        for _ in range(MAX_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method
             terms = self.mechanism.acceleration_terms(
                 t, q, y, self.parameters, self.anchors, penalties, slips=self.slips, lam=lam
             )
