@@ -6,9 +6,10 @@ import json
 import os
 import platform
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from functools import partial
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
@@ -18,6 +19,7 @@ from mbd.analysis.gait import gait
 from mbd.results.archive import plain, write as write_arrays, write_whole
 from mbd.results.storage import SUFFIX, Archive, contents
 from mbd.results.summary import facts
+from mbd.view.beside import beside
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
@@ -121,34 +123,44 @@ def write(
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     stored = place / f"run{SUFFIX}"
-    with ThreadPoolExecutor(1) as pool:  # compression does not hold the interpreter, which draws in the meantime
+    plotted = _plots(run, place) if plots else {}
+    with beside(lambda: _draw(plotted)), ThreadPoolExecutor(1) as pool:  # compression does not hold the interpreter
         saved = pool.submit(write_arrays, stored, *contents(run.record, Archive.of(run)))
-        drawn = draw(run, place, plots)
+        page = run.page(place / "page.html")
         saved.result()
     text = json.dumps(record(run, wall, script), indent=2, default=plain)
     write_whole(place / "record.json", lambda partial: partial.write_text(text + "\n", encoding="utf-8"))
-    return [drawn[0], stored, *drawn[1:], place / "record.json"]
+    return [page, stored, *plotted, place / "record.json"]
 
 
 def draw(run: Trajectory, place: Path, plots: bool = True) -> list[Path]:
     """Write the page of a run and its plots, as far as there is something to plot; returns the paths."""
     place.mkdir(parents=True, exist_ok=True)
-    return [run.page(place / "page.html"), *(_plots(run, place) if plots else [])]
+    plotted = _plots(run, place) if plots else {}
+    with beside(lambda: _draw(plotted)):
+        page = run.page(place / "page.html")
+    return [page, *plotted]
 
 
-def _plots(run: Trajectory, place: Path) -> list[Path]:
-    """Coordinates, energy, phase portrait and forces of contacts, as far as the run has them; returns the paths."""
+def _draw(plotted: Mapping[Path, Callable[..., object]]) -> None:
+    for path, plot in plotted.items():
+        plot(path=path)
+
+
+def _plots(run: Trajectory, place: Path) -> dict[Path, Callable[..., object]]:
+    """Coordinates, energy, phase portrait and forces of contacts, as far as the run has them: what draws each file."""
+    import matplotlib.figure  # noqa: F401  (a fork must not find another thread importing it)
+
     from mbd.view.plots import phase_portrait, portrayed
 
-    run.plot(path=place / "coordinates.png")
-    run.energy.plot(path=place / "energy.png")
-    paths = [place / "coordinates.png", place / "energy.png"]
+    found: dict[Path, Callable[..., object]] = {
+        place / "coordinates.png": run.plot,
+        place / "energy.png": run.energy.plot,
+    }
     if portrayed(run):
-        phase_portrait(run, path=place / "phase.png")
-        paths.append(place / "phase.png")
+        found[place / "phase.png"] = partial(phase_portrait, run)
     kinds = [f"{contact.name}.{what}" for contact in run.facts.contacts for what in ("force", "friction")]
     forces = [name for name in kinds if name in run]
     if forces:
-        run.plot(*forces, path=place / "forces.png")
-        paths.append(place / "forces.png")
-    return paths
+        found[place / "forces.png"] = partial(run.plot, *forces)
+    return found
