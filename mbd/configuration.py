@@ -23,13 +23,13 @@ What schemes make of it, each with the order that it has where coordinates add:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
 
 __all__ = ["Configuration"]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from mbd.bodies.domains import ParameterCheck
+from mbd.dataclass import dataclass
 from mbd.equations.coordinate_scope import identifier
 from mbd.equations.cost import Cost
 from mbd.equations.derivation import derivation_faults

@@ -8,11 +8,11 @@ All vectors are triples of scalars in ground axes, rotations are rows of a 3×3 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from mbd.bodies.algebra import Rotation, Triple
 from mbd.bodies.base import Frame, ParameterSource
+from mbd.dataclass import dataclass
 from mbd.tape.node import Node, Scalar, Table, Tape
 
 __all__ = ["FrameMotion", "JointMotion", "Rotation", "Scope", "Triple"]

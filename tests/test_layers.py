@@ -14,6 +14,7 @@ import mbd
 PACKAGE = Path(mbd.__file__).parent
 
 RANKS = [
+    ("dataclass",),
     ("errors", "equal", "later", "arguments", "arrays", "state", "free_memory", "notebook", "notes", "progress"),
     ("tape", "trees"),
     ("bodies",),

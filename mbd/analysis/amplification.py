@@ -7,12 +7,13 @@ numbers in its memory. Unit changes of each give the matrix.
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, System, Terms
 from mbd.state import Mode, State

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.integrators.base import Integrator
 from mbd.integrators.family import Coefficients, NewmarkFamily
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from mbd.analysis.independent import row_sizes
 from mbd.analysis.instant import Instant
 from mbd.analysis.linear_motion import Prescribed, multiplier_map
 from mbd.arrays import ComplexArray, Matrix
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms

@@ -8,13 +8,13 @@ has left the ground.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 from mbd.notebook import table as html_table
 from mbd.results.record import EventRecord
 

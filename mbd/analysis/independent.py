@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.dependence import NEGLIGIBLE
+from mbd.dataclass import dataclass
 
 __all__ = ["Independent", "independent", "row_sizes"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.given_state import given_state
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import scalar_function
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Row
 from mbd.equations.linearization import LinearTerms, linearization
 from mbd.errors import ModelError

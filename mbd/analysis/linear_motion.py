@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from mbd.analysis.instant import Instant
 from mbd.analysis.ports import Input, Output
 from mbd.arrays import Matrix
 from mbd.assembly.dependence import NEGLIGIBLE
+from mbd.dataclass import dataclass
 from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError

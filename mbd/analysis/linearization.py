@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from mbd.analysis.ports import Input, Output, port_terms
 from mbd.analysis.state_space import StateSpace
 from mbd.arrays import ComplexArray, Matrix, Vector
 from mbd.configuration import Configuration
+from mbd.dataclass import dataclass
 from mbd.later import later
 from mbd.notes import doubt
 

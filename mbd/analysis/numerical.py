@@ -7,7 +7,7 @@ from runs with halved steps.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from mbd.analysis.amplification import LinearOscillator, oscillated
 from mbd.analysis.closed_forms import ClosedForm, closed_form
 from mbd.analysis.spectrum import Spectrum, argument_faults, spectrum
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.errors import CapabilityError, ModelError
 from mbd.integrators.base import Integrator

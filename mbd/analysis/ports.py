@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import names_of
 from mbd.compile.python import scalar_function
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations, Row
 from mbd.equations.ports import PortTerms, enters, ports
 from mbd.errors import ModelError, UnknownNameError, nearest

@@ -11,13 +11,13 @@ with z of the principal pair in the last two.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.analysis.amplification import amplification_matrix
 from mbd.bodies.values import is_number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.integrators.base import Integrator
 

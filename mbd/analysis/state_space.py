@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import ComplexArray, Matrix
 from mbd.bodies.values import is_number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.notebook import table
 from mbd.results.tables import library

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import scalar_function
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import UnknownNameError
 from mbd.tape.derivatives import gradient, live

@@ -7,12 +7,13 @@ left out for good if the others still conflict; what remains conflicts, and no p
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations, Row
 
 __all__ = ["Conflict", "Member", "irreducible", "linear_conflict", "loops_of", "member_of", "solvable"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from mbd.arrays import Vector
 from mbd.assembly.conflicts import loops_of
 from mbd.assembly.infeasibility import MOST_SETS, Held, named_conflict, position_conflicts, velocity_conflict
 from mbd.assembly.posture import TOLERANCE, Posture
+from mbd.dataclass import dataclass
 
 __all__ = ["Attempt", "contradictions", "infeasible"]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 
 __all__ = ["Dependence", "dependences", "rank_of"]
 

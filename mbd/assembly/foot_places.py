@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from mbd.arrays import Vector
 from mbd.assembly.posture import Posture
 from mbd.bodies.values import is_finite_number, shown
 from mbd.constraints.touchdown import Touchdown
+from mbd.dataclass import dataclass
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.state import State
 

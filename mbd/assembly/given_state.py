@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from mbd.assembly.trivial_rows import manager_of
 from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest

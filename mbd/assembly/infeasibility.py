@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
 from mbd.assembly.conflicts import HEAVY, Conflict, Member, irreducible, linear_conflict, member_of, solvable
 from mbd.assembly.posture import TOLERANCE, Posture, close_positions, descend, descents
+from mbd.dataclass import dataclass
 
 __all__ = ["Held", "acceleration_conflict", "named_conflict", "position_conflicts", "velocity_conflict"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.kernel.contact.active_set import ActiveSetManager
 

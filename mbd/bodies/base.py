@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from mbd.bodies.algebra import IDENTITY, Rotation, Triple, constant_rotation, product
 from mbd.bodies.domains import Domain, Parameterized, at_least_zero
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import Vector3, number, printable, triple, unit_vector
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node, Scalar
 

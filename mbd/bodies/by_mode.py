@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from mbd.bodies.values import number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node, Scalar
 from mbd.tape.selection import by_state

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from math import inf
 
 from mbd.bodies.values import named_number_faults
+from mbd.dataclass import dataclass
 
 __all__ = ["Domain", "Parameterized", "ParameterCheck", "at_least_zero", "positive"]
 

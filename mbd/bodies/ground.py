@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from mbd.bodies.algebra import ZERO, Triple
 from mbd.bodies.base import Body, Parameter, ParameterSource
 from mbd.bodies.mass import MassProperties
+from mbd.dataclass import dataclass
 
 __all__ = ["Ground"]
 

@@ -6,10 +6,11 @@ Each helper gives a `Solid` (mass, center, inertia), from which bodies are made:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.values import Vector3, among, number, size, triple
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 
 __all__ = ["SEGMENTS", "Solid", "box", "cylinder", "disk", "rod", "segment", "sphere"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import ZERO, Triple
@@ -18,6 +17,7 @@ from mbd.bodies.mass import (
     inertia_of,
 )
 from mbd.bodies.values import name_of, number
+from mbd.dataclass import dataclass
 
 __all__ = ["Link"]
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.values import name_of, triple
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
 __all__ = ["Marker"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.bodies.algebra import IDENTITY, ZERO, Rotation, Triple
 from mbd.bodies.values import number, numbers
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError
 from mbd.tape.node import Scalar

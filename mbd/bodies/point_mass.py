@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from mbd.bodies.algebra import ZERO, Triple
 from mbd.bodies.base import Body, Parameter, ParameterSource
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import name_of, number
+from mbd.dataclass import dataclass
 
 __all__ = ["PointMass"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import ZERO, Triple
@@ -17,6 +16,7 @@ from mbd.bodies.mass import (
     inertia_of,
 )
 from mbd.bodies.values import Vector3, among, name_of, number, triple
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 
 __all__ = ["FORMS", "RigidBody"]

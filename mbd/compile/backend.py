@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib.util import find_spec
 from typing import Protocol
 
@@ -13,6 +13,7 @@ from mbd.compile.cache import ObjectCache
 from mbd.compile.functions import ByName
 from mbd.compile.layout import Layout
 from mbd.compile.python import ScalarFunction
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, UnknownNameError, nearest
 from mbd.tape.node import Node
 

@@ -16,10 +16,10 @@ import contextlib
 import os
 import stat
 import time
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from mbd.dataclass import dataclass
 from mbd.notes import PROCESS, doubt
 
 __all__ = ["LIMIT", "ObjectCache", "default_cache", "key_of"]

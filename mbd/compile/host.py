@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 
 import llvmlite.binding as llvm
 
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 
 __all__ = ["TURNED_OFF", "Host", "host"]

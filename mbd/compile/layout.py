@@ -9,9 +9,9 @@ out         whatever the program lists
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 
 __all__ = ["Layout"]

@@ -30,7 +30,7 @@ import time
 import weakref
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -46,6 +46,7 @@ from mbd.compile.functions import ByName
 from mbd.compile.host import host
 from mbd.compile.ir import LIBRARY, Module
 from mbd.compile.layout import Layout
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
 from time import perf_counter
@@ -20,6 +19,7 @@ from mbd.compile.layout import Layout
 from mbd.compile.orders import Filled, elimination_order, may_pay
 from mbd.compile.postponed import Postponed
 from mbd.compile.remembered import Facts, Remembered
+from mbd.dataclass import dataclass
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.equations import Equations

@@ -16,11 +16,11 @@ Z, Z, Z               where its value is: in the tangent; in the program `accele
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.tape.node import Node
 from mbd.tape.ordering import Order, order
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.domains import Domain
@@ -13,6 +12,7 @@ from mbd.constraints.law import Equation, Hold, Law
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.measures import JointMeasure
 from mbd.constraints.user_measure import measure
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
 from mbd.forces.quantities import (

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.promises import function_of
 from mbd.bodies.values import name_of, names_of, number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
 __all__ = ["Controller"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total
@@ -15,6 +15,7 @@ from mbd.constraints.measure import Measure
 from mbd.constraints.round_on_surface import NO_PLACE, edge_on
 from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention

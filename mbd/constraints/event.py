@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.domains import Domain
@@ -13,6 +13,7 @@ from mbd.constraints.expressions import is_expression, plain
 from mbd.constraints.machine import Change, Machine
 from mbd.constraints.measure import Measure
 from mbd.constraints.unilateral import measure_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from mbd.bodies.algebra import dot, rotate
@@ -11,6 +10,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import among, name_of, triple
 from mbd.constraints.base import Constraint
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
 from mbd.forces.quantities import (

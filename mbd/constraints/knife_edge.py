@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import dot, rotate
@@ -11,6 +10,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, name_of, unit_vector
 from mbd.constraints.base import VelocityConstraint
+from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope

@@ -25,9 +25,10 @@ were at the instant of closing.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from mbd.dataclass import dataclass
 from mbd.tape.node import Node, Scalar
 
 if TYPE_CHECKING:

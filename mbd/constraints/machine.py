@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.constraints.base import Constraint
+from mbd.dataclass import dataclass
 from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from mbd.bodies.domains import Domain, positive
 from mbd.constraints.law import Closing, Hold, Law
 from mbd.constraints.measure import gap_of
 from mbd.constraints.stop_with_memory import StopWithMemory
+from mbd.dataclass import dataclass
 from mbd.scope import Scope
 from mbd.tape.functions import maximum
 

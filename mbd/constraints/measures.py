@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import difference, dot, norm, rotate
 from mbd.bodies.base import Frame
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
+from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive
@@ -12,6 +12,7 @@ from mbd.constraints.expressions import is_expression
 from mbd.constraints.machine import SEPARATOR, Change, Machine
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.user_measure import measure
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope

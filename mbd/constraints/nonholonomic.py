@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import among, is_number, name_of
 from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.expressions import is_expression, plain, quantities_in
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
     Mention,

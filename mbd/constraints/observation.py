@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.bodies.values import name_of
 from mbd.constraints.expressions import is_expression, plain, quantities_in
 from mbd.constraints.measure import Measure
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import ArgumentSpec, Mention, arguments_of, mentioned, resolved
 from mbd.joints.base import Joint

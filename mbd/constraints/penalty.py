@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
@@ -17,6 +17,7 @@ from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for
 from mbd.constraints.rubbing import rub, slip_velocities
 from mbd.constraints.rules import condition_details, condition_faults, condition_of, contacts_of, mentions_of
 from mbd.constraints.unilateral import measure_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from mbd.bodies.values import among, number
 from mbd.constraints.restitution import (
@@ -18,6 +17,7 @@ from mbd.constraints.restitution import (
     stored_work,
     wanted,
 )
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
 __all__ = ["PenaltyParameters", "largest_dt", "penalty_parameters"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.algebra import cross, difference, dot, scaled, total
@@ -15,6 +15,7 @@ from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.disks import to_edge
 from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import pi
 from typing import Any, ClassVar
 
@@ -16,6 +16,7 @@ from mbd.bodies.values import number
 from mbd.constraints.measure import Measure
 from mbd.constraints.soles import Sole, sole_of
 from mbd.constraints.surfaces import Plane
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import flag
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.measure import Measure
 from mbd.constraints.user_measure import measure
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 

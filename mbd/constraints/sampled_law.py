@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.values import name_of, names_of, number
 from mbd.constraints.machine import SEPARATOR, Change, Machine
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.forces.quantities import Mention, arguments_of, mentioned, resolved
 from mbd.scope import Scope

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError
 from mbd.tape.interpolation import Pieces, joined

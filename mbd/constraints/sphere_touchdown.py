@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.algebra import scaled, total
@@ -16,6 +16,7 @@ from mbd.constraints.measure import Measure
 from mbd.constraints.round_on_surface import NO_PLACE, ball_on
 from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
+from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope, Triple

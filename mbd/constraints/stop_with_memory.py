@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from mbd.bodies.domains import Domain
@@ -12,6 +11,7 @@ from mbd.constraints.base import Constraint
 from mbd.constraints.measure import Measure
 from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.unilateral import measure_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope

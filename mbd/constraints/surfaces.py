@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, cast
 
 from mbd.bodies.algebra import basis, cross, derivatives_at, difference, dot, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.values import Vector3, number, triple, unit_vector
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.scope import Scope, Triple

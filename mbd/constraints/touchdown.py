@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.algebra import dot
 from mbd.bodies.base import Frame
 from mbd.constraints.measure import Measure
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
+from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.scope import Scope, Triple

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import cross, dot, rotate
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint

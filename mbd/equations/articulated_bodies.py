@@ -15,10 +15,11 @@ takes operations in proportion to n.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from mbd.bodies.algebra import ZERO, cross, difference, dot, product, rotate, sum_of, total, transpose
 from mbd.bodies.mass import MassProperties
+from mbd.dataclass import dataclass
 from mbd.equations.composite_mass import Composite
 from mbd.equations.kinematics import Moving
 from mbd.scope import Rotation, Triple

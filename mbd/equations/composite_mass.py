@@ -13,10 +13,10 @@ operations; the derivatives of its balance, column by column, take three times a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from mbd.bodies.algebra import cross, difference, dot, product, rotate, scaled, sum_of, total, transpose
 from mbd.bodies.mass import MassProperties
+from mbd.dataclass import dataclass
 from mbd.equations.kinematics import Moving
 from mbd.scope import Rotation, Triple
 from mbd.tape.node import Node, Scalar, Tape

@@ -24,10 +24,11 @@ virials, where a plane leaves one number of each, is our own.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from mbd.bodies.algebra import difference
 from mbd.bodies.mass import MassProperties
+from mbd.dataclass import dataclass
 from mbd.equations.changes import partials
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematic_proxies import Wrench

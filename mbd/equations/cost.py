@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.equations.programs import accelerations, guards, newton, residual
 from mbd.notebook import table

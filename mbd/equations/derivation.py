@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.bodies.algebra import dot
 from mbd.bodies.domains import ParameterCheck
+from mbd.dataclass import dataclass
 from mbd.equations.changes import partials, rates
 from mbd.equations.contacts import anchors_held, laws
 from mbd.equations.derivation_context import DerivationContext

@@ -9,10 +9,11 @@ power; the sweep itself is the recursion of forces from the tips of the tree to 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from mbd.bodies.algebra import cross, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
+from mbd.dataclass import dataclass
 from mbd.equations.articulated_bodies import articulated_accelerations
 from mbd.equations.composite_mass import composite_mass_matrix
 from mbd.equations.composite_tangent import Branches, turns_by_numbers

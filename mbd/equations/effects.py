@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 
 from mbd.bodies.promises import called, title_of
+from mbd.dataclass import dataclass
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Dynamics, Work

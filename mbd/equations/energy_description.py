@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Self, TypeAlias, cast
 
 from mbd.bodies.domains import Domain, Parameterized
@@ -13,6 +13,7 @@ from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
 from mbd.constraints.machine import Machine
 from mbd.constraints.observation import Observation
+from mbd.dataclass import dataclass
 from mbd.description import all_are, served
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force

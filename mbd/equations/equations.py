@@ -21,10 +21,11 @@ Inputs on the tape, as (kind, index)
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal, Protocol
 
 from mbd.configuration import Configuration
+from mbd.dataclass import dataclass
 from mbd.equations.shapes import Shape
 from mbd.tape.node import Node, Table, Tape
 

@@ -8,8 +8,8 @@ chosen when a mode is met (`mbd.tape.elimination`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.tape.elimination import Factors, factors
 from mbd.tape.node import Node

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Chart, Equations
 from mbd.tape.derivatives import jvps, vjp
 from mbd.tape.node import Node, Scalar, Tape

@@ -8,9 +8,9 @@ the motion itself in.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 from mbd.bodies.algebra import ZERO, cross, rotate, transpose
+from mbd.dataclass import dataclass
 from mbd.equations.kinematics import Moving
 from mbd.equations.placement import Axes, Heading, Placement, Point
 from mbd.scope import Rotation, Triple

@@ -13,10 +13,10 @@ Absolute positions and rotations do not occur: they are made in `placement` wher
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from mbd.bodies.algebra import IDENTITY, ZERO, cross, difference, product, rotate, scaled, total, transpose
 from mbd.bodies.base import Body
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.derivatives import jvp, live

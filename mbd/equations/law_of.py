@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from mbd.bodies.promises import called, title_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Law
 from mbd.constraints.machine import state_of
+from mbd.dataclass import dataclass
 from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.states import has_pairs
 from mbd.errors import ModelError, nearest

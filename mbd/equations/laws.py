@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Contact, Effect, Friction, Guard, Machine, Row, StrikeImpulse
 from mbd.tape.node import Node, Scalar
 

@@ -7,9 +7,9 @@ they change, without differentiating through the chain of rotations.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 from mbd.bodies.algebra import IDENTITY, ZERO, cross, difference, product, rotate, total
+from mbd.dataclass import dataclass
 from mbd.equations.kinematics import Column, Moving
 from mbd.scope import Rotation, Triple
 from mbd.tape.node import Node, Scalar, Tape

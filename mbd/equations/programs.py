@@ -25,8 +25,8 @@ All are values: functions from equations to nodes, which the compile stage turns
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
+from mbd.dataclass import dataclass
 from mbd.equations.cones import cosine, sliding_force
 from mbd.equations.equations import Contact, Equations
 from mbd.equations.inputs import Inputs

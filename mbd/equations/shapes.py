@@ -7,7 +7,6 @@ traced when a picture asks for them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,7 @@ from mbd.constraints.rolling import Rolling
 from mbd.constraints.rolling_touchdown import RollingTouchdown
 from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.surfaces import Plane, Surface
+from mbd.dataclass import dataclass
 from mbd.equations.held import held_contacts, offer_held
 from mbd.equations.outputs import AXES, Outputs
 from mbd.scope import Scope, Triple

@@ -6,11 +6,11 @@ They are offered by name, and not listed: they cost nothing until somebody asks 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
+from mbd.dataclass import dataclass
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.kinematics import Moving
 from mbd.equations.outputs import AXES, Outputs

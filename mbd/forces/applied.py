@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -11,6 +10,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import by_mode_of
 from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import name_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import (

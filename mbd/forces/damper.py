@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number, name_of
+from mbd.dataclass import dataclass
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import Loss, loss_of, rates_of

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import names_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.scope import Scope
 

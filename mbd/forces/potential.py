@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import name_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.forces.quantities import Mention, arguments_of, mentioned, quantity_of, scalar, value_parameters

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.values import name_of, number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, joint_of
 from mbd.forces.quantities import Mention

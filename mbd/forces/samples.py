@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.bodies.values import among, flag, number, numbers, shown
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.scipy_curves import curves_of
 from mbd.forces.smoothing import smoothed

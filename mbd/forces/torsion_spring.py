@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
 from mbd.bodies.values import name_of
+from mbd.dataclass import dataclass
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint

@@ -10,7 +10,7 @@ both, wherever parameters enter a mirrored gait.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import MbdError, ModelError

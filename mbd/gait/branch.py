@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import is_finite_number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import MbdError, ModelError, UnknownNameError, nearest
 from mbd.gait.continuation import QUICK, BranchPoint, Continuation, Corrected, Forbidden
 from mbd.gait.cycle import LimitCycle

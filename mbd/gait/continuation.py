@@ -9,12 +9,13 @@ those of the chart around the last point.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import GaitError, SimulationError
 from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.family import Member, across, floquet

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from mbd.arrays import ComplexArray, Vector
 from mbd.bodies.values import named_number_faults
+from mbd.dataclass import dataclass
 from mbd.errors import GaitError, ModelError
 from mbd.gait.derivatives import Derivatives
 from mbd.gait.energies import cost_of_transport, energy_by_cause

@@ -10,7 +10,6 @@ of g to F(c) − c: as F keeps E, w is across F(c) − c, and both vanish togeth
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import is_finite_number, shown
 from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.gait.floquet import Multipliers, multipliers_of
 from mbd.gait.map_derivative import MapDerivative, Measured

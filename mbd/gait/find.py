@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.assembly.assemble import assemble
 from mbd.bodies.values import among, flag, is_finite_number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import AssemblyError, GaitError, MbdError, ModelError, UnknownNameError
 from mbd.gait.arguments import Functions, check_arguments
 from mbd.gait.cycle import LimitCycle

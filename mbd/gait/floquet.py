@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 
 __all__ = ["Multipliers", "multipliers_of"]
 

@@ -7,13 +7,14 @@ points before lead, and the test function of its kind, or the limit of its event
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import is_finite_number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import GaitError, MbdError, ModelError, UnknownNameError, nearest
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.derivatives import parameter_value

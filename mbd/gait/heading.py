@@ -15,13 +15,13 @@ what does not depend on the directions along the ground that they are written in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.gait.heading_parts import Part, parts_of
 from mbd.gait.reflection import in_space

@@ -9,7 +9,7 @@ follows: of a quaternion the product, of a hinge about the vertical the sum; all
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Frame
 from mbd.configuration import Configuration
+from mbd.dataclass import dataclass
 from mbd.joints import Cylindrical, Free, Prismatic, Revolute, Spherical, Translation, Universal
 from mbd.joints.base import Joint
 from mbd.joints.quaternions import quaternion_product

@@ -9,13 +9,13 @@ differences of coordinates.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import SimulationError
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart

@@ -8,13 +8,13 @@ branch goes on; the least value over the cycle is a smooth test function.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected

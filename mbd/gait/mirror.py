@@ -7,13 +7,14 @@ z, y and x under which the mechanism is its own mirror image (`mbd.gait.alike`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError
 from mbd.gait.machines import image_faults, images

@@ -5,11 +5,12 @@ Of a family of gaits, where one number more picks the member (`mbd.gait.family`)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.equal import RANK_RTOL
 from mbd.errors import SimulationError
 from mbd.gait.family import Member

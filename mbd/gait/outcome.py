@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.analysis.ending import FALLEN
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory

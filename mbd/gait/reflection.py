@@ -8,7 +8,6 @@ theirs, those along it turn the other way, quaternions (w, x, y, z) follow their
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import POSES
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.joints.reflected import ACROSS, mirrored_signs
 from mbd.topology.plan import plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.constraints.base import Constraint
 from mbd.constraints.rolling_touchdown import RollingSole
+from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL
 from mbd.errors import MbdError, ModelError
 from mbd.gait.alike import moves_sides_alike, sides_faults

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import SimulationError
 from mbd.gait.cycle import LimitCycle, residual_by_unit
 from mbd.gait.exact_derivative import exact_derivative

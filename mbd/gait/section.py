@@ -15,7 +15,7 @@ on the chart.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.pose import Posture
 from mbd.assembly.posture import position_rows
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equal import RANK_RTOL, REST_SPEED
 from mbd.errors import SimulationError
 from mbd.gait.heading import Heading

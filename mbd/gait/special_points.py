@@ -11,10 +11,11 @@ branch point : ``det [P − 1, σ F_p; τᵀ]``; another branch crosses, such as
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache, partial
 from importlib.resources import files
 from typing import Any
 
+from mbd.dataclass import dataclass
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["Curve", "Figure", "HardCase", "Outcome", "definition", "hard_case"]

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.hardcases.case import Curve, Figure
 from mbd.hardcases.schemes import has_own_forces, holds_positions_only, is_undamped
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 import mbd
+from mbd.dataclass import dataclass
 from mbd.hardcases.case import Curve, Figure, Outcome, definition, hard_case
 from mbd.hardcases.convergence import second_order
 from mbd.hardcases.impacts import deepest

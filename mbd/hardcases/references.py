@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mbd.dataclass import dataclass
 from mbd.hardcases.case import definition
 
 __all__ = ["Reference", "accuracy", "distance_to", "numbers", "published", "quantity", "size"]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.integrators.extension import HERMITE, Extension
 from mbd.integrators.stepping import SchemeMemory, start_of, step_of
 from mbd.integrators.system import (

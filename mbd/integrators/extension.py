@@ -6,8 +6,9 @@ them states are led onto the rows that act, and forces and multipliers come from
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from mbd.dataclass import dataclass
 from mbd.errors import UnknownNameError, nearest
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from mbd.bodies.values import is_number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.integrators.base import CompiledIntegrator, Integrator, System, completed
 from mbd.integrators.extension import OSCULATING, Extension

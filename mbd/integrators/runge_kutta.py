@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
+from mbd.dataclass import dataclass
 from mbd.integrators.base import CompiledIntegrator, Integrator, System, completed
 from mbd.integrators.extension import STEPS_OF_ORDER_8, Extension
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
+from mbd.dataclass import dataclass
 from mbd.integrators.extension import STEPS_OF_ORDER_4, Extension
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
 from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER

@@ -7,7 +7,7 @@ programs of a model, calls the scheme, and copies the outcome back.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from itertools import accumulate
 from typing import Any, ClassVar, Protocol
@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, nearest
 from mbd.integrators.system import Point, StepReport, StepResult, System, Terms
 from mbd.kernel import codes

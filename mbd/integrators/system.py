@@ -6,12 +6,13 @@ Integrators know nothing but numbers. Anything with an `evaluate` can stand in f
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.state import Mode, State
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import IDENTITY, ZERO, axis_rotation, rotate, transpose
 from mbd.bodies.base import Frame
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, align_rows, angle_about
 from mbd.scope import Rotation, Scope, Triple

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from mbd.bodies.algebra import cross, difference, rotate, scaled, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar

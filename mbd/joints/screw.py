@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import axis_rotation, dot, scaled
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
 from mbd.bodies.values import Vector3, number, unit_vector
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, across_rows, align_rows, sine_cosine

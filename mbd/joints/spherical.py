@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import IDENTITY, ZERO, dot
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints import quaternions
 from mbd.joints.base import Joint, JointLoss, Label

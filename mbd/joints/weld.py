@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from mbd.bodies.algebra import IDENTITY, ZERO
 from mbd.bodies.base import Frame
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint, Label
 from mbd.joints.parts import place_rows, turn_rows
 from mbd.scope import Rotation, Scope, Triple

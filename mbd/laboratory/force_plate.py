@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -16,6 +15,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.algebra import cross, difference
 from mbd.bodies.base import Frame
 from mbd.bodies.values import name_of, number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from mbd.bodies.base import Frame
 from mbd.compile.backend import Function
 from mbd.compile.many import at_blocks, blocks_of
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.equations.linearization import along_places
 from mbd.errors import ModelError, nearest

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from mbd.analysis.gait_report.measures import Measure
 from mbd.analysis.gait_report.report import Walk
 from mbd.analysis.gait_report.strides import Interval, Side, Stride, of_side, strides_between
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 
 __all__ = ["MeasuredGait", "gait_of_dynamics", "gait_of_recording"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from mbd.assembly.assemble import assemble
 from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import array_function
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.forces.samples import Samples

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import is_number, named_number_faults, number, shown
 from mbd.compile.mechanisms import mechanism_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.muscles import Muscle
 from mbd.laboratory.balance_result import InverseDynamics

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.many import at_blocks, blocks_of
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equal import RANK_RTOL
 from mbd.errors import ModelError
 from mbd.laboratory.marker_program import MarkerProgram

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import is_
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
 from mbd.joints.losses import PinFriction

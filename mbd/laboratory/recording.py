@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.smoothing import smoothed
 from mbd.laboratory.measured_gait import MeasuredGait, gait_of_recording

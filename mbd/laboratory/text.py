@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 from mbd.free_memory import available
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
+from mbd.dataclass import dataclass
 from mbd.errors import UnknownNameError, nearest
 from mbd.notebook import table
 from mbd.optimization.problem import Trial

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import GaitError, MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.derivatives import parameter_value

@@ -8,7 +8,7 @@ other. Their multipliers are those of least norm among all that give the same fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import DOUBTFUL, parts_of_row
 from mbd.compile.python import ArrayFunction, array_function
+from mbd.dataclass import dataclass
 from mbd.equal import REST_SPEED, ROUND_OFF_RTOL
 from mbd.equations import programs
 from mbd.equations.equations import Equations

@@ -7,7 +7,6 @@ gives the same bits.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.compile.python import array_function
+from mbd.dataclass import dataclass
 from mbd.equations.charts import chart_maps
 from mbd.results.polynomials import Places, hermite, hermite_rate, quintics
 from mbd.results.record import Rows

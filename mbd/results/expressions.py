@@ -8,11 +8,12 @@ executed but these operations.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.equations import programs
 from mbd.equations.shapes import PLACE
 from mbd.results.archive import Arrays, Members

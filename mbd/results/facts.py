@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.equations.held import WAYS
 from mbd.equations.net_moments import contact_places
 from mbd.equations.shapes import HEIGHT, Shape, drawn

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from mbd.dataclass import dataclass
 from mbd.notebook import table
 from mbd.results.facts import Facts
 from mbd.results.record import EventRecord

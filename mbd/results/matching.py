@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.results.record import EventRecord
 
 __all__ = ["Matches", "aligned", "apart", "matched"]

@@ -12,12 +12,12 @@ its two sides from each other still less, the side nearer to Q is taken, or Q it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import perm
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.results.polynomials import Index, Places
 from mbd.results.quadrature import AT_ONCE, stretches
 

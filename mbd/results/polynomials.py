@@ -6,13 +6,13 @@ On an interval of length h, with θ from 0 to 1,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 
 __all__ = ["AT_ONCE", "Index", "Places", "hermite", "hermite_rate", "parabola", "quintic", "quintics", "theta_and_step"]
 

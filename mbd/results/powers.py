@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from mbd.dataclass import dataclass
 from mbd.equations.cones import NO_SLIP
 from mbd.tape.derivatives import gradient, jvp, live, substitute
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.results.archive import Arrays, Members, named_file, read, write
 from mbd.results.columns import Alias, Columns, SavedColumns, StoredColumns
 from mbd.results.content import arrays_of_run, expect

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.results.columns import ModelColumns
 
 __all__ = ["Violation", "violation"]

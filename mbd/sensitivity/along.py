@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.outputs import with_sliding
 from mbd.sensitivity.passed import Passed

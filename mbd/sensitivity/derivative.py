@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, Source

@@ -7,10 +7,10 @@ name.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.equal import REST_SPEED
 from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError

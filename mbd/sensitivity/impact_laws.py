@@ -7,11 +7,11 @@ A run stores the velocities before and after; its impacts are made again between
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.kernel.contact.impact import APPROACH, MOST_BLOWS
 from mbd.sensitivity.motion import Mode, Motion

@@ -6,11 +6,12 @@ event determines are part of them, and what is differentiated are the numbers of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.sensitivity.programs import Columns, State
 
 __all__ = ["Mode", "Motion", "Rates", "Tangent", "solved"]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from mbd.dataclass import dataclass
 from mbd.sensitivity.guards import Trigger
 from mbd.sensitivity.motion import Mode, Motion, Rates
 

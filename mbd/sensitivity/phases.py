@@ -8,12 +8,13 @@ small (a contact that neither pushes nor parts), the impact has a derivative on 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import product
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.sensitivity.balance import independent, saddle
 from mbd.sensitivity.motion import Mode, Motion, solved
 from mbd.sensitivity.programs import Programs

@@ -20,7 +20,6 @@ that are not always zero. Where coordinates do not add, x is the increment from 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -31,6 +30,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.linearization import along_places, row_changes

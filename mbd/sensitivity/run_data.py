@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +13,7 @@ from mbd import integrators
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, OneSidedError
 from mbd.integrators.base import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager

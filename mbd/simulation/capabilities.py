@@ -7,9 +7,9 @@ pair of the table run.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.integrators import KINDS, Integrator
 

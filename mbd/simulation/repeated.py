@@ -7,13 +7,14 @@ which only the end is asked: here the kernel's arrays are laid out once, and a r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
 from mbd.kernel import codes

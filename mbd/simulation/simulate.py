@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -17,6 +17,7 @@ from mbd.assembly.trivial_rows import manager_of
 from mbd.assembly.turns import directed
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, MemoryLimitError, ModelError, SimulationError, UnknownNameError
 from mbd.integrators import HHT, Integrator
 from mbd.integrators.extension import extension_of

@@ -17,9 +17,9 @@ Nothing is exchanged at run time. Instead every pivot is compared with what it w
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from math import inf
 
+from mbd.dataclass import dataclass
 from mbd.tape.node import Node, Tape
 
 __all__ = ["LOSS", "Factors", "Pivot", "factors"]

@@ -14,7 +14,8 @@ that an order takes little more time than the elimination has entries.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+
+from mbd.dataclass import dataclass
 
 __all__ = ["Order", "order"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import mbd
 from mbd.bodies import Ground
 from mbd.bodies.base import Frame
 from mbd.configuration import Configuration
+from mbd.dataclass import dataclass
 from mbd.joints import Reversed
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp

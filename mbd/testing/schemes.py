@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 import mbd
 from mbd.arrays import Matrix
 from mbd.compile.mechanisms import mechanism_of
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, MbdError, ModelError
 from mbd.forces.base import Action, Force
 from mbd.integrators.base import Integrator

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.point_mass import PointMass
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.free import Free

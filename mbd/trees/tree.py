@@ -13,8 +13,9 @@ int do not grow, and x/0 is ±∞ or NaN.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 
 __all__ = [

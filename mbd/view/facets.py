@@ -6,13 +6,13 @@ Facets are so small that painting them from the farthest to the nearest hides wh
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.view.forms import mesh
 from mbd.view.scene import Scene
 from mbd.view.scenery import PATCH

@@ -8,13 +8,13 @@ A body is drawn as the uniform solid of equal mass and moments of inertia: the o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 
 __all__ = ["Form", "Mesh", "equal_inertia", "mesh"]
 

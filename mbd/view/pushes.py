@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 from mbd.equations.held import WAYS
 from mbd.equations.shapes import Shape, drawn
 from mbd.results.names import AXES

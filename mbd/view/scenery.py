@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.constraints.surfaces import Plane
+from mbd.dataclass import dataclass
 from mbd.equations.shapes import HEIGHT, PLACE, Shape, drawn
 from mbd.results.facts import ROUND
 from mbd.results.names import AXES

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 from mbd.equations.shapes import Shape, drawn
 from mbd.results.names import AXES
 from mbd.view.forms import Form, equal_inertia

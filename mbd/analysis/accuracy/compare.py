@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL, ROUND_OFF_RTOL
 from mbd.results.matching import Matches, aligned, apart, matched
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from time import perf_counter, thread_time
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from mbd.analysis.accuracy.published import Published
 from mbd.analysis.accuracy.settings import Setting
 from mbd.analysis.accuracy.truth import CLEAR, Truth
 from mbd.compile.mechanisms import mechanism_of
+from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.integrators import Integrator
 from mbd.simulation.interrupted import stopped

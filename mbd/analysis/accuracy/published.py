@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,6 +12,7 @@ import numpy as np
 from mbd.analysis.accuracy.compare import Difference
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
 from mbd.simulation.user_calls import call_user
 

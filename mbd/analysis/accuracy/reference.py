@@ -14,13 +14,14 @@ Events, impacts, friction and restarts are those of every other scheme: they com
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from scipy.integrate import DOP853, Radau
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State

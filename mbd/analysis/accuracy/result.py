@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ from mbd.analysis.accuracy.advice import advice
 from mbd.analysis.accuracy.points import Point
 from mbd.analysis.accuracy.published import Published
 from mbd.analysis.rows import Rows
+from mbd.dataclass import dataclass
 from mbd.later import later
 from mbd.notebook import paragraphs, table
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.integrators import Integrator
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from mbd.analysis.accuracy.reference import Method, RungeKuttaReference
 from mbd.arrays import Vector
 from mbd.assembly.trivial_rows import manager_of
 from mbd.compile.mechanisms import mechanism_of
+from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.integrators import Integrator, RadauIIA, RungeKutta853
 from mbd.simulation.interrupted import stopped

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mbd.analysis.effects.advice import advice
 from mbd.analysis.effects.contribution import Contribution, Together
 from mbd.analysis.rows import Rows
+from mbd.dataclass import dataclass
 from mbd.errors import UnknownNameError, nearest
 from mbd.later import later
 from mbd.notebook import folded, paragraphs, table

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from time import perf_counter, thread_time
 from typing import TYPE_CHECKING
+
+from mbd.dataclass import dataclass
 
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
 __all__ = ["Data"]

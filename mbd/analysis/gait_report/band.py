@@ -6,7 +6,6 @@ import csv
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import shown
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
 __all__ = ["Band", "NormativeBand", "read_band"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from mbd.analysis.gait_report.moments import Moments
 from mbd.analysis.gait_report.strides import Side, Stride, base_name, of_side
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.results.interpolation import Side as When
 

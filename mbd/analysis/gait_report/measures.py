@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from mbd.analysis.gait_report.curves import forces_at, grips_of
 from mbd.analysis.gait_report.extremes import largest
 from mbd.analysis.gait_report.strides import Side, Stride, of_side
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.results.interpolation import OneSide
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -15,6 +14,7 @@ from mbd.analysis.gait_report.measures import BOTH, Measure, Spent, energy_of, m
 from mbd.analysis.gait_report.strides import Side, sides_of
 from mbd.analysis.gait_report.symmetry import symmetry_of
 from mbd.bodies.values import names_of, number, printable
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.later import later
 from mbd.notebook import table

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 
 if TYPE_CHECKING:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.values import among, name_of, number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result
 from mbd.forces.muscles.curves import CURVES, Curves

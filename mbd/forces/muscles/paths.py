@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.algebra import Triple, difference, norm, rotate, total
 from mbd.bodies.base import Frame
 from mbd.bodies.values import number, shown, triple
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of, joint_of
 from mbd.forces.quantities import Mention, arguments_of, mentioned, triple_at, triple_of, value_parameters

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.values import shown
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.gait.return_map import ReturnMap
 from mbd.simulation.batch.starts import columns_of, places_of

@@ -11,12 +11,13 @@ map in a ball this small they leave little room.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, SimulationError
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.section import Chart

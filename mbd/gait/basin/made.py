@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, GaitError, ModelError
 from mbd.gait.basin.axes import Study, kinds_of_parameters
 from mbd.gait.basin.balls import Ball, ball_of

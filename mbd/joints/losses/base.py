@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from mbd.bodies.algebra import derivatives_at
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.promises import called, scalar, title_of
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar

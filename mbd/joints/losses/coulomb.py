@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.values import number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import DissipationFunction, Loss
 from mbd.scope import Scope

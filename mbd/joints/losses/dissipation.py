@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import DissipationFunction
 from mbd.scope import Scope

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.values import number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import DISSIPATES, Loss, StateRates
 from mbd.scope import Scope

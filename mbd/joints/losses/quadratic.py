@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from mbd.bodies.values import number
+from mbd.dataclass import dataclass
 from mbd.joints.losses.base import DissipationFunction
 from mbd.scope import Scope
 from mbd.tape.node import Scalar

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.values import numbers
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
 from mbd.scope import Scope

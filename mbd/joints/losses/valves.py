@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss, StateRates
 from mbd.scope import Scope

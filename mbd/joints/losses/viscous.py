@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.dataclass import dataclass
 from mbd.joints.losses.base import DissipationFunction
 from mbd.scope import Scope
 from mbd.tape.node import Scalar

@@ -5,11 +5,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.kernel.algebra.roots import sqrt
 
 __all__ = ["RADAU", "Collocation", "radau_iia"]

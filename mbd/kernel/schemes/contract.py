@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import lru_cache
 from importlib import import_module
 from types import FunctionType
@@ -22,6 +22,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.kernel.records import Kernel, Sizes
 from mbd.kernel.stepping.restart import take_consistent

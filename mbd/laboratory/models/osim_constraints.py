@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -12,6 +11,7 @@ from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.measures import extension, flexion
 from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
 from mbd.joints.spherical import Spherical
 from mbd.joints.weld import Weld

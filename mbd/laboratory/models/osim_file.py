@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Body, Frame
 from mbd.constraints.base import Constraint
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
 from mbd.laboratory.models.osim_elements import plain
 from mbd.laboratory.models.osim_functions import Linear

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.samples import Samples
 from mbd.laboratory.models.xml import Element

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from mbd.bodies.base import Body
+from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
 
 __all__ = ["ImportReport", "ImportedModel"]

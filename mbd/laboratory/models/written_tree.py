@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Body, Frame
 from mbd.constraints.measures import JointMeasure
 from mbd.constraints.unilateral import Unilateral
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.joints.prismatic import Prismatic

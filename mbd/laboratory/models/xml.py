@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from xml.parsers import expat
 
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
 __all__ = ["Element", "read_xml"]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from mbd.bodies.inertia import Solid, segment
 from mbd.bodies.values import among
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.parts.arguments import sizes
 

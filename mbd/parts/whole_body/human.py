@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 from mbd.bodies.base import Body
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, among, flag, name_of, number
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.potential import Potential
 from mbd.joints.base import Joint

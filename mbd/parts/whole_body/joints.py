@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import Any
 
 from mbd.bodies.base import Body, Frame
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.revolute import Revolute

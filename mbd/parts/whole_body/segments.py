@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from mbd.bodies.base import Body
 from mbd.bodies.inertia import Solid
 from mbd.bodies.link import Link
 from mbd.bodies.rigid_body import RigidBody
 from mbd.bodies.values import Vector3
+from mbd.dataclass import dataclass
 from mbd.parts.arguments import sizes
 from mbd.parts.whole_body.table import DE_LEVA, HEIGHTS, SHOULDERS, Row
 

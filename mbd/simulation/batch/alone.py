@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.given_state import LARGEST_ANGLE
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import array_function
+from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.kernel import codes
 from mbd.simulation.diagnostics.energy import TELLING, UNDRIVEN, kinds_of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.given_state import LARGEST_ANGLE, fits
 from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism, rate_names
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.run.many import start_line

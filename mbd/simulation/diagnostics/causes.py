@@ -6,7 +6,6 @@ Sentences name what `Words` tells of the failed step, such as ``{x.closed}``; it
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from mbd.assembly.inertia import lost_inertia
 from mbd.assembly.not_finite import first_cause, tape_inputs
 from mbd.assembly.posture import Posture
+from mbd.dataclass import dataclass
 from mbd.integrators.base import Point
 from mbd.kernel import codes
 from mbd.results.record import EventRecord

@@ -20,7 +20,6 @@ strange is the ledger of all rows made.
 from __future__ import annotations
 
 from collections.abc import Container
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -29,6 +28,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.results.columns import ModelColumns
 from mbd.results.energy import doubted_ledger, kinds_of_work
 from mbd.simulation.run.stored import record_of, whole_record

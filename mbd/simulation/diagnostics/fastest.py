@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.constraints.penalty_parameters import STEPS_OF_APPROACH
+from mbd.dataclass import dataclass
 from mbd.integrators.base import Point
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
+from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
 from mbd.kernel.translation.interpreted import InterpretedScheme

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.simulation.run.stepper import Stepper
 
 __all__ = ["Remainder", "remainder"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equations.switching_times import jumps_between
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator

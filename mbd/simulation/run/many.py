@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.kernel import codes
 from mbd.kernel.stepping.many_runs import END_NUMBERS

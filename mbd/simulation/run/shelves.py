@@ -7,7 +7,6 @@ cache line. Lengths follow from the sizes of a mechanism and of a run, so that r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
 from operator import itemgetter
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbd.dataclass import dataclass
 from mbd.kernel.records import TABLE, Kernel
 from mbd.kernel.schemes.contract import MEMORY
 from mbd.simulation.run.call_table import ARRAYS

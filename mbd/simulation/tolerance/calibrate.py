@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.errors import MemoryLimitError
 from mbd.results.columns import asks_for_forces
 from mbd.simulation.tolerance.driven import drives_of, forces_told, is_wholly_driven

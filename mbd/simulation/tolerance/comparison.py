@@ -7,13 +7,14 @@ and by steps taken again where these are in doubt.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL
 from mbd.results.dense import Restepping
 from mbd.results.matching import Matches, apart, matched

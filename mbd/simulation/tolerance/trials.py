@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbd.dataclass import dataclass
 from mbd.simulation.tolerance.comparison import Gap
 from mbd.trajectory import Trajectory
 

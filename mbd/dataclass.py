@@ -1,0 +1,115 @@
+"""Dataclasses whose methods are made when they are first needed.
+
+`dataclasses.dataclass` writes and compiles the text of some six methods for each class, 0.4 ms of every process for
+each of the 230 classes that a first step of a walker imports; a process uses the methods of a third of them. Here a
+class is given placeholders, and the first look at one of them makes the class the dataclass that it would have been.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from threading import RLock
+from typing import TYPE_CHECKING, Any
+
+__all__ = ["dataclass"]
+
+
+class _Factory:
+    """Default of an argument whose field has a factory, as signatures show it."""
+
+    def __repr__(self) -> str:
+        return "<factory>"
+
+
+_FACTORY: Any = _Factory()
+_ONE_AT_A_TIME = RLock()
+
+
+class _Placeholder:
+    """A method, or table of fields, of a class that is no dataclass yet."""
+
+    def __init__(self, owner: type, name: str, options: dict[str, bool], fields: dict[str, Any]) -> None:
+        self.owner, self.name, self.options, self.fields = owner, name, options, fields
+
+    def __get__(self, instance: Any, kind: type | None = None) -> Any:
+        with _ONE_AT_A_TIME:
+            if self.owner.__dict__.get(self.name) is self:
+                self._complete()
+        found = self.owner.__dict__[self.name]
+        return found.__get__(instance, kind) if hasattr(found, "__get__") else found
+
+    def _complete(self) -> None:
+        """Make the class a dataclass; its `__init__` is put in its place at once, as other threads may wait for it."""
+        owner: Any = self.owner
+        for name, value in list(owner.__dict__.items()):
+            if isinstance(value, _Placeholder) and name != "__init__":
+                delattr(owner, name)
+        for name, value in self.fields.items():
+            setattr(owner, name, value)
+        dataclasses.dataclass(**{**self.options, "init": False})(owner)
+        owner.__init__ = _initializer(owner, self.options.get("frozen", False))
+
+
+def _lazy(owner: type | None = None, /, **options: bool) -> Any:
+    """See `dataclasses.dataclass`; classes with an `__init__` of their own, or no words, are dataclasses at once."""
+    if owner is None:
+        return lambda decorated: _lazy(decorated, **options)
+    known = options.get("init", True) and set(options) <= {"frozen", "eq", "repr"}
+    if not known or "__init__" in owner.__dict__ or owner.__doc__ is None:
+        return dataclasses.dataclass(**options)(owner)
+    names = ["__init__", "__match_args__", "__dataclass_fields__", "__dataclass_params__"]
+    names += ["__repr__"] * options.get("repr", True) + ["__eq__", "__hash__"] * options.get("eq", True)
+    names += ["__setattr__", "__delattr__"] * options.get("frozen", False)
+    fields = {name: value for name, value in owner.__dict__.items() if isinstance(value, dataclasses.Field)}
+    for name, value in fields.items():  # what the class has until then, as it has it afterwards
+        if value.default is dataclasses.MISSING:
+            delattr(owner, name)
+        else:
+            setattr(owner, name, value.default)
+    for name in names:
+        if name not in owner.__dict__:
+            setattr(owner, name, _Placeholder(owner, name, options, fields))
+    return owner
+
+
+def _initializer(owner: Any, frozen: bool) -> Any:
+    """The `__init__` that `dataclasses.dataclass` would write."""
+    scope: dict[str, Any] = {"_set": object.__setattr__, "_FACTORY": _FACTORY}
+    by_place: list[str] = []
+    by_name: list[str] = []
+    lines: list[str] = []
+    found: dict[str, Any] = {}
+    for field in dataclasses.fields(owner):
+        name, argument, value = field.name, field.name, field.name
+        if field.default_factory is not dataclasses.MISSING:
+            scope[f"_made_{name}"] = field.default_factory
+            argument += "=_FACTORY"
+            value = f"_made_{name}() if {name} is _FACTORY else {name}" if field.init else f"_made_{name}()"
+        elif field.default is not dataclasses.MISSING:
+            scope[f"_value_{name}"] = field.default
+            argument += f"=_value_{name}"
+            if not field.init:
+                continue  # the class has it
+        elif not field.init:
+            continue
+        if field.init:
+            (by_name if field.kw_only else by_place).append(argument)
+        lines.append(f"_set(self, {name!r}, {value})" if frozen else f"self.{name} = {value}")
+    if hasattr(owner, "__post_init__"):
+        lines.append("self.__post_init__()")
+    arguments = ", ".join(["self", *by_place, *(["*", *by_name] if by_name else [])])
+    body = "\n  ".join(lines) or "pass"
+    text = f"def made({', '.join(scope)}):\n def __init__({arguments}):\n  {body}\n return __init__"
+    exec(text, vars(sys.modules[owner.__module__]), found)
+    made = found["made"](**scope)
+    made.__qualname__ = f"{owner.__qualname__}.__init__"
+    types = {field.name: field.type for field in dataclasses.fields(owner) if field.init}
+    made.__annotations__ = {**types, "return": None}
+    return made
+
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass
+else:
+    dataclass = _lazy
