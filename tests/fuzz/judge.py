@@ -87,7 +87,9 @@ def _motion(found: Faults, run: mbd.Trajectory, told: Readings, smooth: bool) ->
     scheme, tied = run.settings["integrator"], bool(run.record.lam.shape[1])
     jumps = sum("beyond half a turn" in str(note) for note in run.stats["notes"])  # of a torque within a step
     uncertain, share = int(run.stats["singular_steps"]) + jumps, steps.error_share(scheme)
-    steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share, tol)
+    warned = any("estimated errors of velocities add up" in str(note) for note in run.stats["notes"])
+    err = float(run.stats["local_errors"]) if warned else 0.0
+    steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share, tol, err)
 
 
 def _unresolved(run: mbd.Trajectory, times: Array) -> Array:
@@ -156,7 +158,9 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     told = readings(run, model, given, times)
     found = Faults(told.time)
     tol = run.settings["tol"] if run.settings.get("tol") else 0.0
-    precise = run.settings["integrator"].startswith(("Runge", "Radau"))
+    # with dry friction no step is taken again: curves pass through rows, as good as the order of the scheme
+    again = run.settings["between"].startswith("stages") and not run.record.equations.frictions
+    precise = again or run.settings["integrator"].startswith(("RungeKutta853", "Radau"))
     with np.errstate(all="ignore"):
         try:
             bodies = Bodies(model, told)
@@ -165,7 +169,6 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             uncertain = 4 * int(run.stats["singular_steps"])  # a row ends two steps, each looked at twice
             laws.closure(found, bodies, rates="index3" not in run.settings["integrator"], told=uncertain)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
-            again = run.settings["between"].startswith("stages")  # steps are taken again, and end in balance
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
             laws.balance(found, bodies, loads(bodies), share, stiff + _turned(run, model, times))
             laws.constraints(found, bodies)

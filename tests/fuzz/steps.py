@@ -39,6 +39,7 @@ def motion(
     tied: bool = True,
     share: float = 0.0,
     tol: float = 0.0,
+    err: float = 0.0,
 ) -> None:
     """Each coordinate is the integral of its rate, and that of its acceleration, from one row to the next.
 
@@ -53,6 +54,7 @@ def motion(
     tied : whether there are rows, onto which corrections move all velocities by what one of them errs
     share : error of a position in a step over h² times the change of its acceleration [-]
     tol : what positions may err by in the whole run [m, rad]: long steps pass more than these laws see
+    err : what a note of the run says that velocities err [m/s, rad/s]
     """
     h = np.diff(told.time)
     steps = np.flatnonzero(h > 0.0)
@@ -73,7 +75,7 @@ def motion(
         off = np.diff(q)[steps] - h * (v[steps] + v[steps + 1]) / 2.0
         if smooth:
             off = off + h**2 * np.diff(a)[steps] / 12.0
-        limit = 6.0 * h**2 * (change + jumps) + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast) + tol
+        limit = 6.0 * h**2 * (change + jumps) + 1e-8 * (1.0 + np.abs(q[steps]) + h * fast) + tol + h * err
         if not smooth:  # bodies are lifted out of surfaces
             limit = limit + h * (10.0 * _range(v)[steps] + fastest)
         elif not rates:
@@ -81,7 +83,7 @@ def motion(
         there.small("a coordinate is the integral of its rate", name, off, limit)
         if smooth and rates:
             off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-            limit = 2.0 * h * (change + tied * jumps) + 1e-7 * (1.0 + fast) + tol / h
+            limit = 2.0 * h * (change + tied * jumps) + 1e-7 * (1.0 + fast) + tol / h + err
             there.small("a rate is the integral of the acceleration", name, off, limit, told=2 * uncertain)
 
     for name in spins if smooth and rates else []:
@@ -89,7 +91,7 @@ def motion(
         change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
         fast = np.maximum(np.abs(v[steps]), np.abs(v[steps + 1]))
         off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
-        limit = 2.0 * h * (change + tied * jumps) + 1e-7 * (1.0 + fast) + tol / h
+        limit = 2.0 * h * (change + tied * jumps) + 1e-7 * (1.0 + fast) + tol / h + err
         there.small("an angular velocity is the integral of its rate", name, off, limit, told=2 * uncertain)
     for owner in [name.removesuffix(".orientation.w") for name in told.values if name.endswith(".orientation.w")]:
         turning = told.attitude(owner)

@@ -49,7 +49,7 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         parting=np.zeros(contacts, dtype=int), free=np.ones(contacts, dtype=int), normal=normal,
         friction_row=friction_row, friction_contact=np.arange(max(contacts, 1)), row_contact=row_contact,
         row_normal=is_normal, row_friction=row_friction, rows=np.zeros(rows, dtype=int),
-        dropped=np.zeros(rows, dtype=int), state=np.zeros(26, dtype=int), counts=np.zeros(24, dtype=int),
+        dropped=np.zeros(rows, dtype=int), state=np.zeros(32, dtype=int), counts=np.zeros(24, dtype=int),
         partner=np.full(max(frictions, 1), -1),
         detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip

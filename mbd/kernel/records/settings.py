@@ -95,7 +95,7 @@ class Settings(Sizes):
     loaded: int  # a friction follows multipliers other than linearly: 1 as that of a pin, 2 not at all where one pulls
     adaptive: int  # 1: steps follow the estimated error, 0: they are all dt
     error_order: int  # power of the step with which the estimated error per second falls
-    driven: int  # 1: as `adaptive`, and drives prescribe motion, whose multipliers are part of the error
+    driven: int  # 1: drives prescribe motion, and multipliers are part of the error or decide about contacts
     n_substeps: int  # substeps of a step at whose ends guards are evaluated; 1: at those of the step only
     alpha_m: float
     alpha_f: float

@@ -96,6 +96,7 @@ class State(SchemeAbilities):
     )  # length of the mechanism, as far as it is known: see `mbd.kernel.stepping.scales` [m]
     turned: float = place("clock")  # way of joints whose coordinates do not add since the last row [rad]
     part_turn: float = place("clock")  # largest way of these in a step, where more has failed, 0: a quarter turn [rad]
+    estimates_twice: int = place("state")  # 1: no step was taken since a start or an error that was too large
     halvings: int = place("state")  # how often the step is halved
     halves_left: int = place("state")  # of it
     paired_step: int = place("state")  # see `mbd.kernel.singular.step_pairs`

@@ -101,6 +101,7 @@ def forget_stages(K: Steps) -> None:
 def radau_accept(K: SingularSteps, h: float) -> None:
     """The candidate becomes the accepted state, its stages those to predict the next from."""
     accept_step(K, h)
+    K.estimates_twice = 0
     o = stage_place(K, STAGE_RATES)
     K.past_stages[: 3 * (K.n + K.n_rows + K.n_v)] = K.stages[o : o + 3 * (K.n + K.n_rows + K.n_v)]
     if K.n_active > 0:

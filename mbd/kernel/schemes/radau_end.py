@@ -8,6 +8,8 @@ from mbd.kernel.codes import NOT_CONVERGED, SINGULAR
 from mbd.kernel.records import Balance, Kernel, Steps
 from mbd.kernel.schemes.stage_layout import (
     A_,
+    C_,
+    CHANGES,
     E_,
     MASS_PART,
     MU_REAL,
@@ -17,7 +19,7 @@ from mbd.kernel.schemes.stage_layout import (
     STIFF_PART,
     stage_place,
 )
-from mbd.kernel.schemes.stage_matrices import factor_stages
+from mbd.kernel.schemes.stage_matrices import factor_stages, matrices
 from mbd.kernel.schemes.stages import (
     load_stage,
 )
@@ -26,6 +28,7 @@ from mbd.kernel.stepping.restart import (
     compose,
     consistent,
     evaluate,
+    fill_block,
     find_sliding_friction,
     holds_rows,
     load_accelerations,
@@ -34,6 +37,9 @@ from mbd.kernel.tangent_rules import follow_rates
 
 __all__ = ["complete"]
 
+BETWEEN = 0.4
+"""Part of a step, amid the widest gap between stages, at which a second estimate looks at the balance [-]."""
+
 
 def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) -> int:
     """The converged last stage becomes the candidate, with consistent rates and multipliers where rows are active.
@@ -41,7 +47,11 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
     So they are where the iteration was `slow`: its residual is small beside the largest forces that it met, which may
     be far above those at the end.
     """
-    if renew and not factor_stages(K, K.n + m):
+    twice = K.estimates_twice == 1 and K.adaptive == 1 and K.near_singular == 0 and misses_balance(K, h)
+    if twice:
+        load_stage(K, 1, h, t1)
+        matrices(K, m, h)
+    if (renew or twice) and not factor_stages(K, K.n + m):
         return SINGULAR
     load_stage(K, 2, h, t1)
     o_W = stage_place(K, STAGE_RATES) + 2 * K.n
@@ -51,6 +61,8 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
         K.rate1[i] = K.stages[o_W + i]
     K.lam1[: K.n_rows] = K.stages[o_L : o_L + K.n_rows]
     estimate_error(K, h, m)
+    if twice:
+        raise_error(K, h, m)
     for i in range(K.n_v):
         if K.unit[i] == 1 and not abs(K.error[i]) <= 0.5:
             K.failure_size = -1.0
@@ -144,6 +156,68 @@ def estimate_error(K: Steps, h: float, m: int) -> None:
         K.error[K.n_v + i] = K.rhs[i]
         if i < K.n_v:
             K.error[i] += c * K.rhs[i]
+
+
+def misses_balance(K: Balance, h: float) -> bool:
+    """What the parabola through the rates of the stages misses at `BETWEEN`, f − W, into K.stages; whether it is known.
+
+    Positions and velocities there are integrals of that parabola and of the one through the velocities of the stages.
+    The factors of the step are lost.
+    """
+    S = K.stages
+    n = K.n
+    o_W = stage_place(K, STAGE_RATES)
+    o_D = stage_place(K, CHANGES)
+    t = K.time + BETWEEN * h
+    fill_block(K, t, K.q, K.y)
+    for j in range(n):
+        K.y1[j] = K.y[j]
+        K.block[K.o_x + j] = 0.0 if j < K.n_v else K.block[K.o_x + j]
+        S[o_D + j] = 0.0
+    for i in range(3):
+        a = S[C_ + (i + 1) % 3]
+        b = S[C_ + (i + 2) % 3]
+        over = 1.0 / ((S[C_ + i] - a) * (S[C_ + i] - b))
+        value = (BETWEEN - a) * (BETWEEN - b) * over
+        integral = BETWEEN * (BETWEEN * (BETWEEN / 3.0 - 0.5 * (a + b)) + a * b) * over
+        for j in range(n):
+            K.y1[j] += h * integral * S[o_W + i * n + j]
+            S[o_D + j] -= value * S[o_W + i * n + j]
+            if j < K.n_v:
+                K.block[K.o_x + j] += h * integral * stage_speed(K, i, j, h)
+    compose(K, K.q1)
+    if consistent(K, t, K.q1, K.y1) != 0:
+        return False
+    for j in range(n):
+        S[o_D + j] += K.jump[j]
+    return True
+
+
+def raise_error(K: Steps, h: float, m: int) -> None:
+    """K.error is at least as large as by what `misses_balance` found: for smooth motions both are equally large.
+
+    The estimate of the module, f(y₀) less the same parabola at 0, is one number for each coordinate: it vanishes by
+    chance where forces that die away within the step pass through that parabola.
+    """
+    n = K.n
+    S = K.stages
+    c = S[MU_REAL] * h
+    o_D = stage_place(K, CHANGES)
+    o_M = stage_place(K, MASS_PART)
+    part = 1.0  # of the same third difference, seen at 0 and seen between
+    for i in range(3):
+        part *= S[C_ + i] / (S[C_ + i] - BETWEEN)
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += S[o_M + i * n + j] * c * part * S[o_D + j]
+        K.rhs[i] = total
+    K.rhs[n : n + m] = 0.0
+    solve_kkt(K, n + m, K.rhs)
+    for i in range(n):
+        K.error[K.n_v + i] = max(abs(K.error[K.n_v + i]), abs(K.rhs[i]))
+        if i < K.n_v:
+            K.error[i] = max(abs(K.error[i]), c * abs(K.rhs[i]))
 
 
 def stage_speed(K: Steps, k: int, j: int, h: float) -> float:

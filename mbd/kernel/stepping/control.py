@@ -135,6 +135,7 @@ def controlled_step(K: Kernel, h: float) -> int:
                 K.next_step = min(following, K.longest)
                 return 0
             h *= factor
+            K.estimates_twice = 1
             lower_scales(K)
         elif is_to_shorten(status):
             h *= 0.5  # a long step may also have left the region where forces are defined
@@ -181,3 +182,4 @@ def first_step(K: Balance) -> None:
     if change > 0.0 and change < 1e300:
         h = (0.01 * size / change) ** (1.0 / (K.error_order + 1.0))
     K.step = min(max(h, 4.0 * smallest_step(K)), K.longest)
+    K.estimates_twice = 1

@@ -21,6 +21,7 @@ from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.simulation.run.call_table import CallTable
 from mbd.simulation.run.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
 from mbd.simulation.run.shelves import Shelves, plan_of
+from mbd.simulation.tolerance.driven import driving_rows
 from mbd.tape.derivatives import live
 
 __all__ = ["Stepper", "is_compiled"]
@@ -105,6 +106,8 @@ class Stepper:
         self.stabilized = integrator.stabilized
         layout = mechanism.layout
         self.kernel = self._sizes(dt, options)
+        if self.stabilized and self.kernel.n_judged > 0 and driving_rows(mechanism.equations):
+            self.kernel.driven = 1
         self._arrays(parameters, manager)
         self.kernel.chunk, self.kernel.end = 1, float(options.get("end", 0.0))
         self.system = MechanismSystem(
