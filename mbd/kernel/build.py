@@ -37,7 +37,7 @@ APART = (
     "algebra.linear.factor", "algebra.linear.solve", "algebra.linear.solve_definite",
     "algebra.ordered.factor_ordered", "algebra.ordered.solve_ordered",
     "algebra.ordered_complex.factor_pair_ordered", "algebra.ordered_complex.solve_pair_ordered",
-    "singular.gram_norms.pivoted_gram_norms_of_many", "events.guard_substeps.parts_to_take", "events.locate.locate",
+    "singular.gram_norms.gram_norms", "events.guard_substeps.parts_to_take", "events.locate.locate",
     "events.handling.handle_event", "events.handling.land", "stepping.resolution.look_closer",
     "singular.events.find_passed_events", "singular.events.log_passed_events", "singular.events.refuses",
     "hooks.scheme_accept", "stepping.trial_step.brief_step", "stepping.trial_step.share_multipliers",

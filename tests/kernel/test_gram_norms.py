@@ -1,4 +1,4 @@
-"""What is left of rows beside others: from their Gram matrix as by Gram–Schmidt."""
+"""What is left of rows beside others: from their Gram matrix what Gram–Schmidt leaves."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
-from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
-from mbd.kernel.singular.newmark_step import pivoted_gram_norms
+from mbd.kernel.singular.gram_norms import pivoted_gram_norms
 
 
 def kernel(rng, n, m, density):
@@ -25,25 +24,41 @@ def kernel(rng, n, m, density):
     )  # fmt: skip
 
 
+def gram_schmidt(rows, order):
+    """Lengths of rows less their parts along earlier ones, the longest remaining next or in a given order."""
+    rows, left = rows.copy(), []
+    for done in range(len(rows)):
+        lengths = np.linalg.norm(rows, axis=1)
+        lengths[[taken for _, taken in left]] = -1.0
+        k = int(np.argmax(lengths)) if order is None else order[done]
+        left.append((lengths[k], k))
+        unit = rows[k] / lengths[k]
+        rows = rows - np.outer(rows @ unit, unit)
+        rows -= np.outer(rows @ unit, unit)
+    return np.array([length for length, _ in left]), [k for _, k in left]
+
+
 @given(n=st.integers(2, 16), m=st.integers(1, 10), seed=st.integers(0, 2**32 - 1), density=st.floats(0.05, 1.0))
-def test_both_ways_leave_the_same_of_every_row_in_the_same_order(n, m, seed, density):
-    m, found = min(m, n), []
-    for way in (pivoted_gram_norms, pivoted_gram_norms_of_many):
-        K = kernel(np.random.default_rng(seed), n, m, density)
-        for place, ahead in enumerate((0.0, -0.01, 0.01)):
-            way(K, m, 0.01, 0.005, ahead, place * m, 0, 1, n, n)
-        found.append((K.spare[: 4 * m].copy(), K.columns.copy()))
-    (one, order), (other, same) = found
-    np.testing.assert_array_equal(order, same)
-    np.testing.assert_allclose(one, other, rtol=0, atol=3e-8)
-    assert np.all(np.diff(other[:m]) <= 1e-12)  # the longest first
+def test_what_is_left_of_rows_is_that_of_gram_schmidt(n, m, seed, density):
+    m, order = min(m, n), None
+    K = kernel(np.random.default_rng(seed), n, m, density)
+    weights = 1.0 / np.sqrt(K.out[:n])
+    H, turning = (each.reshape(m, n) * weights for each in (K.out[n:], K.turning))
+    for place, ahead in enumerate((0.0, -0.01, 0.01)):
+        pivoted_gram_norms(K, m, 0.01, 0.005, ahead, place * m, 0, 1, n, n)
+        lengths = np.linalg.norm(H - 0.005 * turning, axis=1) + 0.01 * np.linalg.norm(turning, axis=1)
+        left, order = gram_schmidt((H - 0.005 * turning + ahead * turning) / lengths[:, None], order)
+        np.testing.assert_array_equal(K.columns, order)
+        np.testing.assert_allclose(K.spare[place * m : place * m + m], left, rtol=0, atol=3e-8)
+        np.testing.assert_allclose(K.spare[3 * m : 4 * m], lengths[order], rtol=1e-12)
+    assert np.all(np.diff(K.spare[:m]) <= 1e-12)  # the longest first
 
 
 def test_nothing_is_left_of_a_row_that_depends_on_others():
     K = kernel(np.random.default_rng(3), 8, 4, 0.5)
     rows, turning = K.out[8:].reshape(4, 8), K.turning.reshape(4, 8)
     rows[3], turning[3] = rows[0] - 2.0 * rows[1], 0.0
-    pivoted_gram_norms_of_many(K, 4, 0.0, 0.0, 0.0, 0, 0, 1, 8, 8)
+    pivoted_gram_norms(K, 4, 0.0, 0.0, 0.0, 0, 0, 1, 8, 8)
     assert K.spare[3] < 1e-7 < K.spare[2]
 
 
@@ -56,8 +71,7 @@ def test_round_off_of_an_inertia_decides_nothing():
         least = least_inertia(K, K.out, 0, 1, 0), least_inertia(K, K.out, 0, 1, 1)
         weighed = [1.0 / np.sqrt(counted_inertia(K, j, abs(K.out[j]), *least)) for j in range(8)]
         assert max(weighed) < 2e4
-        for way in (pivoted_gram_norms, pivoted_gram_norms_of_many):
-            way(K, 5, 0.01, 0.005, 0.0, 0, 0, 1, 8, 8)
-            found.append(K.spare[:5].copy())
+        pivoted_gram_norms(K, 5, 0.01, 0.005, 0.0, 0, 0, 1, 8, 8)
+        found.append(K.spare[:5].copy())
     for each in found[1:]:
         np.testing.assert_allclose(each, found[0], rtol=0, atol=3e-8)

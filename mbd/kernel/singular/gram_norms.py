@@ -1,23 +1,24 @@
-"""How much of each row of a large mechanism is left beside the others, where most rows have nothing in common.
+"""How much of each row is left beside the earlier ones.
 
-The squares that remain are the pivots of G = Q Qᵀ, Q the scaled rows, eliminated with the largest next (Cholesky with
-diagonal pivoting): what Gram–Schmidt finds, to within √ε of a row's length. While orthogonal rows fill up with what
-they were cleared of, G keeps its zeros: a row that is done makes neighbours of its own neighbours only.
+The squares that remain are the pivots of G = Q Qᵀ, Q the rows scaled to length 1 (Cholesky, with diagonal pivoting
+where the longest remaining row comes next): what Gram–Schmidt finds, to within √ε of a row's length. While orthogonal
+rows fill up with what they were cleared of, G keeps its zeros: a row that is done makes neighbours of its own
+neighbours only, so that a large mechanism, most rows of which have nothing in common, costs little.
 """
 
 from __future__ import annotations
 
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.roots import sqrt
-from mbd.kernel.records import DependentRows, Singular, SingularSteps
+from mbd.kernel.records import DependentRows, SingularSteps
 
-__all__ = ["common_part", "pivoted_gram_norms_of_many"]
+__all__ = ["gram_norms", "pivoted_gram_norms"]
 
 NOTHING_LEFT = 1e-15
 """Square of a scaled row below which it is round-off of its terms [-]."""
 
 
-def pivoted_gram_norms_of_many(
+def pivoted_gram_norms(
     K: SingularSteps,
     m: int,
     h: float,
@@ -29,18 +30,32 @@ def pivoted_gram_norms_of_many(
     o_H: int,
     width: int,
 ) -> None:
-    """What `pivoted_gram_norms` finds, in the same places of K.spare and K.columns."""
+    """Lengths of the rows of B, `ahead` of now, less their parts along earlier ones, into K.spare from `place` on.
+
+    The longest remaining row comes next; at place 0 that order is found, elsewhere it is kept.
+    """
     if place == 0:
         find_support(K, m, o_S, stride, o_H, width)
-    G = 5 * m
     for row in range(m):
         K.spare[4 * m + row] = scaled_row(K, m, row, h, ratio, ahead, o_H, width)
+    gram_norms(K, m, K.n_v, place, 5 * m, place == 0)
+    for done in range(m):
+        K.spare[3 * m + done] = K.spare[4 * m + K.columns[done]]
+
+
+def gram_norms(K: DependentRows, m: int, n: int, place: int, G: int, searches: bool) -> None:
+    """What is left of each row of the basis beside those earlier in K.columns, into K.spare from `place` on.
+
+    The m rows have n numbers and length 1; K.support tells which are not zero. G is made at K.spare[G:]. Where it
+    `searches`, the order in K.columns becomes that of the longest remaining row next.
+    """
+    for row in range(m):
         for other in range(row + 1):
-            part = common_part(K, K.n_v, row, other)
+            part = common_part(K, n, row, other)
             K.spare[G + row * m + other] = part
             K.spare[G + other * m + row] = part
     for done in range(m):
-        if place == 0:
+        if searches:
             longest = done
             for k in range(done + 1, m):
                 if K.spare[G + K.columns[k] * (m + 1)] > K.spare[G + K.columns[longest] * (m + 1)]:
@@ -48,10 +63,8 @@ def pivoted_gram_norms_of_many(
             row = K.columns[longest]
             K.columns[longest] = K.columns[done]
             K.columns[done] = row
-        row = K.columns[done]
-        K.spare[place + done] = sqrt(max(K.spare[G + row * (m + 1)], 0.0))
-        K.spare[3 * m + done] = K.spare[4 * m + row]
-        take_out(K, m, done, G)
+        K.spare[place + done] = sqrt(max(K.spare[G + K.columns[done] * (m + 1)], 0.0))
+        take_out(K, m, n, done, G)
 
 
 def find_support(K: SingularSteps, m: int, o_S: int, stride: int, o_H: int, width: int) -> None:
@@ -93,7 +106,7 @@ def scaled_row(K: SingularSteps, m: int, row: int, h: float, ratio: float, ahead
     return float(length)
 
 
-def common_part(K: Singular, n: int, row: int, other: int) -> float:
+def common_part(K: DependentRows, n: int, row: int, other: int) -> float:
     """The product of two rows of the basis, which are n long, over the entries of the first in K.support."""
     part = 0.0
     for e in range(K.support[row * (n + 1)]):
@@ -102,13 +115,13 @@ def common_part(K: Singular, n: int, row: int, other: int) -> float:
     return float(part)
 
 
-def take_out(K: DependentRows, m: int, done: int, G: int) -> None:
+def take_out(K: DependentRows, m: int, n: int, done: int, G: int) -> None:
     """Clear the rows still to come of their parts along the one that is done."""
     row = K.columns[done]
     pivot = K.spare[G + row * (m + 1)]
     if not pivot > NOTHING_LEFT:
         return
-    near = m * (K.n_v + 1)
+    near = m * (n + 1)
     count = 0
     for k in range(done + 1, m):
         if K.spare[G + row * m + K.columns[k]] != 0.0:

@@ -6,10 +6,8 @@ onto the rows and the scheme starts again, but for the average that it carries. 
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
-from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
@@ -24,7 +22,7 @@ from mbd.kernel.schemes.iteration import (
     runs_away,
     soundness_at,
 )
-from mbd.kernel.singular.gram_norms import pivoted_gram_norms_of_many
+from mbd.kernel.singular.gram_norms import pivoted_gram_norms
 from mbd.kernel.singular.step_pairs import is_of_pair, is_whole
 from mbd.kernel.stepping.restart import (
     add_shares,
@@ -92,9 +90,9 @@ def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, strai
         width = K.n_v
         K.turning[: m * K.n_v] = K.out[K.n + 2 * m : K.n + 2 * m + m * K.n_v]
     stride = 1 if straight else size + 1
-    find_gram_norms(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
-    find_gram_norms(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
-    find_gram_norms(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
+    pivoted_gram_norms(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
+    pivoted_gram_norms(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
+    pivoted_gram_norms(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
     speed = 0.0
     for j in range(K.n_v):
         speed += abs(K.out[o_S + stride * j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
@@ -111,30 +109,11 @@ def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, strai
     if (
         NEAREST < fewest < WITHIN + 2.0
     ):  # a row that turns, beside others that turn with it, changes but does not vanish
-        find_gram_norms(K, m, h, ratio, -fewest * h, m, o_S, stride, o_H, width)
-        find_gram_norms(K, m, h, ratio, fewest * h, 2 * m, o_S, stride, o_H, width)
+        pivoted_gram_norms(K, m, h, ratio, -fewest * h, m, o_S, stride, o_H, width)
+        pivoted_gram_norms(K, m, h, ratio, fewest * h, 2 * m, o_S, stride, o_H, width)
         if min(K.spare[m + nearest], K.spare[2 * m + nearest]) > VANISHING * K.spare[nearest]:
             return 1e300
     return fewest
-
-
-def find_gram_norms(
-    K: SingularSteps,
-    m: int,
-    h: float,
-    ratio: float,
-    ahead: float,
-    place: int,
-    o_S: int,
-    stride: int,
-    o_H: int,
-    width: int,
-) -> None:
-    """`pivoted_gram_norms`, by products of rows where most of them have nothing in common."""
-    if order_at(K, m) > 0:
-        pivoted_gram_norms_of_many(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
-    else:
-        pivoted_gram_norms(K, m, h, ratio, ahead, place, o_S, stride, o_H, width)
 
 
 def misses(K: DependentRows, away: float, h: float) -> bool:
@@ -150,68 +129,6 @@ def misses(K: DependentRows, away: float, h: float) -> bool:
     foreseen = away >= WITHIN - FORESEEN and is_whole(K, h)  # nearer it was judged already, as a rule
     doubt = FORESEEN - NEAREST if foreseen else 0.0
     return bool(part < NEAREST + doubt and K.velocity_noise * away > K.tolerance * max(part - doubt, 1e-3))
-
-
-def pivoted_gram_norms(
-    K: SingularSteps,
-    m: int,
-    h: float,
-    ratio: float,
-    ahead: float,
-    place: int,
-    o_S: int,
-    stride: int,
-    o_H: int,
-    width: int,
-) -> None:
-    """Lengths of the rows of B, `ahead` of now, less their parts along earlier ones, into K.spare from `place` on.
-
-    Gram–Schmidt on scaled rows, the longest remaining first; at place 0 that order is found, elsewhere it is kept.
-    """
-    n = K.n_v
-    Q = K.basis
-    least_mass = least_inertia(K, K.out, o_S, stride, 0)
-    least_turning = least_inertia(K, K.out, o_S, stride, 1)
-    for k in range(m):
-        row = K.columns[k] if place > 0 else k
-        K.columns[k] = row
-        moves = 0.0 if K.row_level[K.rows[row]] == 1 else 1.0
-        length = 0.0
-        turned = 0.0
-        for j in range(n):
-            weight = counted_inertia(K, j, abs(K.out[o_S + stride * j]), least_mass, least_turning)
-            weight = 1.0 / sqrt(weight) if weight > 0.0 else 1.0
-            turn = K.turning[row * n + j] * weight
-            entry = K.out[o_H + row * width + j] * weight - ratio * turn
-            length += entry * entry
-            turned += turn * turn
-            Q[k * n + j] = entry + moves * ahead * turn
-        length = sqrt(length) + moves * h * sqrt(turned) + 1e-300
-        K.spare[3 * m + k] = length
-        for j in range(n):
-            Q[k * n + j] /= length
-    for done in range(m):
-        longest = done
-        left = -1.0
-        for k in range(done, m if place == 0 else done + 1):
-            length = square(Q, k * n, n)
-            if length > left:
-                left = length
-                longest = k
-        left = sqrt(left)
-        K.spare[place + done] = left
-        row = K.columns[longest]
-        K.columns[longest] = K.columns[done]
-        K.columns[done] = row
-        length = K.spare[3 * m + longest]
-        K.spare[3 * m + longest] = K.spare[3 * m + done]
-        K.spare[3 * m + done] = length
-        for j in range(n):
-            swap = Q[longest * n + j] / (left + 1e-300)
-            Q[longest * n + j] = Q[done * n + j]
-            Q[done * n + j] = swap
-        for k in range(done + 1, m):
-            clear_row(Q, k * n, done * n, n)
 
 
 def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:

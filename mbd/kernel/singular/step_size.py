@@ -12,7 +12,6 @@ columns scaled by √M_ii, passes zero. |w| at the ends of steps tells where it 
 from __future__ import annotations
 
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
-from mbd.kernel.algebra.ordered import order_at
 from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, PASSING
@@ -28,7 +27,7 @@ from mbd.kernel.records import (
     SingularSteps,
     Steps,
 )
-from mbd.kernel.singular.gram_norms import common_part
+from mbd.kernel.singular.gram_norms import gram_norms
 from mbd.kernel.stepping.restart import compose, evaluate, fill_block
 
 __all__ = [
@@ -88,10 +87,7 @@ def note_row_norms(K: DependentRows) -> None:
     for k in range(K.n_rows):
         if K.dropped[k] == 1 and K.row_level[k] == 0:
             K.misfit = max(K.misfit, abs(K.acc[K.acc_h + k]))
-    if order_at(K, m) > 0:
-        row_norms_of_many(K, m)
-    else:
-        row_norms(K, m)
+    row_norms_alone(K, m)
     K.left1[:m] = K.work[:m]
     K.left1[m] = motion(K, K.y1)
 
@@ -169,31 +165,25 @@ def row_norms(K: DependentRows, m: int) -> None:
             K.basis[k * n + j] *= inverse
 
 
-def row_norms_of_many(K: DependentRows, m: int) -> None:
-    """|w| into K.work where most rows have nothing in common: roots of the pivots of their products, in their order.
-
-    Rows keep their zeros there, which Gram–Schmidt fills; see `mbd.kernel.singular.gram_norms`.
-    """
+def row_norms_alone(K: DependentRows, m: int) -> None:
+    """|w| into K.work without its directions, by products of rows: see `mbd.kernel.singular.gram_norms`."""
     n = K.n
     weigh_columns(K)
     for k in range(m):
         load_row(K, k)
+        length = sqrt(square(K.basis, k * n, n)) + 1e-300
         count = 0
         for j in range(n):
             if K.basis[k * n + j] != 0.0:
+                K.basis[k * n + j] /= length
                 count += 1
                 K.support[k * (n + 1) + count] = j
         K.support[k * (n + 1)] = count
-        for i in range(k + 1):
-            K.spare[n + k * m + i] = common_part(K, n, k, i)
+        K.columns[k] = k
+        K.work[k] = length
+    gram_norms(K, m, n, n, n + m, False)
     for k in range(m):
-        pivot = max(K.spare[n + k * (m + 1)], 0.0)
-        K.work[k] = sqrt(pivot)
-        for a in range(k + 1, m):
-            part = K.spare[n + a * m + k]
-            if part != 0.0 and pivot > 0.0:
-                for b in range(k + 1, a + 1):
-                    K.spare[n + a * m + b] -= part / pivot * K.spare[n + b * m + k]
+        K.work[k] *= K.spare[n + k]
 
 
 def evaluate_ahead(K: Mechanism, ahead: float) -> None:
