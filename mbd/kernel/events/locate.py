@@ -10,42 +10,28 @@ from mbd.kernel.codes import (
     GRAZE,
     JUMPED,
     NO_LOCATION,
-    OPEN_FORCE,
-    OPEN_GAP,
-    OPEN_PULL,
-    PRESS,
-    SLIP,
     STICK,
     STICK_BRIEF,
-    WATCH,
 )
+from mbd.kernel.events.bracket import bracket, flag_of
 from mbd.kernel.events.guard_round_off import guard_round_off
 from mbd.kernel.events.guard_sides import striking_contact
 from mbd.kernel.events.guards import (
-    along_slip,
     gap_scale,
     gap_tolerance,
     guard_value,
     is_watched,
     judge,
-    pull_round_off,
 )
-from mbd.kernel.events.hermite import first_guess
-from mbd.kernel.events.refine import enough, refine
 from mbd.kernel.records import Events, Guards, Kernel, Switching
-from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate, put_on_rows
 from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["find_jump", "jumps_over_stop", "locate"]
 
-MOST_LOOKS = 12
-"""How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
 JUMP = 1e-6
 """Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
 UNEXPLAINED = 0.5
 """What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
-AT_SURFACE = 1e-10
-"""Part of its terms within which a gap is at rest on its surface [-]."""
 SAME = 1e-9
 """Events closer than this part of the way to the first are one event."""
 EARLIER, LATER = -2, -1
@@ -218,11 +204,7 @@ def jumps_over_stop(K: Switching, h: float) -> bool:
 
 def another_before(K: Switching, kind: int, index: int, found: float) -> bool:
     """Whether another guard fired before this one, which is at round-off and may look fired itself."""
-    place = index
-    if kind == CROSS or kind == CROSS_BACK:
-        place += K.flag_user
-    elif kind == STICK or kind == SLIP:
-        place += K.flag_friction
+    place = flag_of(K, kind, index)
     quiet = K.active[place]
     K.active[place] = 1
     other = judge(K, found) and K.event_place < 1.0 - SAME
@@ -269,120 +251,3 @@ def left_alone(K: Guards, c: int) -> bool:
     fall = abs(K.guards0[c] - K.guards1[c])
     apart = SAME * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
     return bool(K.guards1[place] <= apart * change)
-
-
-def guard_rate(K: Guards, kind: int, index: int) -> float:
-    """Rate of `guard_value` at the candidate; 0 where it is not known."""
-    if kind == CLOSE:
-        return float(K.guards1[K.at_gap_rate + index])
-    if kind == OPEN_GAP:
-        return float(-K.guards1[K.at_gap_rate + index])
-    if kind == CROSS:
-        return float(K.side[index] * K.guards1[K.at_user_rate + index])
-    if kind == CROSS_BACK:
-        return float(-K.side[index] * K.guards1[K.at_user_rate + index])
-    if kind == STICK:
-        return along_slip(K, index, K.guards1, K.at_slip_rate)
-    return 0.0
-
-
-def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> float:
-    """Distance at which what began just now (sliding, parting, a pull) is seen by steps shorter than one that does not.
-
-    It is seen where the guard is above `tiny`. 0 if none sees it; − status if a step fails.
-    """
-    low = high
-    for _ in range(MOST_LOOKS):
-        low *= 0.5
-        status = event_candidate(K, low, K.time + low)
-        if status != 0:
-            return -float(status)
-        if guard_value(K, kind, index, K.time + low) > tiny:
-            return low
-    return 0.0
-
-
-def parts_slowly(K: Kernel, c: int, high: float) -> int:
-    """0 where a gap at rest on its surface rises, though a step ends below; 1 where it falls; − status if a step fails.
-
-    As the force of a contact passes zero, the gap rises with the cube of time, which is what a scheme of order 2 errs
-    by in a step of any size. Its rate, which grows with the square, tells: no shorter step may end with one that falls.
-    """
-    place = high
-    rising = 0
-    for _ in range(MOST_LOOKS):
-        place *= 0.5
-        status = event_candidate(K, place, K.time + place)
-        if status != 0:
-            return -status
-        way = place * K.guards1[K.at_gap_rate + c]
-        if way < -gap_tolerance(K, c):
-            return 1
-        if way > gap_tolerance(K, c):
-            rising += 1
-    return 0 if rising > 0 else 1
-
-
-def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
-    """Root of the fired guard between two distances from the accepted state; K.event_after its distance."""
-    t = K.time
-    K.n_locations += 1
-    put_on_rows(K, t + high)
-    f_high = guard_value(K, kind, index, t + high)
-    if f_high >= 0.0:
-        if kind == OPEN_PULL:  # only the multiplier of the step was negative, not that of the motion
-            K.active[index] = 1
-            K.event_kind = -1
-        elif kind == STICK or kind == SLIP:
-            K.active[K.flag_friction + index] = 1
-            K.event_kind = -1
-        elif kind == CROSS or kind == CROSS_BACK:  # with velocities on the rows it has not crossed yet
-            K.active[K.flag_user + index] = 1
-            K.event_kind = -1
-        K.event_after = high
-        return 0
-    d_high = guard_rate(K, kind, index)
-    if low > 0.0:
-        status = event_candidate(K, low, t + low)
-        if status != 0:
-            return status
-    else:
-        event_at_start(K)
-    f_low = guard_value(K, kind, index, t + low)
-    near = gap_tolerance(K, index) if kind == CLOSE else 0.0
-    if kind == PRESS or kind == OPEN_FORCE:  # its last event left its force at round-off, which is no root
-        near = enough(K, kind, index, f_low, f_high)
-    if kind == SLIP:  # what has just come to rest may be at its limit, as behind a stop that opens
-        near = pull_round_off(K, index, K.impulse)
-    begun = f_low <= 0.0 and (kind == STICK or kind == CLOSE or kind == PRESS or (kind == SLIP and f_low >= -near))
-    if begun or (0.0 < f_low <= near and kind != CLOSE):
-        low = find_way(K, kind, index, high, near)
-        if low < 0.0:
-            return int(-low)
-        if low == 0.0 and kind == CLOSE and abs(K.guards0[index]) <= AT_SURFACE * gap_scale(K, index):
-            status = parts_slowly(K, index, high)
-            if status <= 0:
-                if status == 0:
-                    K.active[index] = 1
-                    K.event_kind = -1
-                    K.event_after = high
-                return -status
-        if low == 0.0:
-            event_at_start(K)
-        f_low = guard_value(K, kind, index, t + low)
-    if f_low <= 0.0:
-        if (kind == OPEN_GAP or kind == OPEN_FORCE) and K.guards0[K.at_gap_rate + index] < 0.0:
-            K.event_after = high  # a touch too short to be seen within the step: it is over at its end
-            return event_candidate(K, high, t + high)
-        if low > 0.0 and kind != CROSS and kind != CROSS_BACK:
-            low = 0.0
-            event_at_start(K)
-        K.event_after = low
-        return 0
-    width = high - low
-    guess = first_guess(f_low, f_high, guard_rate(K, kind, index) * width, d_high * width)
-    if K.linear == 1 and kind != WATCH and kind != OPEN_PULL:  # no contact is stored that pulls
-        place = low + width * f_low / (f_low - f_high)
-        K.event_after = place
-        return event_candidate(K, place, t + place)
-    return refine(K, kind, index, low, f_low, high, f_high, low + width * guess)

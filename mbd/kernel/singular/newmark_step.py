@@ -143,7 +143,44 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     c = (1.0 - K.alpha_f) / (1.0 - K.alpha_m)
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
+    predict_along_branch(K, h, t1, c_C, c_K)
     K.near_singular = PASSING
+    K.failure_time = t1
+    K.failure_step = h
+    tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
+    before = 1e300
+    away = 0.0
+    for iteration in range(K.max_iterations):
+        # tangent and residual at the iterate
+        if sharing(K):
+            share_loads(K, m)
+        call(K, K.tangent_program, K.out)
+        K.n_tangents += 1
+        error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
+        if error < 0.0:
+            return NOT_FINITE
+        if error > 1.0 and iteration >= 2 and error > 0.5 * before:
+            error = error_or_round_off(K, o_r, m, c_C, c_K, tolerance)
+            if error < 0.0:
+                return NOT_CONVERGED
+        K.failure_size = error
+        # distance of the singularity, from the first tangent
+        if iteration == 0:
+            K.turning[: m * K.n_v] = K.out[o_r + K.n + 2 * m : o_r + K.n + 2 * m + m * K.n_v]
+            away = steps_to_singularity(K, m, h, c_K / c_C, False)
+            if away < NEAREST and K.velocity_noise > K.tolerance:
+                return SINGULAR
+        # the candidate, or the next iterate
+        if error <= 1.0:
+            return conclude_singular_step(K, h, away)
+        before = error
+        if not correct_positions(K, m, c_C, c_K):
+            return SINGULAR
+    return NOT_CONVERGED
+
+
+def predict_along_branch(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> None:
+    """The prediction with the position correction of the last step that held both; its velocities also into K.y1."""
     predict(K, h, t1, c_C, c_K)
     stretch = min(h / K.aux_step, 1.0)
     cube = stretch * stretch * stretch
@@ -153,55 +190,39 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
             K.block[K.o_x + i] -= K.shift1[i]
             K.shift1[i] = K.shift[i] * cube
             K.block[K.o_x + i] += K.shift1[i]
-    K.failure_time = t1
-    K.failure_step = h
-    tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
-    before = 1e300
-    away = 0.0
-    for iteration in range(K.max_iterations):
-        if sharing(K):
-            share_loads(K, m)
-        call(K, K.tangent_program, K.out)
-        K.n_tangents += 1
-        error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
-        if error < 0.0:
-            return NOT_FINITE
-        if error > 1.0 and iteration >= 2 and error > 0.5 * before:
-            note_scales(K)
-            raise_scales(K, True)
-            if runs_away(K, m):
-                restore_scales(K)
-                return NOT_CONVERGED
-            error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
-            rough = residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, 0)
-            if error > 1.0 and (rough <= 16.0 or is_below_floors(K, o_r, m, 0)):
-                K.n_stagnations += 1
-                error = 1.0
-            if error <= 1.0:
-                retain_scales(K)
-            else:
-                restore_scales(K)
-        K.failure_size = error
-        if iteration == 0:
-            K.turning[: m * K.n_v] = K.out[o_r + K.n + 2 * m : o_r + K.n + 2 * m + m * K.n_v]
-            away = steps_to_singularity(K, m, h, c_K / c_C, False)
-            if away < NEAREST and K.velocity_noise > K.tolerance:
-                return SINGULAR
-        if error <= 1.0:
-            K.failure_size = 0.0
-            if leaves_branch(K, h):
-                return NOT_CONVERGED
-            finish(K, h)
-            if overturns(K, h):
-                K.failure_size = -1.0
-                return NOT_CONVERGED
-            K.n_singular_steps += 1
-            K.near_singular = PASSING if away < WITHIN else LEFT
-            return 0
-        before = error
-        if not correct_positions(K, m, c_C, c_K):
-            return SINGULAR
-    return NOT_CONVERGED
+
+
+def error_or_round_off(K: SingularSteps, o_r: int, m: int, c_C: float, c_K: float, tolerance: float) -> float:
+    """A residual that falls no more, by sizes of forces as they are here; 1 if it is round-off, −1 if it runs away."""
+    note_scales(K)
+    raise_scales(K, True)
+    if runs_away(K, m):
+        restore_scales(K)
+        return -1.0
+    error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)
+    rough = residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, 0)
+    if error > 1.0 and (rough <= 16.0 or is_below_floors(K, o_r, m, 0)):
+        K.n_stagnations += 1
+        error = 1.0
+    if error <= 1.0:
+        retain_scales(K)
+    else:
+        restore_scales(K)
+    return float(error)
+
+
+def conclude_singular_step(K: Kernel, h: float, away: float) -> int:
+    """The iterate becomes the candidate if it continues the motion on its branch; 0, or `NOT_CONVERGED`."""
+    K.failure_size = 0.0
+    if leaves_branch(K, h):
+        return NOT_CONVERGED
+    finish(K, h)
+    if overturns(K, h):
+        K.failure_size = -1.0
+        return NOT_CONVERGED
+    K.n_singular_steps += 1
+    K.near_singular = PASSING if away < WITHIN else LEFT
+    return 0
 
 
 def correct_positions(K: DependentRows, m: int, c_C: float, c_K: float) -> bool:
