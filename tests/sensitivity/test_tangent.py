@@ -90,8 +90,6 @@ def entry(K: Kernel, A: Reals, b: Reals, pivots: Integers, work: Reals, way: int
     if way == 0:
         return 0 if solve_definite(A, 3, b, work) > 0.0 else 1
     if way == 1:
-        return 0 if solve_from_tips(A, 3, b, work) > 0.0 else 1
-    if way == 2:
         status = factor(A, 3, pivots)
         solve(A, 3, pivots, b)
         return status
@@ -99,12 +97,10 @@ def entry(K: Kernel, A: Reals, b: Reals, pivots: Integers, work: Reals, way: int
 """
 
 
-@pytest.mark.parametrize("way", range(4))
+@pytest.mark.parametrize("way", range(3))
 def test_entries_that_are_zero_have_derivatives_in_every_elimination(way):
     """``A x = b → A x' = b' − A' x`` where A is diagonal and A' is full, as M is where links stand square."""
-    known = {
-        name: getattr(linear, name) for name in ("solve_definite", "solve_from_tips", "factor", "solve", "eliminate")
-    }
+    known = {name: getattr(linear, name) for name in ("solve_definite", "factor", "solve", "eliminate")}
     source = Source("given", functions_of(SOLVERS), known)
     kinds = ["kernel", "reals", "reals", "integers", "reals", "int"]
     found = translate(source, "entry", kinds, instead={"mbd.kernel.tangent_rules": own_rules()})

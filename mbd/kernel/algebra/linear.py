@@ -10,7 +10,7 @@ from mbd.kernel.records import Integers, Reals
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = [
-    "eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "solve_from_tips", "sum_of_sizes",
+    "eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes",
 ]  # fmt: skip
 
 MOST_ROUND_OFF = 1e-12
@@ -94,46 +94,11 @@ def round_off(n: int) -> float:
 
 
 def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:
-    """b ← M⁻¹ b by M = Uᵀ D U, D U in the upper half of M; 0 where M is not clearly positive definite.
+    """b ← M⁻¹ b by M = Lᵀ D L, last unknown first, D L in the lower half of M; 0 where M is not positive definite.
 
     What returns else is the least part that a pivot keeps of its diagonal entry. `work` needs n places, for the
-    diagonal of M.
-    """
-    for k in range(n):
-        work[k] = abs(M[k * n + k])
-    kept = 1.0
-    lost = round_off(n)
-    for k in range(n):
-        pivot = M[k * n + k]
-        if not pivot > lost * work[k]:
-            return 0.0
-        if pivot < kept * work[k]:
-            kept = pivot / work[k]
-        inverse = 1.0 / pivot
-        M[k * n + k] = inverse
-        for i in range(k + 1, n):
-            if takes_part(M[k * n + i]):
-                left = M[k * n + i] * inverse
-                b[i] -= left * b[k]
-                subtract_row(M, n, i, k, left, i)
-    substitute_back(M, n, b)
-    return kept
-
-
-def solve_again(M: Reals, n: int, b: Reals) -> None:
-    """b ← M⁻¹ b with the factors of `solve_definite`."""
-    for k in range(n):
-        left = b[k] * M[k * n + k]
-        for i in range(k + 1, n):
-            b[i] -= M[k * n + i] * left
-    substitute_back(M, n, b)
-
-
-def solve_from_tips(M: Reals, n: int, b: Reals, work: Reals) -> float:
-    """`solve_definite` by M = Lᵀ D L, last unknown first, D L in the lower half of M.
-
-    Of a tree whose coordinates are numbered outwards the zeros of M between branches stay zeros (Featherstone 2005,
-    Int. J. Robotics Research 24:487).
+    diagonal of M. Of a tree whose coordinates are numbered outwards the zeros of M between branches stay zeros
+    (Featherstone 2005, Int. J. Robotics Research 24:487).
     """
     for k in range(n):
         work[k] = abs(M[k * n + k])
@@ -153,9 +118,25 @@ def solve_from_tips(M: Reals, n: int, b: Reals, work: Reals) -> float:
                 left = M[k * n + i] * inverse
                 b[i] -= left * b[k]
                 subtract_head(M, n, i, k, left)
+    substitute_outwards(M, n, b)
+    return kept
+
+
+def solve_again(M: Reals, n: int, b: Reals) -> None:
+    """b ← M⁻¹ b with the factors of `solve_definite`."""
+    for c in range(n):
+        k = n - 1 - c
+        left = b[k] * M[k * n + k]
+        for i in range(k):
+            b[i] -= M[k * n + i] * left
+    substitute_outwards(M, n, b)
+
+
+def substitute_outwards(M: Reals, n: int, b: Reals) -> None:
+    """b ← (D L)⁻¹ b with the factors of `solve_definite`."""
     for k in range(n):
         left = b[k]
-        even = 0.0
+        even = 0.0  # two sums, which do not wait for each other
         j = 0
         while j + 1 < k:
             left -= M[k * n + j] * b[j]
@@ -164,7 +145,6 @@ def solve_from_tips(M: Reals, n: int, b: Reals, work: Reals) -> float:
         if j < k:
             left -= M[k * n + j] * b[j]
         b[k] = (left + even) * M[k * n + k]
-    return kept
 
 
 def subtract_head(A: Reals, n: int, i: int, k: int, part: float) -> None:
@@ -183,22 +163,6 @@ def subtract_head(A: Reals, n: int, i: int, k: int, part: float) -> None:
     while j <= i:
         A[i * n + j] -= part * A[k * n + j]
         j += 1
-
-
-def substitute_back(M: Reals, n: int, b: Reals) -> None:
-    """b ← (D U)⁻¹ b with the factors of `solve_definite`."""
-    for c in range(n):
-        k = n - 1 - c
-        left = b[k]
-        even = 0.0  # two sums, which do not wait for each other
-        j = k + 1
-        while j + 1 < n:
-            left -= M[k * n + j] * b[j]
-            even -= M[k * n + j + 1] * b[j + 1]
-            j += 2
-        if j < n:
-            left -= M[k * n + j] * b[j]
-        b[k] = (left + even) * M[k * n + k]
 
 
 def eliminate(A: Reals, n: int, b: Reals, columns: Integers, work: Reals, rank_tolerance: float) -> int:

@@ -6,7 +6,7 @@ from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, OPEN_FORCE, OPEN_GAP, OPE
 from mbd.kernel.events.guards import along_slip, gap_scale, gap_tolerance, guard_value, pull_round_off
 from mbd.kernel.events.hermite import first_guess
 from mbd.kernel.events.refine import enough, refine
-from mbd.kernel.records import Guards, Kernel, Sizes
+from mbd.kernel.records import ContactForces, Guards, Kernel, Sizes
 from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate, put_on_rows
 
 __all__ = ["bracket", "flag_of"]
@@ -87,7 +87,7 @@ def candidate_at(K: Kernel, place: float) -> int:
     return 0
 
 
-def root_tolerance(K: Kernel, kind: int, index: int, f_low: float, f_high: float) -> float:
+def root_tolerance(K: ContactForces, kind: int, index: int, f_low: float, f_high: float) -> float:
     """Value up to which a guard at the near end is the root of its last event, left at round-off.
 
     Forces begin there after their event; a friction that has just come to rest may be at its limit, as behind a stop
@@ -102,7 +102,7 @@ def root_tolerance(K: Kernel, kind: int, index: int, f_low: float, f_high: float
     return 0.0
 
 
-def begins_at_root(K: Kernel, kind: int, index: int, f_low: float, f_high: float) -> bool:
+def begins_at_root(K: ContactForces, kind: int, index: int, f_low: float, f_high: float) -> bool:
     """Whether what the guard watches began at the near end, just now: its root there is no event."""
     near = root_tolerance(K, kind, index, f_low, f_high)
     if f_low > 0.0:

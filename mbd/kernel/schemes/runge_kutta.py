@@ -11,7 +11,7 @@ that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.linear import solve_definite, solve_from_tips, sum_of_sizes
+from mbd.kernel.algebra.linear import solve_definite, sum_of_sizes
 from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
@@ -221,15 +221,12 @@ def explicit_rates(K: Balance, t: float) -> int:
     if m == 0:
         for i in range(n):
             K.jump[i] = -K.acc[K.acc_f + i]
-        if K.vector == 0 and solve_from_tips(K.acc, n, K.jump, K.spare) >= LOSS:
-            note_pull(K)
-            return 0
-        if K.vector == 0:
-            K.stage_pull = 1e300
-            evaluate(K, t, K.q1, K.y1)
-            for i in range(n):
-                K.jump[i] = -K.acc[K.acc_f + i]
         kept = solve_definite(K.acc, n, K.jump, K.spare)
+        if K.vector == 0:
+            if kept >= LOSS:
+                note_pull(K)
+            else:
+                K.stage_pull = 1e300
         if kept == 0.0:
             return consistent(K, t, K.q1, K.y1)
         if kept < LOSS:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.roots import sqrt
-from mbd.kernel.records import DependentRows, SingularSteps
+from mbd.kernel.records import DependentRows, Singular, SingularSteps
 
 __all__ = ["gram_norms", "pivoted_gram_norms"]
 
@@ -106,7 +106,7 @@ def scaled_row(K: SingularSteps, m: int, row: int, h: float, ratio: float, ahead
     return float(length)
 
 
-def common_part(K: DependentRows, n: int, row: int, other: int) -> float:
+def common_part(K: Singular, n: int, row: int, other: int) -> float:
     """The product of two rows of the basis, which are n long, over the entries of the first in K.support."""
     part = 0.0
     for e in range(K.support[row * (n + 1)]):

@@ -12,7 +12,7 @@ from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
 from mbd.kernel.hooks import call
-from mbd.kernel.records import DependentRows, Kernel, Motion, SingularSteps
+from mbd.kernel.records import DependentRows, Equations, Kernel, Motion, SingularSteps
 from mbd.kernel.schemes.iteration import (
     finish,
     is_below_floors,
@@ -192,7 +192,7 @@ def predict_along_branch(K: SingularSteps, h: float, t1: float, c_C: float, c_K:
             K.block[K.o_x + i] += K.shift1[i]
 
 
-def error_or_round_off(K: SingularSteps, o_r: int, m: int, c_C: float, c_K: float, tolerance: float) -> float:
+def error_or_round_off(K: Equations, o_r: int, m: int, c_C: float, c_K: float, tolerance: float) -> float:
     """A residual that falls no more, by sizes of forces as they are here; 1 if it is round-off, −1 if it runs away."""
     note_scales(K)
     raise_scales(K, True)
@@ -211,7 +211,7 @@ def error_or_round_off(K: SingularSteps, o_r: int, m: int, c_C: float, c_K: floa
     return float(error)
 
 
-def conclude_singular_step(K: Kernel, h: float, away: float) -> int:
+def conclude_singular_step(K: SingularSteps, h: float, away: float) -> int:
     """The iterate becomes the candidate if it continues the motion on its branch; 0, or `NOT_CONVERGED`."""
     K.failure_size = 0.0
     if leaves_branch(K, h):

@@ -10,7 +10,7 @@ step from any other at most; next to an end it has not. In space, without rows, 
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.linear import solve_from_tips
+from mbd.kernel.algebra.linear import solve_definite
 from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Guards, Switching
@@ -129,7 +129,7 @@ def pull_without_rows(K: Balance, t: float) -> float:
         finite += abs(K.jump[i])
     if not finite < 1e300:
         return NOT_FOUND
-    if solve_from_tips(K.acc, n, K.jump, K.spare) < LOSS:
+    if solve_definite(K.acc, n, K.jump, K.spare) < LOSS:
         return NOT_FOUND
     total = 0.0
     for i in range(K.n_v):
