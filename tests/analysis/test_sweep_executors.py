@@ -30,7 +30,7 @@ def count() -> None:
     mechanisms.derive = counted
     try:
         from mbd.compile import llvm
-    except ImportError:
+    except ImportError:  # without llvmlite nothing is compiled
         return
     emit = llvm.emit_object
 

@@ -117,6 +117,7 @@ def test_what_is_remembered_is_what_would_be_made(kind, seed, store, monkeypatch
         assert np.array_equal(code.order, again._modes[key].order)
 
 
+@at_least(3)
 def test_what_is_missing_is_made_in_its_old_place(store):
     """Of a mode that is not remembered the text is that of a process that remembered nothing."""
     model = KINDS["scene"](4)
@@ -125,6 +126,7 @@ def test_what_is_missing_is_made_in_its_old_place(store):
     for name, path in whole.items():
         if b'"straight"' in (content := path.read_bytes()) or b'"tail"' in content or b'"order"' in content:
             path.unlink()
+            compared()
             assert values(made(model, store, 3)) == expected
             assert {path.name for path in store.directory.iterdir()} == set(whole), name
 
@@ -203,7 +205,7 @@ def elements(model):
     return list(numbers([word for group in groups for word in (group.values() if isinstance(group, dict) else group)]))
 
 
-@at_least(5)
+@at_least(1)
 @given(st.sampled_from(sorted(KINDS)), SEEDS, st.integers(0, 10**6), st.sampled_from(["zero", "one", "larger"]))
 @settings(max_examples=10)
 def test_equal_fingerprints_mean_equal_code(kind, seed, place, how):
@@ -218,9 +220,9 @@ def test_equal_fingerprints_mean_equal_code(kind, seed, place, how):
         after = derive(model)
     except (mbd.ModelError, mbd.CapabilityError, ValueError, TypeError):
         return
-    compared()
     assert known is not None
     if fingerprint(after) == known:
+        compared()
         assert texts(after) == code
 
 

@@ -82,11 +82,9 @@ def test_the_order_is_8_in_positions_rates_accelerations_and_multipliers(scene):
         for steps in (28, 56):
             record, every = fixed(scene, steps).record, FINEST // steps
             errors.append(np.max(np.abs(getattr(record, part) - getattr(exact, part)[::every]), initial=0.0))
-        if getattr(exact, part).size:
-            assert np.log2(errors[0] / errors[1]) == pytest.approx(8.0, abs=0.15 if part == "q" else 0.3), (
-                part,
-                errors,
-            )
+        if part == "lam" and not exact.lam.size:
+            continue
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(8.0, abs=0.15 if part == "q" else 0.3), (part, errors)
 
 
 @pytest.mark.parametrize("scene", SCENES)

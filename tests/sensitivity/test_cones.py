@@ -135,9 +135,11 @@ def random_box(seed):
         kinds = {event.kind for event in mbd.simulate(model, start, scheme, dt=2.5e-3, until=0.4).events}
     except (mbd.SimulationError, mbd.CapabilityError):
         return
+    if found is None:  # differences of these runs tell no derivative
+        return
     compared()
     most = 1e-7 if "slipped" in kinds else 1e-8
-    assert found is None or np.all(found[0] <= np.maximum(most, 2.0 * found[1])), (seed, found)
+    assert np.all(found[0] <= np.maximum(most, 2.0 * found[1])), (seed, found)
 
 
 @pytest.mark.parametrize("dt", [0.005, 0.008])
