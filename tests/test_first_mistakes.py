@@ -484,3 +484,85 @@ def test_a_delay_in_milliseconds_is_doubted() -> None:
     model.apply(mbd.Motor("drive", pin, 0.0), mbd.SampledLaw("law", 0.01, outputs, read, delay=3.0))
     with pytest.warns(mbd.MbdWarning, match=r"'law' puts its outputs out 3 s after .* 3 ms is 0.003"):
         model.check()
+
+
+# units and orders that other programs have --------------------------------------------------------------------------
+def runner(stiffness: float) -> mbd.Model:
+    """A point mass of 80 kg on a spring leg."""
+    model, body = mbd.Model("runner"), mbd.PointMass("body", mass=80.0)
+    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model.constrain(
+        mbd.SpringLeg("leg", body.origin, stiffness, 1.0, np.radians(68.0)),
+        mbd.Event("apex", mbd.measure("place.y.rate"), direction=-1),
+    )
+    return model
+
+
+def test_a_leg_in_kilonewtons_per_metre_is_doubted(recwarn: pytest.WarningsRecorder) -> None:
+    assert runner(20e3).check() == [] and not recwarn.list
+    with pytest.warns(mbd.MbdWarning, match=r"'leg' of 20 N/m .* at most, the model weighs 785 N; .* 20 kN/m is 20000"):
+        runner(20.0).check()
+
+
+def test_a_drive_in_degrees_is_doubted(recwarn: pytest.WarningsRecorder) -> None:
+    time = np.linspace(0.0, 1.0, 21)
+    degrees, turning = 50.0 * np.sin(2.0 * np.pi * time), 30.0 * time
+    for values, doubted in ((degrees, True), (np.radians(degrees), False), (turning, False)):
+        model, pin = pendulum()
+        model.constrain(mbd.Bilateral("drive", pin, mbd.Samples(time, values)))
+        model.check()
+        told = [str(each.message) for each in recwarn.list]
+        assert [
+            bool(re.search("'drive' swings an angle to and fro by 100 rad.*numpy.radians", text)) for text in told
+        ] == ([True] if doubted else [])
+        recwarn.clear()
+
+
+def test_a_scalar_at_the_end_of_a_quaternion_is_doubted(recwarn: pytest.WarningsRecorder) -> None:
+    for first in ((1.0, 0.0, 0.0, 0.0), (0.6, 0.0, 0.0, 0.8), ((0, 0, 1), np.pi)):
+        mbd.assemble(ball_joint(), {"hip.orientation": first})
+    assert not recwarn.list
+    with pytest.warns(mbd.MbdWarning, match=r"turns by 180°.*scalar first.*give \(1, 0, 0, 0\)"):
+        mbd.assemble(ball_joint(), {"hip.orientation": (0.0, 0.0, 0.0, 1.0)})
+    with pytest.warns(mbd.MbdWarning, match=r"turns by 180°.*give \(0.995, 0, 0.09983, 0\)"):
+        mbd.assemble(ball_joint(), {"hip.orientation": np.array([0.0, np.sin(0.1), 0.0, np.cos(0.1)])})
+
+
+@pytest.mark.parametrize("energy", [1.785, 100.0])  # in kJ, and below m g l sin α = 727 J, without which no leg fits
+def test_an_energy_without_a_gait_is_named_with_those_that_there_are(energy: float) -> None:
+    model = runner(20e3)
+    start = mbd.assemble(model, {"place.y": 1.0}, {"place.x": 5.0, "place.y": 0.0})
+    said = rf"energy={energy:g} J: the start has T \+ V = 1785 J just after 'apex', and 7\d\d\.?\d* J is the nearest"
+    with pytest.raises(mbd.GaitError, match=said):
+        mbd.limit_cycle(model, start, section="apex", energy=energy)
+
+
+@pytest.mark.parametrize(
+    ("loss", "said"),
+    [
+        (mbd.Viscous(0.1), "'knee loss.coefficient'"),
+        (mbd.Coulomb(0.1), "'knee loss.torque'"),
+        (mbd.Viscous(0.1) + mbd.Coulomb(0.1), "'knee loss.viscous.coefficient' or 'knee loss.coulomb.torque'"),
+    ],
+)
+def test_the_number_of_a_loss_is_found(loss: Any, said: str) -> None:
+    model, rod = mbd.Model("leg"), mbd.Link("rod", length=1.0, **mbd.rod(1.0, length=1.0).link)
+    model.connect(mbd.Revolute("knee", model.ground.origin, rod.start, loss=loss))
+    for wrong in ("knee.loss", "knee.damping"):
+        with pytest.raises(mbd.UnknownNameError, match=f"did you mean {said}"):
+            mbd.assemble(model, parameters={wrong: 0.3})
+
+
+URDF = """<robot name="leg"><link name="base"/><link name="shank"/><joint name="knee" type="revolute">
+<parent link="base"/><child link="shank"/><axis xyz="0 1 0"/><limit lower="{}" upper="{}"/></joint></robot>"""
+
+
+def test_limits_of_a_robot_in_degrees_are_doubted(tmp_path, recwarn: pytest.WarningsRecorder) -> None:
+    file = tmp_path / "leg.urdf"
+    for limits in ((0.0, 2.27), (-6.2832, 6.2832), (-1e16, 1e16)):
+        file.write_text(URDF.format(*limits))
+        mbd.read_model(file)
+    assert not recwarn.list
+    file.write_text(URDF.format(0, 130))
+    with pytest.warns(mbd.MbdWarning, match=r"leg.urdf: a limit of 'knee' is 130 rad, 20.7 turns; .* 130° is 2.269"):
+        mbd.read_model(file)

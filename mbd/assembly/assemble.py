@@ -69,10 +69,11 @@ def assemble(
     model : a `Model` or `Lagrangian`
     position : {'left hip.angle': 0.2} coordinates [m, rad], first-order states, and any named position
         ('left shank.end.x', the angle of a cut joint), which then holds like a row. 'ball.orientation' is a unit
-        quaternion (w, x, y, z), whose length is 1 within 1e-6, a scipy ``Rotation``, a rotation matrix (3, 3), an axis
-        with an angle ((0, 0, 1), 0.3), or Euler angles about axes that turn along ('zxy', (0.1, 0.2, 0.3)) [rad]; three
-        numbers behind any other name are its '.x', '.y', '.z'. A mode starts in another state than its own by
-        {'knee phase': 'swing'}, with a remembered value by {'knee phase.touchdown angle': 0.2}
+        quaternion (w, x, y, z), scalar first, whose length is 1 within 1e-6, a scipy ``Rotation``, a rotation matrix
+        (3, 3), an axis with an angle ((0, 0, 1), 0.3), or Euler angles about axes that turn along
+        ('zxy', (0.1, 0.2, 0.3)) [rad]; three numbers behind any other name are its '.x', '.y', '.z'. A mode starts in
+        another state than its own by {'knee phase': 'swing'}, with a remembered value by
+        {'knee phase.touchdown angle': 0.2}
     velocity : {'left hip.angle': −1.1} or {'left hip.rate': …} rates by coordinate or rate name [m/s, rad/s], such as
         {'ball.angular_velocity': (0, 0, 2)} in the child's axes, 'ball.angular_velocity.parent', '… .ground'
     closed : names of contacts that start closed

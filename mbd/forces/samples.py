@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.bodies.values import among, flag, number, numbers, shown
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -18,7 +21,7 @@ from mbd.tape.interpolation import Pieces, hold, linear, monotone, spline
 from mbd.tape.node import Node, Scalar
 from mbd.tape.table import Table
 
-__all__ = ["KINDS", "MOTION", "Samples"]
+__all__ = ["KINDS", "MOTION", "Samples", "in_degrees"]
 
 KINDS = ("spline", "smooth", "monotone", "linear", "hold")
 """Curves through samples."""
@@ -245,3 +248,12 @@ class Samples:
 def behind(first: float, last: float) -> float:
     """Just behind the last sample."""
     return last + BEHIND * max(abs(first), abs(last))
+
+
+def in_degrees(values: Sequence[float] | Vector) -> float:
+    """By how much an angle swings to and fro [rad], if by more than a turn, as joints do in degrees only; else 0."""
+    if len(values) < 3:
+        return 0.0
+    swing = float(np.ptp(values))
+    there_and_back = swing > math.tau and float(np.sum(np.abs(np.diff(values)))) > 1.5 * swing
+    return swing if there_and_back else 0.0

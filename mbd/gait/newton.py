@@ -5,7 +5,7 @@ Of a family of gaits, where one number more picks the member (`mbd.gait.family`)
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import RANK_RTOL
 from mbd.errors import SimulationError
-from mbd.gait.family import Member
+from mbd.gait.family import Member, energy_of
 from mbd.gait.map_derivative import Measured, map_derivative, measured, numbers_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap, Values
@@ -36,6 +36,8 @@ FINE = 0.01
 """Residual over `tol` above which one more step is made at the end [-]."""
 FAMILY = 1e-3
 """Singular value of 1 − P relative to its largest below which gaits near may form a family [-]."""
+KEPT = 1e-8
+"""Relative change of the energy in one return up to which nothing takes or gives any [-]."""
 REST = 1e3
 """Speed over `tol` below which what repeats itself is rest [-]."""
 
@@ -51,6 +53,7 @@ class FixedPoint:
         row below it is that of the member
     member : of a family, that is asked for; None: the one near the start
     gap : what is left at the last state: c' − c, then of the member
+    energies : T + V [J] of the states from which the walker came back, where a member of some energy is asked for
     """
 
     chart: Chart
@@ -63,6 +66,7 @@ class FixedPoint:
     exact: bool = False
     member: Member | None = None
     gap: Vector = field(default_factory=lambda: np.zeros(0))
+    energies: list[float] = field(default_factory=list)
 
     @property
     def state(self) -> State:
@@ -88,20 +92,30 @@ def fixed_point(
     if near is not None and near[0].size == point.chart.size and member is None:
         turn = point.chart.basis.T @ near[0].basis
         point.slope = turn @ (np.eye(point.chart.size) - near[1]) @ turn.T
+    _search(map_, point, values, tol)
+    if member is not None and member.kind == "energy" and not point.outcome.good:
+        point.outcome = replace(
+            point.outcome, text=f"{_energies(map_, point, start, values, member.value)}; {point.outcome.text}"
+        )
+    return point
+
+
+def _search(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> None:
+    """Newton's method from the state of the point; its outcome tells how it ended."""
     found: Measured | Outcome | None = _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
     walked = 0
     for _ in range(MOST):
         if not isinstance(found, Measured):
             assert found is not None
             point.outcome = map_.explained(point.state, found, values)
-            return point
+            return
         point.found, point.gap = found, _gap(map_, point, np.zeros(point.chart.size), found, values)
         point.residual = float(np.max(np.abs(point.gap), initial=0.0))
         point.residuals.append(point.residual)
         if point.residual <= tol:
             _polish(map_, point, values, tol)
             point.outcome = _rest(map_, point, tol) or Outcome("walks", "walks")
-            return point
+            return
         found = _stepped(map_, point, found, values)
         if found is None and point.residual <= 100.0 * tol:
             break
@@ -110,8 +124,19 @@ def fixed_point(
             if walked > AGAIN:
                 break
             found = _walked(map_, point, values)
-    _give_up(map_, point, tol)
-    return point
+    _give_up(map_, point, values, tol)
+
+
+def _energies(map_: ReturnMap, point: FixedPoint, start: State, values: Values, wanted: float) -> str:
+    """The energy asked for, that of the start, and the nearest with which the walker came back, in words."""
+    text = (
+        f"energy={wanted:g} J: the start has T + V = {energy_of(map_, [start], values)[0]:.4g} J just after "
+        f"{map_.section!r}"
+    )
+    if not point.energies:
+        return text
+    nearest = min(point.energies, key=lambda energy: abs(energy - wanted))
+    return f"{text}, and {nearest:.4g} J is the nearest energy with which the walker came back"
 
 
 def _polish(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> None:
@@ -125,12 +150,12 @@ def _polish(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> N
         point.residuals.append(point.residual)
 
 
-def _give_up(map_: ReturnMap, point: FixedPoint, tol: float) -> None:
+def _give_up(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> None:
     """The outcome of a search that came to no fixed point."""
     if resting := _rest(map_, point, tol):
         point.outcome = resting
         return
-    if point.member is not None and (alone := _alone(point)):
+    if point.member is not None and (alone := _alone(map_, point, values)):
         point.outcome = Outcome("does not converge", alone)
         return
     last = f"; beside it the walker {point.attempts[-1]}" if point.attempts else ""
@@ -140,13 +165,17 @@ def _give_up(map_: ReturnMap, point: FixedPoint, tol: float) -> None:
     point.outcome = Outcome("does not converge", text + last)
 
 
-def _alone(point: FixedPoint) -> str:
+def _alone(map_: ReturnMap, point: FixedPoint, values: Values) -> str:
     """That gaits near the last state are isolated, so that none has the energy or speed asked for; '' if they are not.
 
-    It is so where what Newton's method cannot reduce is that of the member, and no multiplier there is 1.
+    It is so where a return changes the energy, what Newton's method cannot reduce is that of the member, and no
+    multiplier there is 1.
     """
     size = point.chart.size
-    if point.slope is None or len(point.gap) == size:
+    if point.slope is None or point.found is None or len(point.gap) == size:
+        return ""
+    before, after = energy_of(map_, [point.state, point.found.arrival.state], values)
+    if abs(after - before) <= KEPT * max(abs(before), abs(after)):
         return ""
     sizes = np.linalg.svd(point.slope[:size], compute_uv=False)
     if not size or sizes[-1] <= FAMILY * sizes[0]:
@@ -173,7 +202,10 @@ def _gap(map_: ReturnMap, point: FixedPoint, c: Vector, found: Measured, values:
     left = found.c - c
     if point.member is None:
         return left
-    return np.append(left, point.member.misfit(map_, point.chart, c, found, values))
+    misfit = point.member.misfit(map_, point.chart, c, found, values)
+    if point.member.kind == "energy":
+        point.energies.append(point.member.value - misfit * point.member.size)
+    return np.append(left, misfit)
 
 
 def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:

@@ -19,9 +19,11 @@ ROUNDED = 1e-6
 """Most by which the length of a quaternion may be off 1, and the axes of a matrix off each other, by rounding [-]."""
 NEAR = 1e-6
 """Distance from the singularity of an Euler sequence within which a start is in doubt [rad]."""
+SMALL_TURN = math.cos(math.radians(15.0))
+"""Scalar of the quaternion of a turn by 30° [-]."""
 FORMS = (
-    "give a unit quaternion (w, x, y, z), a scipy Rotation, a 3 × 3 rotation matrix, an axis with an angle such as "
-    "((0, 0, 1), 0.3), or Euler angles such as ('zxy', (0.1, 0.2, 0.3)), in radians"
+    "give a unit quaternion (w, x, y, z), scalar first, a scipy Rotation, a 3 × 3 rotation matrix, an axis with an "
+    "angle such as ((0, 0, 1), 0.3), or Euler angles such as ('zxy', (0.1, 0.2, 0.3)), in radians"
 )
 
 
@@ -102,8 +104,25 @@ def _angles_in(value: Any) -> list[float]:
     return [float(value[1])] if is_number(value[1]) else [float(angle) for angle in value[1]]
 
 
+def _scalar_last(value: Any, what: str) -> str | None:
+    """A sentence on four numbers that are nearly half a turn about z, and a small turn if their scalar is the last."""
+    if hasattr(value, "as_quat") or len(value) != 4:
+        return None
+    w, x, y, z = map(float, value)
+    if abs(z) < SMALL_TURN:
+        return None
+    turn = math.degrees(2.0 * math.acos(min(1.0, abs(w))))
+    return (
+        f"{what}: ({w:.4g}, {x:.4g}, {y:.4g}, {z:.4g}) turns by {turn:.0f}°, nearly half a turn about z; the order is "
+        f"(w, x, y, z), scalar first. If the scalar is the last number, as in scipy and ROS, give "
+        f"({z:.4g}, {w:.4g}, {x:.4g}, {y:.4g}); half a turn about z without this warning is ((0, 0, 1), math.pi)"
+    )
+
+
 def orientation_doubt(value: Any, what: str) -> str | None:
-    """A sentence on Euler angles at the singularity of their sequence, or on angles beyond a turn."""
+    """A sentence on angles beyond a turn, quaternions in another order, and singular Euler angles."""
+    if text := _scalar_last(value, what):
+        return text
     beyond = max(map(abs, _angles_in(value)), default=0.0)
     if beyond > 2.0 * math.pi:
         return (

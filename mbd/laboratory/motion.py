@@ -19,7 +19,7 @@ from mbd.compile.python import array_function
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
-from mbd.forces.samples import Samples
+from mbd.forces.samples import Samples, in_degrees
 from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
 from mbd.laboratory.recording import Recording
 from mbd.notes import doubt
@@ -183,19 +183,16 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
 
 def _in_degrees(equations: Equations, columns: Mapping[str, _Column]) -> list[str]:
     """Sentences on angles that swing to and fro by more than a turn, as those of a joint do in degrees."""
-    found = []
-    angles = [c for c in equations.coordinates if c.unit == "rad" and c.name in columns]
-    if not angles or len(columns[angles[0].name].value) < 3:
+    angles = [c.name for c in equations.coordinates if c.unit == "rad" and c.name in columns]
+    if not angles:
         return []
-    swings = np.ptp([columns[coordinate.name].value for coordinate in angles], axis=1)
-    for k in np.flatnonzero(swings > math.tau):
-        coordinate, swing = angles[k], float(swings[k])
-        if float(np.sum(np.abs(np.diff(columns[coordinate.name].value)))) > 1.5 * swing:
-            found.append(
-                f"motion: {coordinate.name!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; "
-                "angles are in radians: numpy.radians(…) converts degrees, a file says 'knee.angle [deg]'"
-            )
-    return found
+    wide = np.flatnonzero(np.ptp([columns[name].value for name in angles], axis=1) > math.tau)
+    return [
+        f"motion: {angles[k]!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; "
+        "angles are in radians: numpy.radians(…) converts degrees, a file says 'knee.angle [deg]'"
+        for k in wide
+        if (swing := in_degrees(columns[angles[k]].value))
+    ]
 
 
 def _in_milliseconds(time: Vector) -> list[str]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 from typing import Any
 
 from mbd.bodies.ground import Ground
 from mbd.bodies.link import Link
+from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.spring_leg import SpringLeg
+from mbd.forces.samples import Samples, in_degrees
 from mbd.joints.base import AWAITED, Joint
 from mbd.topology.graph import links_of, spanning_tree
 
@@ -28,7 +32,7 @@ SLOWEST_SAMPLING = 2.0
 
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    parts = (_weights, _lengths, _masses, _turned, _twice, _grips, _periods, _awaited)
+    parts = (_weights, _lengths, _masses, _turned, _twice, _grips, _weak_legs, _driven, _periods, _awaited)
     return [sentence for part in parts for sentence in part(model)]
 
 
@@ -110,6 +114,35 @@ def _grips(model: Any) -> list[str]:
         for contact in getattr(model, "constraints", ())
         if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > GRIPPING
     ]
+
+
+def _weak_legs(model: Any) -> list[str]:
+    """Spring legs that cannot carry the model however far they are compressed, whose stiffness may be in kN/m."""
+    legs = [contact for contact in getattr(model, "constraints", ()) if isinstance(contact, SpringLeg)]
+    mass = sum(getattr(body, "mass", 0.0) for body in getattr(model, "bodies", {}).values())
+    weight = mass * math.hypot(*getattr(model, "gravity", (0.0, 0.0, 0.0)))
+    if not legs or sum(leg.stiffness * leg.length for leg in legs) >= weight:
+        return []
+    return [
+        f"'{leg.name}' of {leg.stiffness:g} N/m and {leg.length:g} m pushes with {leg.stiffness * leg.length:.3g} N at "
+        f"most, the model weighs {weight:.3g} N; stiffness is in N/m, for people who run about "
+        f"20 m g/l = {20.0 * weight / leg.length:.2g} N/m, and {leg.stiffness:g} kN/m is {leg.stiffness * 1e3:g}"
+        for leg in legs
+    ]
+
+
+def _driven(model: Any) -> list[str]:
+    """Angles that follow samples to and fro through more than a turn, which may be in degrees."""
+    found = []
+    for drive in getattr(model, "constraints", ()):
+        if isinstance(drive, Bilateral) and isinstance(drive.value, Samples) and drive.measure.unit == "rad":
+            swing = in_degrees(drive.value.values)
+            if swing:
+                found.append(
+                    f"'{drive.name}' swings an angle to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; "
+                    "angles are in radians: mbd.Samples(time, numpy.radians(values)) converts degrees"
+                )
+    return found
 
 
 def _periods(model: Any) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.assembly.doubtful import WIDE
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.rigid_body import RigidBody
 from mbd.constraints.base import Constraint
@@ -28,6 +29,7 @@ from mbd.laboratory.models.inertia import possible_inertia
 from mbd.laboratory.models.report import ImportedModel, ImportReport
 from mbd.laboratory.models.xml import Element, read_xml
 from mbd.model import Model
+from mbd.notes import doubt
 
 __all__ = ["read_urdf"]
 
@@ -73,6 +75,7 @@ def read_urdf(path: Path, base: str, stops: bool, losses: bool, repair: bool) ->
     model.connect(*joints.values())
     model.constrain(*held)
     _summary(root, links, bodies, stops, losses, report)
+    doubt(*_limits_in_degrees(links, root.file))
     return ImportedModel(model, bodies, joints, report)
 
 
@@ -224,6 +227,26 @@ def _stops(each: Element, joint: Joint, report: ImportReport) -> list[Constraint
     return [
         Unilateral(f"{joint.name} lower stop", extension(joint, offset=lower)),
         Unilateral(f"{joint.name} upper stop", flexion(joint, offset=-upper)),
+    ]
+
+
+def _limits_in_degrees(links: list[Element], file: Any) -> list[str]:
+    """A sentence on limits of angles that are whole numbers beyond `WIDE`, as degrees are."""
+    limits = [(_plain(each.get("name")), each.find("limit")) for each in links if each.get("type") == "revolute"]
+    both = ("lower", "upper")
+    ends = {name: [limit.numbers(key, 1, (0.0,))[0] for key in both] for name, limit in limits if limit is not None}
+    wide = {
+        name: max(pair, key=abs)
+        for name, pair in ends.items()
+        if WIDE < max(map(abs, pair)) <= 360.0 and all(end.is_integer() for end in pair)
+    }
+    if not wide:
+        return []
+    name, angle = next(iter(wide.items()))
+    others = f" and of {len(wide) - 1} more" if len(wide) > 1 else ""
+    return [
+        f"{file}: a limit of {name!r}{others} is {angle:g} rad, {angle / math.tau:.1f} turns; URDF has radians, and "
+        f"{angle:g}° is {math.radians(angle):.4g}"
     ]
 
 
