@@ -1,4 +1,4 @@
-"""Beside OpenSim itself, where its package is installed: inverse dynamics and lengths of muscles of `.osim` files.
+"""Beside OpenSim itself, where its package is installed: inverse dynamics, lengths of muscles, surfaces, activations.
 
 `MBD_OSIM` may name a folder with further files, which are never copied here: the gait models of `osim-rl` 3.0.11, say.
 """
@@ -92,3 +92,54 @@ def test_moments_and_muscles_are_those_of_opensim(file, tmp_path):
         if lengths is not None and f"{name}.length" in lengths and not muscle.getGeometryPath().getWrapSet().getSize():
             length = muscle.getGeometryPath().getLength(state)
             assert lengths[f"{name}.length"][2] == pytest.approx(length, abs=1e-12), name
+
+
+WHOLE = """<OpenSimDocument Version="40000"><Model name="surface"><gravity>0 -9.81 0</gravity>
+<Ground name="ground"><WrapObjectSet><objects>{surface}</objects></WrapObjectSet></Ground>
+<BodySet><objects><Body name="end"><mass>1</mass><mass_center>0 0 0</mass_center><inertia>1 1 1 0 0 0</inertia></Body>
+</objects></BodySet><JointSet><objects><CustomJoint name="move">
+<socket_parent_frame>/ground</socket_parent_frame><socket_child_frame>/bodyset/end</socket_child_frame>
+<coordinates><Coordinate name="x"/><Coordinate name="y"/><Coordinate name="z"/></coordinates><SpatialTransform>
+{axes}</SpatialTransform></CustomJoint></objects></JointSet>
+<ForceSet><objects><DeGrooteFregly2016Muscle name="muscle"><GeometryPath><PathPointSet><objects>
+<PathPoint name="1"><socket_parent_frame>/ground</socket_parent_frame><location>{start}</location></PathPoint>
+<PathPoint name="2"><socket_parent_frame>/bodyset/end</socket_parent_frame><location>0 0 0</location></PathPoint>
+</objects></PathPointSet><PathWrapSet><objects><PathWrap name="around"><wrap_object>thing</wrap_object>
+<range>-1 -1</range></PathWrap></objects></PathWrapSet></GeometryPath></DeGrooteFregly2016Muscle></objects></ForceSet>
+</Model></OpenSimDocument>"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["WrapSphere", "WrapCylinder"])
+def test_paths_around_surfaces_are_those_of_opensim(kind, tmp_path):
+    """Around a sphere and across a cylinder to round-off; obliquely OpenSim's way is longer than the shortest one."""
+    axes = "".join(
+        f"""<TransformAxis name="rotation{k + 1}"><axis>{a}</axis><Constant><value>0</value></Constant></TransformAxis>
+<TransformAxis name="translation{k + 1}"><coordinates>{"xyz"[k]}</coordinates><axis>{a}</axis>
+<LinearFunction><coefficients>1 0</coefficients></LinearFunction></TransformAxis>"""
+        for k, a in enumerate(("1 0 0", "0 1 0", "0 0 1"))
+    )
+    rng, path, bent = np.random.default_rng(5), tmp_path / "surface.osim", 0
+    for _ in range(12):
+        rise = 0.0 if kind == "WrapSphere" else rng.choice([0.0, 0.05])
+        away, turn = rng.uniform(0.04, 0.1), rng.uniform(0.0, 6.0)
+        start = (away * np.cos(turn), away * np.sin(turn), 0.02 if kind == "WrapSphere" else 0.0)
+        end = (-1.2 * start[0] + 0.01, -1.2 * start[1] + 0.01, -start[2] + rise)
+        surface = f"""<{kind} name="thing"><xyz_body_rotation>0 0 0</xyz_body_rotation><translation>0 0 0</translation>
+<quadrant>all</quadrant><radius>0.03</radius><length>1</length></{kind}>"""
+        text = WHOLE.format(surface=surface, axes=axes, start="{:.17g} {:.17g} {:.17g}".format(*start))
+        path.write_text(text.replace("<length>1</length>", "") if kind == "WrapSphere" else text)
+        _, theirs, state, coordinates = opened(path)
+        for coordinate, value in zip(coordinates, end, strict=True):
+            coordinate.setValue(state, value, False)
+        theirs.realizePosition(state)
+        other = theirs.getMuscles().get(0).getGeometryPath().getLength(state)
+        found = mbd.read_model(path)
+        motion = {"time": [0.0]} | {f"{name}.displacement": [value] for name, value in zip("xyz", end, strict=True)}
+        ours = mbd.muscle_forces(found.model, motion, muscles=found.muscles)["muscle.length"][0]
+        bent += ours > np.linalg.norm(np.subtract(end, start)) + 1e-6
+        if rise == 0.0:
+            assert ours == pytest.approx(other, abs=1e-12)
+        else:
+            assert other - 1e-3 < ours < other + 1e-12
+    assert bent > 6

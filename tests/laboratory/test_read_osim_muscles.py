@@ -52,6 +52,66 @@ def with_muscle(version, text):
     return whole[:a] + text + whole[b:]
 
 
+def around(name, reach="-1 -1"):
+    return f"""<PathWrapSet><objects><PathWrap name='w'><wrap_object>{name}</wrap_object>
+<range>{reach}</range></PathWrap></objects></PathWrapSet>"""
+
+
+def with_surfaces(text, surfaces, body="femur"):
+    """The document with surfaces in a body."""
+    start = text.index(f"<Body name='{body}'>") + len(f"<Body name='{body}'>")
+    return f"{text[:start]}<WrapObjectSet><objects>{surfaces}</objects></WrapObjectSet>{text[start:]}"
+
+
+SPHERE = """<WrapSphere name="knob"><xyz_body_rotation>0.1 0.2 0.3</xyz_body_rotation>
+<translation>0.01 -0.4 0</translation>
+<quadrant>all</quadrant><radius>0.03</radius></WrapSphere>"""
+ROD = """<WrapCylinder name="rod"><xyz_body_rotation>0.1 0.2 0.3</xyz_body_rotation>
+<translation>0.02 -0.39 0</translation>
+<quadrant>+x</quadrant><radius>0.025</radius><length>0.2</length></WrapCylinder>"""
+
+
+@pytest.mark.parametrize("version", FORMATS)
+@pytest.mark.parametrize(("name", "surface"), [("knob", SPHERE), ("rod", ROD)])
+def test_a_path_goes_around_the_surfaces_of_bodies(version, name, surface, tmp_path):
+    """The same path by words of our own."""
+    text = with_muscle(version, muscles(version, wrap=around(name, "3 4")))
+    found = mbd.read_model(written(tmp_path, with_surfaces(text, surface)))
+    path = found.muscles["vasti"].path.points
+    assert [isinstance(point, mbd.WrappingSphere | mbd.WrappingCylinder) for point in path] == [False] * 3 + [
+        True,
+        False,
+    ]
+    femur = found.bodies["femur"]
+    frame = femur.point(0.01, -0.4, 0.0) if name == "knob" else femur.point(0.02, -0.39, 0.0)
+    for k, axis in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
+        frame = frame.turned(0.1 * (k + 1), axis)
+    own = mbd.WrappingSphere(frame, 0.03) if name == "knob" else mbd.WrappingCylinder(frame, 0.025, side=(1, 0, 0))
+    rigid = {"tendon": "rigid", "activation_time": 0.0, "deactivation_time": 0.0}
+    paths = {"theirs": path, "ours": (*path[:3], own, path[4]), "straight": (*path[:3], path[4])}
+    muscles_of = [mbd.Muscle(name, points, 1.0, 0.1, 0.1, **rigid) for name, points in paths.items()]
+    found.model.apply(*muscles_of)
+    bent = 0
+    for knee in -1.3, -0.9, -0.2:
+        state = mbd.assemble(found.model, found.posture | {"knee.angle": knee})
+        assert state["theirs.length"] == pytest.approx(state["ours.length"], abs=1e-14)
+        bent += state["theirs.length"] > state["straight.length"] + 1e-5
+    assert bent
+
+
+def test_surfaces_that_paths_name_must_be_there(tmp_path):
+    text = with_muscle("40000", muscles("40000", wrap=around("rod")))
+    with pytest.raises(mbd.ModelError, match="names the surface 'rod', which no body has"):
+        mbd.read_model(written(tmp_path, text))
+    with pytest.raises(mbd.ModelError, match="needs a radius above 0 m"):
+        mbd.read_model(written(tmp_path, with_surfaces(text, ROD.replace("0.025", "-1"))))
+    off = ROD.replace("<quadrant>", "<active>false</active><quadrant>")
+    found = mbd.read_model(written(tmp_path, with_surfaces(text, off)))
+    assert not any("Wrapping" in type(point).__name__ for point in found.muscles["vasti"].path.points)
+    odd = mbd.read_model(written(tmp_path, with_surfaces(text, ROD.replace("+x", "z"))))
+    assert any("not on its side 'z'" in line for line in odd.report.approximated)
+
+
 @pytest.mark.parametrize("version", FORMATS)
 def test_a_path_has_the_length_of_its_points(version, tmp_path):
     found = mbd.read_model(written(tmp_path, with_muscle(version, muscles(version))))
@@ -76,9 +136,9 @@ def test_a_path_has_the_length_of_its_points(version, tmp_path):
 
 
 def test_what_is_not_kept_is_said(tmp_path):
-    wrap = "<PathWrapSet><objects><PathWrap name='w'><wrap_object>rod</wrap_object></PathWrap></objects></PathWrapSet>"
-    found = mbd.read_model(written(tmp_path, with_muscle("40000", muscles("40000", "DeGrooteFregly2016Muscle", wrap))))
-    assert any("wrapping surfaces go straight" in line for line in found.report.approximated)
+    text = with_muscle("40000", muscles("40000", "DeGrooteFregly2016Muscle", around("egg", "1 2")))
+    found = mbd.read_model(written(tmp_path, with_surfaces(text, "<WrapEllipsoid name='egg'/>")))
+    assert any("around <WrapEllipsoid> go straight" in line for line in found.report.approximated)
     assert found.muscles["vasti"].damping == 0.0
     assert "1 muscles" in " ".join(found.report.understood)
     off = muscles("40000", more="<appliesForce>false</appliesForce>")

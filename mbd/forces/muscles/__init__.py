@@ -2,5 +2,6 @@
 
 from mbd.forces.muscles.muscle import Muscle
 from mbd.forces.muscles.paths import PolynomialPath, ViaPoint
+from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingSphere
 
-__all__ = ["Muscle", "PolynomialPath", "ViaPoint"]
+__all__ = ["Muscle", "PolynomialPath", "ViaPoint", "WrappingCylinder", "WrappingSphere"]

@@ -62,7 +62,8 @@ class Muscle(Force):
     Parameters
     ----------
     name : its name
-    path : points on bodies from origin to insertion (frames or `ViaPoint`), or a `PolynomialPath`
+    path : points on bodies from origin to insertion (frames or `ViaPoint`), between them surfaces that it wraps around
+        (`WrappingSphere`, `WrappingCylinder`), or a `PolynomialPath`
     max_force : F_max of the fibers, isometric [N]
     fiber_length : optimal length of the fibers [m]
     tendon_length : slack length of the tendon [m]
@@ -173,7 +174,8 @@ class Muscle(Force):
         least = self._curves.least_damping if self.is_elastic else 0.0
         found[f"{self.name}.damping"] = Domain(low=least) if least else at_least_zero()
         found[f"{self.name}.excitation"] = Domain(0.0, 1.0)
-        return found
+        of_path: dict[str, Domain] = self.path.domains(self.name)
+        return found | of_path
 
     def laws(self) -> tuple[str, ...]:
         """`excitation` where it is no number."""

@@ -1,4 +1,4 @@
-"""Paths of muscles: straight lines through points, and polynomials of joint angles; their length is a function of q.
+"""Paths of muscles: lines through points and around surfaces, and polynomials of joint angles; lengths l(q).
 
 A muscle acts on the rate of its length, so that its moment arm is exactly −∂l/∂q whatever the path is.
 """
@@ -14,10 +14,12 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.algebra import Triple, difference, norm, rotate, total
 from mbd.bodies.base import Frame
+from mbd.bodies.domains import Domain
 from mbd.bodies.values import number, shown, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of, joint_of
+from mbd.forces.muscles.wrapping import WrappingSurface, taut
 from mbd.forces.quantities import Mention, arguments_of, mentioned, triple_at, triple_of, value_parameters
 from mbd.joints.base import Joint
 from mbd.scope import Scope
@@ -90,40 +92,60 @@ class Path(ABC):
         """Run-time parameters by full name; none by default."""
         return {}
 
+    def domains(self, owner: str) -> dict[str, Domain]:
+        """What its parameters may be, where they may not be any number."""
+        return {}
+
 
 @dataclass(frozen=True)
 class PointPath(Path):
-    """Straight lines from point to point; conditional points join the path within their range."""
+    """Straight lines from point to point, and around the surfaces between them.
 
-    points: tuple[Frame | ViaPoint, ...]
+    Conditional points join the path within their range; the surfaces before one are met where it is met.
+    """
+
+    points: tuple[Frame | ViaPoint | WrappingSurface, ...]
 
     def mentions(self) -> list[Mention]:
-        """Of its points."""
+        """Of its points and surfaces."""
         found: list[Mention] = []
         for point in self.points:
             found += [point] if isinstance(point, Frame) else point.mentions()
         return found
 
     def parameters(self, owner: str) -> dict[str, float]:
-        """Of points that move."""
+        """Of points that move, and of surfaces."""
         found: dict[str, float] = {}
         for k, point in enumerate(self.points):
-            found |= point.parameters(f"{owner} point {k + 1}") if isinstance(point, ViaPoint) else {}
+            found |= point.parameters(f"{owner} point {k + 1}") if not isinstance(point, Frame) else {}
+        return found
+
+    def domains(self, owner: str) -> dict[str, Domain]:
+        """Radii are positive."""
+        found: dict[str, Domain] = {}
+        for k, point in enumerate(self.points):
+            found |= point.domains(f"{owner} point {k + 1}") if isinstance(point, WrappingSurface) else {}
         return found
 
     def length(self, scope: Scope, owner: str) -> Scalar:
-        """Σ |p_k − p_l| over points k of the path and the point l before each."""
+        """Σ over points k of the way from the point before, straight or around the surfaces between both."""
         whole: Scalar = 0.0
         last: Triple | None = None
         before: Frame | None = None
+        over: list[tuple[int, WrappingSurface]] = []
         for k, point in enumerate(self.points):
+            if isinstance(point, WrappingSurface):
+                over.append((k, point))
+                continue
             via = point if isinstance(point, ViaPoint) else ViaPoint(point)
             place = via.position(scope, f"{owner} point {k + 1}")
             still = via.frame if via.place is None else None
             if last is None:
                 last, before = place, still
                 continue
-            if before is not None and still is not None and before.body is still.body:  # whatever the posture
+            if over:
+                piece, over = taut(scope, owner, last, place, over), []
+            elif before is not None and still is not None and before.body is still.body:  # whatever the posture
                 piece = norm(difference(still.placement(scope)[1], before.placement(scope)[1]))
             else:
                 piece = norm(difference(place, last))
@@ -244,10 +266,11 @@ def path_of(value: Any, what: str) -> Path:
     if isinstance(value, Path):
         return value
     points = tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else ()
-    if len(points) < 2 or not all(isinstance(point, Frame | ViaPoint) for point in points):
+    known = all(isinstance(point, Frame | ViaPoint | WrappingSurface) for point in points)
+    if len(points) < 2 or not known or any(isinstance(points[k], WrappingSurface) for k in (0, -1)):
         raise ModelError(
-            f"{what} is two points at least, such as (thigh.point(0.03, -0.1), shank.point(0.04, -0.05)), or a "
-            f"mbd.PolynomialPath; got {shown(value)[:80]}"
+            f"{what} is two points at least, such as (thigh.point(0.03, -0.1), shank.point(0.04, -0.05)), with "
+            f"surfaces between points, or a mbd.PolynomialPath; got {shown(value)[:80]}"
         )
     for end in points[0], points[-1]:
         if isinstance(end, ViaPoint) and end.joint is not None:

@@ -21,6 +21,7 @@ from mbd.laboratory.models.osim_elements import (
 )
 from mbd.laboratory.models.osim_file import OsimFile, body_named, body_of_socket, coordinate_named
 from mbd.laboratory.models.osim_functions import Linear, function_of, is_left_out
+from mbd.laboratory.models.osim_surfaces import surfaces_of
 from mbd.laboratory.models.xml import Element
 from mbd.tape.functions import clip
 
@@ -44,7 +45,8 @@ def is_muscle(element: Element) -> bool:
 def muscles_of(file: OsimFile) -> dict[str, Muscle]:
     """Muscles by name; what of them is approximated or left out is in the report."""
     found: dict[str, Muscle] = {}
-    wrapped, others, off, pathless = list[str](), list[str](), list[str](), list[str]()
+    others, off, pathless = list[str](), list[str](), list[str]()
+    surfaces = surfaces_of(file)
     taken = {*file.bodies, *file.joints, *file.carriers, *(each.name for each in file.held), "ground"}
     for element in objects_in(file.source, "ForceSet"):
         if not is_muscle(element):
@@ -58,20 +60,22 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
         if path is None:
             pathless.append(given)
             continue
-        if any(True for _ in objects_in(path, "PathWrapSet")):
-            wrapped.append(name)
         if element.tag not in SAME:
             others.append(name)
         try:
-            found[name] = _muscle(file, element, name, list(_points(file, path, name)))
+            points = list(_points(file, path, name))
+            bodies = [(point.frame if isinstance(point, ViaPoint) else point).body for point in points]
+            between = [*surfaces.between(path, name, bodies), []]
+            whole = [part for point, over in zip(points, between, strict=True) for part in (point, *over)]
+            found[name] = _muscle(file, element, name, whole)
         except ModelError as error:
             if str(error).startswith(file.source.file):
                 raise
             raise element.wrong(str(error)) from None
     report = file.report
-    if wrapped:
+    for kind, muscles in surfaces.straight.items():
         report.approximated.append(
-            f"paths over wrapping surfaces go straight, so that their moment arms differ: {listed(wrapped)}"
+            f"paths around {kind} go straight, so that their moment arms differ: {listed(dict.fromkeys(muscles))}"
         )
     if others:
         report.approximated.append(f"curves of De Groote and Fregly stand for others: {listed(others)}")
