@@ -37,8 +37,8 @@ from mbd.tape.elimination import factors
 from mbd.tape.node import Node, Scalar
 
 __all__ = [
-    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "correction", "free_rates",
-    "guard_terms", "guards", "increment_rates", "is_judged", "loaded_balance", "mass_matrix", "newton",
+    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "constraint_terms", "correction",
+    "free_rates", "guard_terms", "guards", "increment_rates", "is_judged", "loaded_balance", "mass_matrix", "newton",
     "residual", "row_forces", "scales", "switched_balance",
 ]  # fmt: skip
 
@@ -208,6 +208,14 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     out += [tape.input("anchor", turn.anchor) for turn in equations.turns]
     out += [equations.kinetic, *(friction.limit_at_speed(smooth) for friction in equations.frictions)]
     return out + [entry for impulse in equations.impulses for entry in impulse.vector]
+
+
+def constraint_terms(equations: Equations, rows: Sequence[int]) -> list[Node]:
+    """h, ``ḣ = B v + h_t``, γ of ``ḧ = B v̇ + γ``, and B row by row, of some rows."""
+    rates = [equations.rows[k].rate for k in rows]
+    B = constraint_jacobian(equations, rows)
+    values = [equations.rows[k].value for k in rows]
+    return [*values, *rates, *_time_rates(equations, rates), *(entry for line in B for entry in line)]
 
 
 def guards(equations: Equations) -> list[Node]:

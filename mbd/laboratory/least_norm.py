@@ -9,7 +9,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import RANK_RTOL
 
-__all__ = ["Balanced", "balanced"]
+__all__ = ["Balanced", "balanced", "left_inverses"]
 
 MAX_CONDITION = 1e6
 """Product of the largest elements of a triangle and of its inverse up to which its rank is beyond doubt [-]."""
@@ -48,7 +48,7 @@ def balanced(g: Matrix, R: NDArray[np.float64], driven: NDArray[np.bool_]) -> Ba
     if not m or not count:
         return Balanced(effort, np.zeros((count, m)), residual)
     upper, lower = R[:, ~driven, :], R[:, driven, :]
-    back = _left_inverse(upper)
+    back = left_inverses(upper)
     if back is not None:  # the usual case: the balance where nothing drives determines λ
         lam = -_applied(back, g[:, ~driven])
         residual[:, ~driven] = g[:, ~driven] + _applied(upper, lam)
@@ -65,11 +65,17 @@ def balanced(g: Matrix, R: NDArray[np.float64], driven: NDArray[np.bool_]) -> Ba
     return Balanced(effort, lam, residual, int((m - held).max()), bool(np.any(moved > 0)))
 
 
-def _left_inverse(matrices: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """``(AᵀA)⁻¹ Aᵀ`` by A = Q U of each matrix (R, n, m), n ≥ m; None where one of them is near a loss of rank."""
-    n, m = matrices.shape[1:]
+def left_inverses(matrices: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """``(AᵀA)⁻¹ Aᵀ`` by A = Q U of each matrix (R, n, m), n ≥ m; None where one of them is near a loss of rank.
+
+    Where all are the same, as those of couplers and of motions that are functions of coordinates are, one is inverted.
+    """
+    count, n, m = matrices.shape
     if n < m:
         return None
+    if count > 1 and np.array_equal(matrices, np.broadcast_to(matrices[:1], matrices.shape)):
+        one = left_inverses(matrices[:1])
+        return None if one is None else np.broadcast_to(one, (count, m, n))
     Q, U = np.linalg.qr(matrices)
     if not np.all(np.abs(np.diagonal(U, axis1=1, axis2=2)) > 0.0):
         return None

@@ -20,6 +20,7 @@ from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.forces.samples import Samples, in_degrees
+from mbd.laboratory.closed_loops import close_loops, refuse_open_loops
 from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
 from mbd.laboratory.recording import Recording
 from mbd.notes import doubt
@@ -28,10 +29,6 @@ from mbd.trajectory import Trajectory
 
 __all__ = ["Motion", "derivatives", "motion_of", "parameters_of", "record_of"]
 
-CLOSED = 1e-11
-"""Residual of rows up to which coordinates that were not given are completed, over the largest row [-]."""
-MAX_CORRECTIONS = 30
-"""Newton corrections of one frame of a loop."""
 SECONDS_APART = 2.0
 """Time between frames above which it may be in milliseconds [s]."""
 
@@ -315,47 +312,22 @@ def _bilateral(equations: Equations) -> list[tuple[int, Any]]:
 def _closed(
     model: Any, mechanism: Mechanism, motion: Motion, missing: list[str], changed: Mapping[str, float]
 ) -> Motion:
-    """The motion with the coordinates that the rows determine: positions by Newton's method, from frame to frame."""
-    equations = mechanism.equations
-    whole = equations.configuration
-    names = [c.name for c in equations.coordinates]
-    places = {int(place): k for k, place in enumerate(whole.places) if place >= 0}
-    free = [places[names.index(name)] for name in missing]
-    rows = list(equations.bilateral)
+    """The motion with the coordinates that the rows determine."""
+    names = [c.name for c in mechanism.equations.coordinates]
     position = {name: float(value) for name, value in zip(names, motion.q[0], strict=True) if name not in missing}
-    contacts = [contact.name for contact in equations.contacts]
-    start = assemble(model, position=position, open=contacts, parameters=dict(changed))
-    q, v, a = motion.q.copy(), motion.v.copy(), motion.a.copy()
+    contacts = [contact.name for contact in mechanism.equations.contacts]
+
+    def assembled() -> tuple[Vector, Vector]:
+        start = assemble(model, position=position, open=contacts, parameters=dict(changed))
+        return np.array(start.q), start.anchors
+
     parameters = mechanism.parameters(changed, getattr(model, "parameters", {}))
-    held = [row.is_velocity for _, row in _bilateral(equations)]
-    last = np.array(start.q)
-    for k, t in enumerate(motion.time):
-        at = q[k].copy()
-        own = [names.index(name) for name in missing]
-        at[own] = last[own] if k < 2 else 2.0 * last[own] - q[k - 2][own]
-        for _ in range(MAX_CORRECTIONS):
-            there = mechanism.acceleration_terms(t, at, v[k], parameters, start.anchors)
-            h = np.where(held, 0.0, there.h[rows])
-            step = np.linalg.lstsq(there.B[np.ix_(rows, free)], -h, rcond=None)[0]
-            x = np.zeros(equations.n_v)
-            x[free] = step
-            at = whole.compose(at, x)
-            if np.abs(step).max(initial=0.0) <= CLOSED * max(1.0, np.abs(at).max()):
-                break
-        there = mechanism.acceleration_terms(t, at, v[k], parameters, start.anchors)
-        off = np.abs(np.where(held, 0.0, there.h[rows]))
-        if off.max(initial=0.0) > 1e3 * CLOSED * max(1.0, np.abs(at).max()):
-            row = equations.rows[rows[int(np.argmax(off))]]
-            raise ModelError(
-                f"motion: at t = {t:.6g} s no {missing[0]!r} closes {row.title} (off by {off.max():.3g} {row.unit})"
-            )
-        B = there.B[rows]
-        v[k, free] = np.linalg.lstsq(B[:, free], -there.rate[rows], rcond=None)[0] + v[k, free]
-        there = mechanism.acceleration_terms(t, at, v[k], parameters, start.anchors)
-        a[k, free] = np.linalg.lstsq(B[:, free], -(B @ a[k] + there.bias[rows]), rcond=None)[0] + a[k, free]
-        q[k] = last = at
+    known = (motion.q, motion.v, motion.a)
+    found = close_loops(mechanism, motion.time, known, missing, assembled, parameters)
+    refuse_open_loops(found, mechanism.equations, motion.time, missing)
     shown_names = ", ".join(map(repr, missing[:4])) + (f" and {len(missing) - 4} more" if missing[4:] else "")
-    return Motion(motion.time, q, v, a, None, (*motion.notes, f"{shown_names} follow from the closed loops"))
+    remarks = (*motion.notes, f"{shown_names} follow from the closed loops")
+    return Motion(motion.time, found.q, found.v, found.a, None, remarks)
 
 
 # the record ---------------------------------------------------------------------------------------------------------

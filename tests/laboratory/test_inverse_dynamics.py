@@ -231,6 +231,69 @@ def test_the_angle_of_the_crank_alone_determines_a_loop():
     assert any("follow from the closed loops" in note for note in found.notes)
 
 
+def test_a_loop_follows_its_branch_at_all_frames_at_once(monkeypatch):
+    """What one frame after another gives, over two turns of the crank."""
+    import mbd.laboratory.closed_loops as loops
+
+    time_ = np.linspace(0.0, 4.0, 161)
+    motion = {"time": time_, "drive.angle": math.pi * time_ + 0.3 * np.sin(4.0 * time_)}
+    sequential, at_once = [], []
+    original = loops.close_loops
+
+    def both(mechanism, time, known, missing, assembled, parameters):
+        start, anchors = assembled()
+        names = [c.name for c in mechanism.equations.coordinates]
+        own = [names.index(name) for name in missing]
+        start = start.copy()
+
+        def begun():
+            return start, anchors
+
+        at_once.append(original(mechanism, time, known, missing, begun, parameters))
+        q = []
+        for k in range(len(time)):
+            one = tuple(part[k : k + 1] for part in known)
+            q.append(original(mechanism, time[k : k + 1], one, missing, begun, parameters).q[0])
+            start[own] = q[-1][own] if k < 1 else 2.0 * q[-1][own] - q[-2][own]
+        sequential.append(np.array(q))
+        return at_once[-1]
+
+    monkeypatch.setattr("mbd.laboratory.motion.close_loops", both)
+    mbd.inverse_dynamics(four_bar(), motion, joints=["drive"])
+    assert at_once[0].q == pytest.approx(sequential[0], abs=1e-10)
+    assert np.abs(np.diff(at_once[0].q, axis=0)).max() < 0.3
+
+
+def test_motions_that_are_functions_of_coordinates_have_their_values_and_rates():
+    """A slider that follows sin of an angle, and one that follows the square of the slider."""
+    model = mbd.Model("follower")
+    wheel = mbd.Link("wheel", mass=2.0, length=0.3, center=0.1, inertia=0.02)
+    blocks = [mbd.PointMass(f"block {k}", mass=1.0 + k) for k in range(2)]
+    model.connect(mbd.Revolute("pin", model.ground.origin, wheel.start))
+    for k, block in enumerate(blocks):
+        model.connect(mbd.Prismatic(f"rail {k}", model.ground.point(1.0, k), block.origin, axis=(1.0, 0.0, 0.0)))
+    model.constrain(
+        mbd.Bilateral("cam", mbd.measure(lambda x, q: x - mbd.sin(q), "rail 0.displacement", "pin.angle", unit="m")),
+        mbd.Bilateral(
+            "next", mbd.measure(lambda y, x: y - x**2, "rail 1.displacement", "rail 0.displacement", unit="m")
+        ),
+    )
+    t = np.linspace(0.0, 1.0, 41)
+    q, v, a = 0.3 + 2.0 * t + t**2, 2.0 + 2.0 * t, np.full(41, 2.0)
+    given = {"time": t, "pin.angle": q, "pin.angle.rate": v, "pin.angle.acceleration": a}
+    found = mbd.inverse_dynamics(model, given, joints=["pin"])
+    x, u, b = np.sin(q), v * np.cos(q), a * np.cos(q) - v**2 * np.sin(q)
+    assert found["rail 0.displacement"] == pytest.approx(x, abs=1e-14)
+    assert found["rail 1.displacement"] == pytest.approx(x**2, abs=1e-14)
+    assert found["rail 1.acceleration"] == pytest.approx(2.0 * (u**2 + x * b), abs=1e-12)
+    inertia = 0.02 + 2.0 * 0.1**2
+    power = inertia * v * a + u * b + 2.0 * (2.0 * x * u) * 2.0 * (u**2 + x * b)
+    weight = found["pin.moment"] - power / v  # only gravity is left
+    alone = mbd.inverse_dynamics(model, {"time": t, "pin.angle": q, "pin.angle.rate": 0.0 * t,
+                                         "pin.angle.acceleration": 0.0 * t}, joints=["pin"])  # fmt: skip
+    assert weight == pytest.approx(alone["pin.moment"], abs=1e-11)
+
+
 def test_moments_of_a_loop_with_too_many_drives_are_of_least_norm():
     """Any change that does the same work along the one freedom of the loop is larger."""
     driven = four_bar(lambda t: 3.0 * t)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from mbd.bodies.base import Body
+from mbd.dataclass import dataclass
 from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingSphere, WrappingSurface
 from mbd.laboratory.models.osim_elements import flag_of, number_of, numbers_of, objects_in, plain, text_of
 from mbd.laboratory.models.osim_file import OsimFile, framed
