@@ -36,6 +36,8 @@ FIRST, LARGEST, SMALLEST = 0.02, 0.1, 1e-6
 """First, largest and least distance of two points in (c, p/σ) [-]."""
 GROWTH = 1.5
 """Factor of the distance where corrections were few [-]."""
+SHORT = 1e-3
+"""Part of the first distance from which a test function that jumps is no reason for a shorter one [-]."""
 TURN = 0.3
 """Largest angle between the tangents of two points [rad]."""
 WITHOUT_EFFECT = 1e-13
@@ -223,7 +225,10 @@ def branch(
             break
         new, taken, quick = made
         beyond = (new.value - to) * toward >= 0.0
-        between = special_points(given, last, new, taken)
+        between, complete = special_points(given, last, new, taken)
+        if not (complete or changed_events(last.events, new.events)) and taken > SHORT * FIRST:
+            ds = 0.5 * taken
+            continue
         if changed_events(last.events, new.events):
             limit = limit_between(given, last, taken)
             between += [] if limit is None else [limit]

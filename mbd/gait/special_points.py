@@ -29,6 +29,8 @@ CLOSE, SECANTS = 1e-3, 8
 """Change of the parameter, over its range, from which on derivatives are found with least errors [-], and how often."""
 FINER = 1e-3
 """Residual of gaits at special points over that of others, where it is reached [-]."""
+VANISHED = 0.01
+"""Value of a test function at its zero, over the smaller one at the ends of the bracket, at most [-]."""
 COMPLEX = 1e-7
 """Imaginary part from which on a pair of multipliers is complex [-]."""
 
@@ -82,18 +84,26 @@ KINDS = (*TESTS, "scuff", "graze", "release", "slip", "pull", "new event", "lost
 """Kinds of special points; the others are found in `mbd.gait.limits` and `mbd.gait.margins`."""
 
 
-def special_points(given: Continuation, one: BranchPoint, other: BranchPoint, ds: float) -> list[SpecialPoint]:
-    """The special points between a point and the one that lies ds further along its tangent."""
-    found = []
+def special_points(
+    given: Continuation, one: BranchPoint, other: BranchPoint, ds: float
+) -> tuple[list[SpecialPoint], bool]:
+    """The special points between a point and the one that lies ds further along its tangent; whether these are all.
+
+    They are not where a test function changes its sign and is zero nowhere between: both points may then lie on two
+    branches.
+    """
+    found, complete = list[SpecialPoint](), True
     for kind, test in TESTS.items():
         ends = test(one), test(other)
         if kind == "torus" and len(one.multipliers.values) != len(other.multipliers.values):
             continue  # a direction was forgotten on the way, whose multiplier of 0 is a factor −1 of each pair
         if np.isfinite(ends).all() and ends[0] * ends[1] < 0.0:
             located = _located(given, one, other, ds, test)
-            if located is not None and _is_one(kind, located[0]):
+            if located is None or abs(test(located[0])) > VANISHED * min(map(abs, ends)):
+                complete = False
+            elif _is_one(kind, located[0]):
                 found.append(SpecialPoint(kind, located[0].value, *located))
-    return sorted(found, key=lambda special: abs(special.value - one.value))
+    return sorted(found, key=lambda special: abs(special.value - one.value)), complete
 
 
 def _is_one(kind: str, point: BranchPoint) -> bool:

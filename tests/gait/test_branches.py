@@ -237,3 +237,14 @@ def test_multipliers_and_doublings_of_the_compass_gait_are_those_of_the_cases():
         assert abs(np.min(one.gait(math.radians(slope)).multipliers.real) - multiplier) < 1e-6
     (second,) = mbd.branch(one.switch(first), "slope", 0.0875).points("doubling")
     assert abs(second.value - reference["slope of period doubling 2 -> 4 steps"].value) < 1e-9
+
+
+@pytest.mark.parametrize(("gap", "step"), [(0.003, 0.1), (0.0005, 0.02)])
+def test_a_branch_does_not_jump_to_its_neighbour(gap: float, step: float):
+    """Fixed points x = −p² and x = gap − p², whose multipliers are 1 ± 5 gap: ahead along a tangent lies the other."""
+    gait = cycle_of(f"x - 5*(x + p**2)*(x + p**2 - {gap})", "0.3*y + 0.2*x", 0.05, -0.0025, -0.0005 / 0.7)
+    assert abs(gait.state["x"] + 0.0025) < 1e-9
+    found = mbd.branch(gait, "scale", 0.6, step=step)
+    x = np.array([point.state["x"] for point in found.curve])
+    assert np.max(np.abs(x + found["scale"] ** 2)) < 1e-6
+    assert found["scale"][-1] == 0.6 and not found.special
