@@ -9,7 +9,7 @@ from benchmarks.peers.command import SYSTEMS, Comparison
 from benchmarks.peers.race import Result
 from benchmarks.peers.scenes import SCENES
 
-__all__ = ["GROUPS", "page", "table", "write"]
+__all__ = ["GROUPS", "page", "settings", "table", "write"]
 
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 GROUPS = {
@@ -22,47 +22,76 @@ LOOP, CALL = "mbd, loop", "mbd, call"
 
 HEAD = """# Beside other systems
 
-The same scenes, with the same physics and the same measure of error, in `mbd` and in other multibody systems, all in
-one run of `python -m benchmarks peers`, which writes this page. The scenes, their numbers and the reference motions
-(equations derived by hand, DOP853 at 1e-13, impacts located) stand in `benchmarks/peers`.
+`mbd` and five other multibody systems simulate the same scenes. `python -m benchmarks peers` measures all of them in
+one run and writes this page. The folder `benchmarks/peers` holds the parameters of each scene and the reference
+motions: equations derived by hand, integrated by DOP853 at 1e-13 with impacts located.
 
-- **Times** are seconds of processor time, one thread, the least of up to five repeats, of the simulation loop alone: no
-  import, no building of models, no reading of results. For `mbd` two columns: *call* is `mbd.simulate` as a user calls
-  it, with the code of the model already made; *loop* is the time inside its kernel.
-- **Errors** are the largest absolute difference from the reference at any output time [rad, m; rates and strike times
-  in S4]. A cell is the fastest setting tried that reaches the error; '-' means that none did, or that the scene cannot
-  be built as it is stated. Finer settings than the first that takes longer than 0.4 s are not tried.
-- **In space** (S7) every system is tried with ball joints as it has them and with three hinges in the place of each,
-  `mbd` too; the largest difference of any center of mass counts [m], of the top that of its axis, of the coin that of
-  center and axis. DART and the implicit schemes of others are of order 1 or 2. Pinocchio is a library of equations
-  without a simulator: its loops are Python, whose share is large for small models. Rolling without slip is a joint of
-  Exudyn; the others have contacts with friction only, which is another scene.
-- **By hand** is no framework: equations derived for the one scene and compiled, in loops compiled with them (`numba`),
-  or called by `solve_ivp` (`scipy`; of S4 the reference's own code, with events and, in S4c and S4d, a largest step).
-  They are the floor.
-- A machine that is shared with other work makes all times longer, those of large models and of memory most. What counts
-  is how columns of one run compare.
-- Settings were chosen to span the errors, for every system from its usual way of working to what its documentation
-  offers beyond; a user who knows a system better may get more out of it.
+- **Times** are processor times of one thread, the best of up to five runs. They exclude import, model building and
+  reading of results. `mbd` has two columns: *call* is `mbd.simulate` as you call it, once the model is compiled;
+  *loop* is the time inside its kernel.
+- **Errors** are the largest absolute difference from the reference at any output time. Each scene says what is
+  compared.
+- **A cell** is the time of the fastest setting that reaches the error. A dash means that no setting tried reached it,
+  or that the system cannot build the scene as stated. Settings finer than the first that took over 0.4 s were not
+  tried.
+- **By hand** is the floor: equations derived for that one scene, in a compiled loop (`numba`) or called by
+  `solve_ivp` (`scipy`).
+
+Compare columns, not absolute times: the machine was shared with other work. Every system ran with its usual settings
+and with what its documentation recommends for accuracy, but an expert may get more out of it. [Settings of the
+comparison](peers-settings.md) lists the settings of `mbd`, those that failed, and how scenes were built.
+"""
+
+SETTINGS = """# Settings of the comparison
+
+[Beside other systems](peers.md) shows how long `mbd` and other systems take for an error. This page lists the
+settings behind its cells.
+
+- In space (S7) each system was tried with its own ball joints and with three hinges in place of each; the faster
+  result counts.
+- DART and the implicit schemes of other systems have order 1 or 2.
+- Pinocchio computes equations but has no simulator. Its loops are written in Python, which dominates the time of
+  small models.
+- Only Exudyn and `mbd` have rolling without slip as a constraint. The others have frictional contact, which is
+  another scene, so their cells of the coin show a dash.
+- By hand, `scipy` solves the impacts (S4) with the reference's own code: events and, in S4c and S4d, a largest step.
+
+Each entry of `mbd` gives the setting, the error it reached, and steps × time of a step in the loop. Other lists name
+the settings that gave no result, with the message of the system.
 """
 
 
 def page(comparison: Comparison) -> str:
     """The page of the documentation."""
     parts = [HEAD, _participants(comparison)]
-    for group, title in GROUPS.items():
-        names = [name for name in _scenes(comparison) if name.startswith(group)]
-        if names:
-            parts += [
-                f"## {title}\n",
-                f"![work and precision](peers/{group}.png)\n",
-                table(comparison, names),
-                _bests(comparison, names),
-            ]
+    for group, (title, names) in _groups(comparison).items():
+        parts += [
+            f"## {title}\n", _described(names), f"![Time of each system against its error](peers/{group}.png)\n",
+            table(comparison, names),
+        ]  # fmt: skip
     if comparison.starts:
         parts.append(_start_up(comparison))
-    parts.append(_failures(comparison))
     return "\n".join(parts)
+
+
+def settings(comparison: Comparison) -> str:
+    """The page of the settings behind the cells."""
+    parts = [SETTINGS]
+    for title, names in _groups(comparison).values():
+        parts += [f"## {title}\n", _bests(comparison, names)]
+    return "\n".join([*parts, _failures(comparison)])
+
+
+def _groups(comparison: Comparison) -> dict[str, tuple[str, list[str]]]:
+    """Titles and scenes of the sections, by the beginning of their names."""
+    ran = _scenes(comparison)
+    found = {group: (title, [name for name in ran if name.startswith(group)]) for group, title in GROUPS.items()}
+    return {group: section for group, section in found.items() if section[1]}
+
+
+def _described(names: Sequence[str]) -> str:
+    """What is simulated and compared."""
+    return "\n".join(f"- {name}: {SCENES[name].title}; compared: {SCENES[name].shown}" for name in names) + "\n"
 
 
 def table(comparison: Comparison, names: Iterable[str]) -> str:
@@ -119,7 +148,7 @@ def _participants(comparison: Comparison) -> str:
 
 def _bests(comparison: Comparison, names: Sequence[str]) -> str:
     """What `mbd` did in the cells above."""
-    lines = ["`mbd` in these cells (the error reached; steps × time of a step in the loop):\n"]
+    lines = []
     for name in names:
         for error in TOLERANCES:
             best = _reached(comparison, name, LOOP, error)
@@ -131,9 +160,9 @@ def _bests(comparison: Comparison, names: Sequence[str]) -> str:
 
 def _start_up(comparison: Comparison) -> str:
     lines = [
-        "## S6: from a fresh process to the first step\n",
-        "Seconds by the clock from the start of the interpreter to the end of the first step of the double pendulum,",
-        "and in times of a process that imports numpy; code is in the cache, where a system has one.\n",
+        "## From a fresh process to the first step\n",
+        "Wall time from the start of the interpreter to the end of the first step of the double pendulum, in seconds",
+        "and as a multiple of a process that only imports numpy. Compiled code is cached where a system has a cache.\n",
         "| | s | × numpy |", "|---|---|---|",
     ]  # fmt: skip
     numpy = comparison.starts["import numpy"]
@@ -149,13 +178,13 @@ def _failures(comparison: Comparison) -> str:
             failed.setdefault((r.scene, r.system, r.fault), []).append(r.label)
     if not failed:
         return ""
-    lines = ["## Settings without a result\n"]
+    lines = ["## Settings that failed\n"]
     lines += [f"- {scene}, {system}: {', '.join(labels)}: {fault}" for (scene, system, fault), labels in failed.items()]
     return "\n".join(lines) + "\n"
 
 
 def write(comparison: Comparison, folder: Path) -> None:
-    """The page and its pictures."""
+    """The pages and their pictures."""
     from benchmarks.peers.plots import draw
 
     pictures = folder / "peers"
@@ -163,3 +192,4 @@ def write(comparison: Comparison, folder: Path) -> None:
     for group, title in GROUPS.items():
         draw(comparison, group, title, pictures / f"{group}.png")
     (folder / "peers.md").write_text(page(comparison))
+    (folder / "peers-settings.md").write_text(settings(comparison))
