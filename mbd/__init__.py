@@ -206,7 +206,7 @@ if TYPE_CHECKING:
     )
     from mbd.trajectory import Trajectory as Trajectory, load as load
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "mbd.analysis.linearization": "Linearization",
