@@ -1,4 +1,4 @@
-"""``python -m benchmarks [run | compare | baseline | peers | growth | house]``: see README.md here."""
+"""``python -m benchmarks [run | compare | baseline | peers | growth | house | GROUP]``: see README.md here."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from benchmarks.figures import NOISY, table
 from benchmarks.handwritten import compiler
 from benchmarks.run import BASELINE, GROUPS, RESULTS, Record, measure
 
+WHAT = ("run", "compare", "baseline", "peers", "growth", "house")
 DOCS = Path(__file__).parents[1] / "docs"
 
 
@@ -19,9 +20,10 @@ def main() -> int:
     """Measure and print; 1 if a comparison finds a figure more than 15 % worse."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="What mbd costs, measured.")
     parser.add_argument(
-        "what", nargs="?", default="run", choices=("run", "compare", "baseline", "peers", "growth", "house"),
-        help="print the figures; compare them with the baseline; make them the baseline; compare with other systems; "
-        "write the page on how cost grows with bodies; or count lines, constants and imports of the source",
+        "what", nargs="?", default="run", choices=(*WHAT, *GROUPS), metavar="WHAT",
+        help=f"{', '.join(WHAT)}, or a group of figures alone: print the figures; compare them with the baseline; make "
+        "them the baseline; compare with other systems; write the page on how cost grows with bodies; or count lines, "
+        "constants and imports of the source",
     )  # fmt: skip
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS, metavar="GROUP", help=", ".join(GROUPS))
     parser.add_argument("--repeats", type=int, default=7, help="of every measurement, minima count (default 7)")
@@ -31,6 +33,8 @@ def main() -> int:
     )
     parser.add_argument("--largest", type=int, default=growth.LARGEST, help="of 'growth': bodies at most")
     options = parser.parse_args()
+    if options.what in GROUPS:
+        options.what, options.only = "run", [options.what]
     if options.what == "peers":
         return _peers(parser, [word for word in options.scenes.split(",") if word], options.json)
     if options.what == "growth":

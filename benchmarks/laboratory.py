@@ -1,13 +1,16 @@
 """A gait laboratory's day: moments and postures of a person of 34 degrees of freedom, frame by frame.
 
 Inverse dynamics is measured from arrays of angles to moments by name, beside pinocchio's `rnea` of the same tree called
-frame by frame from Python where that is installed; inverse kinematics from 40 markers with errors of 5 mm.
+frame by frame from Python, and from angles alone beside the inverse dynamics tool of OpenSim on the same person written
+as `.osim`, where these are installed; inverse kinematics from 40 markers with errors of 5 mm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
+from tempfile import mkdtemp
 
 import numpy as np
 
@@ -47,13 +50,23 @@ def measure(repeats: int) -> list[Figure]:
     calls = _rnea()
     if calls is not None:
         tasks["pinocchio"] = partial(processor_seconds, calls)
+    tool = _opensim_tool(model)
+    if tool is not None:
+        tasks["filmed"] = partial(processor_seconds, mbd.inverse_dynamics, model, _filmed(model, FRAMES))
+        tasks["opensim"] = tool
     samples = interleaved(tasks, repeats)
     other = samples["pinocchio"].least / FRAMES * 1e6 if calls is not None else None
     yardstick, ratio = ("", None) if other is None else ("rnea from Python", 1.2)
     moments, postures = samples["moments"], samples["postures"]
     value = moments.least / FRAMES * 1e6
+    beside = []
+    if tool is not None:
+        ours, theirs = (samples[name].least / FRAMES * 1e6 for name in ("filmed", "opensim"))
+        spread = samples["filmed"].spread
+        beside = [Figure("the same from angles alone", ours, "µs", 20.0, "OpenSim's tool", theirs, 0.01, spread)]
     return [
         Figure("inverse dynamics, a frame", value, "µs", 20.0, yardstick, other, ratio, moments.spread),
+        *beside,
         Figure("inverse kinematics, a frame", postures.least / MARKED * 1e6, "µs", 1000.0, spread=postures.spread),
     ]
 
@@ -62,7 +75,7 @@ def _motion(model: mbd.Model, count: int) -> dict[str, np.ndarray]:
     """All coordinates with rates and accelerations."""
     equations, rng = mechanism_of(model).equations, np.random.default_rng(0)
     whole = equations.configuration
-    q = whole.normalise(rng.normal(size=(count, equations.n_q)))
+    q = whole.normalise(0.4 * rng.normal(size=(count, equations.n_q)))
     motion = {"time": np.arange(float(count))} | dict(zip(whole.names, q.T, strict=True))
     for name in equations.velocity_names:
         motion[name], motion[f"{name.removesuffix('.rate')}.acceleration"] = rng.normal(size=(2, count))
@@ -96,3 +109,47 @@ def _rnea() -> Callable[[], None] | None:
             pin.rnea(tree, data, q[k], v[k], a[k])
 
     return calls
+
+
+def _filmed(model: mbd.Model, count: int) -> dict[str, np.ndarray]:
+    """Angles alone, of a smooth motion."""
+    whole, rng = mechanism_of(model).equations.configuration, np.random.default_rng(3)
+    time, n_v = np.arange(count) / 100.0, len(mechanism_of(model).equations.velocity_names)
+    x = 0.2 * rng.normal(size=n_v) * np.sin(5.0 * time[:, None] + 3.0 * rng.normal(size=n_v))
+    start = mbd.assemble(model)
+    return {"time": time} | dict(zip(whole.names, whole.compose(np.array(start.q), x).T, strict=True))
+
+
+def _opensim_tool(model: mbd.Model) -> Callable[[], float] | None:
+    """Seconds of OpenSim's inverse dynamics tool, which reads as many frames of the person and writes its moments."""
+    try:
+        import opensim
+    except ImportError:
+        return None
+    opensim.Logger.setLevelString("Off")
+    folder = Path(mkdtemp())
+    mbd.write_model(model, folder / "person.osim")
+    person = opensim.Model(str(folder / "person.osim"))
+    person.initSystem()
+    coordinates = person.getCoordinateSet()
+    names = [coordinates.get(k).getName() for k in range(coordinates.getSize())]
+    rng, time = np.random.default_rng(4), np.arange(FRAMES) / 100.0
+    angles = 0.2 * rng.normal(size=len(names)) * np.sin(5.0 * time[:, None] + 3.0 * rng.normal(size=len(names)))
+    lines = ["\t".join(f"{value:.12g}" for value in (t, *row)) for t, row in zip(time, angles, strict=True)]
+    head = f"motion\nversion=1\nnRows={FRAMES}\nnColumns={len(names) + 1}\ninDegrees=no\nendheader\n"
+    (folder / "motion.sto").write_text(head + "\t".join(["time", *names]) + "\n" + "\n".join(lines) + "\n")
+
+    def seconds() -> float:
+        person = opensim.Model(str(folder / "person.osim"))
+        tool = opensim.InverseDynamicsTool()
+        tool.setModel(person)
+        tool.setCoordinatesFileName(str(folder / "motion.sto"))
+        tool.setEndTime(float(time[-1]))
+        tool.setLowpassCutoffFrequency(-1.0)
+        tool.setResultsDir(str(folder))
+        tool.setOutputGenForceFileName("moments.sto")
+        taken = processor_seconds(tool.run)
+        assert (folder / "moments.sto").exists()
+        return taken
+
+    return seconds

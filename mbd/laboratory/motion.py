@@ -138,6 +138,9 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
             f"{'; the recording has ' + _few(unused) if unused else ''}"
         )
     turned: set[int] = set()
+    charts = {names[first_q + joint.adding + k] for joint, first_q, _ in whole.charts for k in range(4)}
+    plain = [n for n in names if n in columns and n not in charts and columns[n].rate is None]
+    slopes = dict(zip(plain, zip(*_slopes(time, [columns[n].value for n in plain]), strict=True), strict=True))
     for joint, first_q, first_v in whole.charts:
         at = first_q + joint.adding
         parts = names[at : at + 4]
@@ -162,14 +165,12 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
         column, k = columns[name], places[place]
         q[place] = column.value
         rate, acceleration = column.rate, column.acceleration
-        if rate is None or acceleration is None:
-            first, second = derivatives(time, column.value)
-            if rate is None:
-                rate = first
-            elif acceleration is None:
-                second = derivatives(time, rate)[0]
-            differentiated |= acceleration is None
-            acceleration = second if acceleration is None else acceleration
+        if rate is None:
+            rate, second = slopes[name]
+        elif acceleration is None:
+            second = derivatives(time, rate)[0]
+        if acceleration is None:
+            acceleration, differentiated = second, True
         v[k], a[k] = rate, acceleration
     doubt(*_in_degrees(equations, columns), *_in_milliseconds(time), of=model)
     remarks = (f"channels that are no coordinates are not used: {_few(unused)}",) if unused else ()
@@ -294,6 +295,12 @@ def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
 
 def _of_samples(signal: Samples, time: Vector, order: int) -> Vector:
     return np.asarray(signal(time, order), dtype=float)
+
+
+def _slopes(time: Vector, columns: list[Vector]) -> tuple[Matrix, Matrix]:
+    """First and second derivatives of several columns, a row each."""
+    first, second = derivatives(time, np.array(columns).reshape(len(columns), len(time)).T)
+    return np.ascontiguousarray(first.T), np.ascontiguousarray(second.T)
 
 
 def derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:

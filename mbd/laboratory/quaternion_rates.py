@@ -44,5 +44,6 @@ def quaternion_rates(q: Matrix, rate: Matrix, acceleration: Matrix) -> tuple[Mat
 
 def _conjugate_product(q: Matrix, p: Matrix) -> Matrix:
     """The vector part of q* ⊗ p."""
-    w, x = q[:, :1], q[:, 1:]
-    return np.asarray(w * p[:, 1:] - p[:, :1] * x - np.cross(x, p[:, 1:]))
+    (w, x, y, z), (a, b, c, d) = q.T, p.T
+    parts = (w * b - a * x - y * d + z * c, w * c - a * y - z * b + x * d, w * d - a * z - x * c + y * b)
+    return np.stack(parts, axis=1)
