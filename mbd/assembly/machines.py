@@ -31,6 +31,8 @@ def store_first(mechanism: Mechanism, time: float, q: Vector, y: Vector, paramet
     captured = mechanism.acceleration_terms(time, q, y, parameters, anchors).captured
     for machine in machines:
         anchors[list(machine.first)] = captured[list(machine.first)]
+        if not machine.first:  # a law that samples forces: its first sample is due at the start
+            anchors[list(machine.times)] = time
 
 
 def without_held(model: Any, position: Any) -> tuple[Any, dict[str, Any]]:

@@ -62,6 +62,11 @@ class Machine(Constraint):
         return "machine"
 
     @property
+    def reads_before(self) -> bool:
+        """Whether forces that it stores are those just before the instant, as a sensor reads them."""
+        return False
+
+    @property
     @abstractmethod
     def state_names(self) -> tuple[str, ...]:
         """Names of its states."""

@@ -121,6 +121,11 @@ class SampledLaw(Machine):
             if name in ("period", "delay", *labels) or (name in self.states and name in self.outputs):
                 yield f"SampledLaw '{self.name}': {name!r} names two things; rename one"
 
+    @property
+    def reads_before(self) -> bool:
+        """Always: a sample reads what was before its outputs change."""
+        return True
+
     # what it holds --------------------------------------------------------------------------------------------------
     @property
     def own_outputs(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from mbd.equations.effects import causes, effect_of, weight_of
 from mbd.equations.equations import Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.gathered import Gathered
+from mbd.equations.held_forces import HeldForces, held_force_faults
 from mbd.equations.impulses import impulses_of
 from mbd.equations.laws import Laws
 from mbd.equations.machines import declare_machines, machine_guards
@@ -84,13 +85,17 @@ def derivation_faults(model: Description | FrontDoor) -> list[str]:
     return [fault for error in gathered.errors for fault in getattr(error, "faults", (str(error),))]
 
 
-def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] = ()) -> Equations:
+def _derived(
+    model: Description, plan: Plan, carried: Sequence[tuple[str, int]] = (), first: Equations | None = None
+) -> Equations:
     """Kinematics, causes of forces, balance, constraints, results.
 
     Angles of cut joints that forces, rows, contacts, events or controllers depend on, and that only a rotation shows,
-    are `carried` as coordinates of their own in a second derivation.
+    are `carried` as coordinates of their own in a second derivation. Laws that read forces of constraints know their
+    rows from the `first` one.
     """
     scope = DerivationContext(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
+    scope.held_force = held = HeldForces(model, scope, first)
     declare_machines(scope, model.machines, scope.quantities.value)
     scope.offer_frames(model.frames.values())
     scope.parameters.expect(model.parameters)
@@ -145,11 +150,14 @@ def _derived(model: Description, plan: Plan, carried: Sequence[tuple[str, int]] 
         machines=tuple(constraints.machines), impulses=tuple(constraints.impulses),
         geometry=TreeGeometry(scope, dynamics, work, rests, constraints, plan.planar and vectors and not carried),
         frictions=tuple(constraints.frictions), turns=(*scope.turns.values(), *scope.wrapped.values()),
-        facings=_facings(scope, constraints),
+        facings=_facings(scope, constraints), held_forces=tuple(held.asked),
     )  # fmt: skip
     seen = () if carried else _wrapped(scope, equations, model)
-    if seen:
-        return _derived(model, plan, seen)
+    if seen or (held.asked and first is None):
+        return _derived(model, plan, seen or carried, equations if held.asked and not seen else None)
+    if held.asked and (faults := held_force_faults(equations, held.asked)):
+        raise ModelError(faults)
+    scope.held_force = held.asked.get  # results ask again; equations outlive the model, which `held` knows
     whole = work + _closed(scope, constraints)
     offer_results(outputs, scope, dynamics, whole, equations, model, {joint.name for joint in plan.floating})
     offer_whole_body(outputs, scope, masses)

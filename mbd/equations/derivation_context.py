@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -56,6 +56,7 @@ class DerivationContext(ParameterScope):
     bodies : by name, the ground first
     placement : everything in ground axes
     quantities : named results that words may ask for
+    held_force : a force of a constraint, contact or joint by name, None where there is none
     turns : of the cut joints of a planar mechanism, by joint
     wrapped : of angles of cut joints that only a rotation shows, by joint and number
     """
@@ -81,6 +82,7 @@ class DerivationContext(ParameterScope):
         self.gravity = tuple(self.parameters.node(f"gravity.{a}", g) for a, g in zip(AXES, gravity, strict=True))
         self.states: list[tuple[Coordinate, Node]] = []
         self._joints: dict[str, JointMotion] = {}
+        self.held_force: Callable[[str], Node | None] = dict[str, Node]().get
         self._dynamics: Dynamics | None = None
         self._rotors: list[Rotor] = []
         self._inertia: tuple[list[list[Node]], list[Node]] | None = None
@@ -197,7 +199,10 @@ class DerivationContext(ParameterScope):
     def named(self, name: str) -> Node:
         """A named quantity of the configuration or the velocity, or a parameter."""
         value = None if self.quantities.offers(name) else self.parameters.declared(name)
-        return self.quantities(name) if value is None else self.parameter(*_owner_and_field(name), value)
+        if value is not None:
+            return self.parameter(*_owner_and_field(name), value)
+        held = None if self.quantities.offers(name) else self.held_force(name)
+        return self.quantities(name) if held is None else held
 
     def offer_inertia(self, dynamics: Dynamics, rotors: Sequence[Rotor]) -> None:
         """Let laws ask for mass matrices, of bodies and of the rotors on joints of the tree."""

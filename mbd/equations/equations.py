@@ -235,7 +235,7 @@ class Machine:
 
     states : their names; anchors : the numbers that it holds, that of the state first; fields : their names
     times : which of these anchors are instants [s]
-    initial : what they are before the start; first : those that are stored then
+    initial : what they are before the start; first : those that are stored then, none where forces must be known for it
     captured : what is stored into each anchor, on the tape; the anchor itself where nothing is
     """
 
@@ -399,6 +399,7 @@ class Equations:
     facings : of the cut joints whose rows hold sines, see `Facing`
     machines : discrete states, see `Machine`
     impulses : of the user, as contacts close
+    held_forces : names of the forces of constraints, contacts and joints that laws read
     idle : (owner, part) of rows of cut joints that hold whatever the motion, and were left out
     markers : full names of the named points, which pages show
     observations : (name, unit) of the results of users' own; anatomy : (joint, joint of the body) of those that are one
@@ -434,6 +435,7 @@ class Equations:
     markers: tuple[str, ...] = ()
     machines: tuple[Machine, ...] = ()
     impulses: tuple[StrikeImpulse, ...] = ()
+    held_forces: tuple[str, ...] = ()
     observations: tuple[tuple[str, str], ...] = ()
     anatomy: tuple[tuple[str, str], ...] = ()
     shapes: tuple[Shape, ...] = ()

@@ -112,14 +112,17 @@ def machine_guards(
     for m, word in enumerate(words):
         own = held[word.name]
         for k, node in stored[m].items():
-            if any(each.op == "input" and each.data[0] in ("a", "s", "lam") for each in live([node])):
+            jumps = ("a", "s") if word.reads_before else ("a", "s", "lam")
+            if any(each.op == "input" and each.data[0] in jumps for each in live([node])):
                 faults.append(
                     f"'{word.name}' stores {word.fields[k]!r}, which depends on accelerations or forces of contacts; "
                     "they jump at the instant: store what positions and velocities tell"
                 )
+        loads = any(each.op == "input" and each.data[0] == "lam" for each in live(list(stored[m].values())))
+        stored_first = () if loads else tuple(own[k].data[1] for k in first[m])  # forces are known once steps begin
         machines.append(records.Machine(
             word.name, word.state_names, tuple(node.data[1] for node in own), word.fields,
-            tuple(own[k].data[1] for k in word.times), word.initial(values), tuple(own[k].data[1] for k in first[m]),
+            tuple(own[k].data[1] for k in word.times), word.initial(values), stored_first,
             tuple(stored[m].get(k, node) for k, node in enumerate(own)),
         ))  # fmt: skip
     if faults:

@@ -38,8 +38,8 @@ from mbd.tape.node import Node, Scalar
 
 __all__ = [
     "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "constraint_terms", "correction",
-    "free_rates", "guard_terms", "guards", "increment_rates", "is_judged", "loaded_balance", "mass_matrix", "newton",
-    "residual", "row_forces", "scales", "switched_balance",
+    "follows_multipliers", "free_rates", "guard_terms", "guards", "increment_rates", "is_judged", "law_forces",
+    "loaded_balance", "mass_matrix", "newton", "residual", "row_forces", "scales", "switched_balance",
 ]  # fmt: skip
 
 
@@ -183,8 +183,9 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
 
     ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that transitions
     and closing contacts store, in the order of anchors, and the whole turns as they are; T is the kinetic energy. In
-    `impacts`, where c_C is 1, smooth friction of contacts has no impulse, and dry friction of contacts its limit at
-    the slip before them.
+    `impacts`, where c_C is 1, smooth friction of contacts has no impulse, nor have laws that read multipliers, and dry
+    friction of contacts its limit at the slip before them. Where such a law is not linear in them, f + R λ is its
+    tangent at the λ of the block.
     """
     inputs = Inputs.of(equations)
     tape = equations.tape
@@ -192,11 +193,13 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     smooth = 1.0 - inputs.c[0] if impacts else 1.0
     r = switched_balance(equations, smooth)
     rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
-    f = substitute(r, rest)
+    f = [force + bent for force, bent in zip(substitute(r, rest), _bent_forces(equations), strict=True)]
     M = None if equations.geometry is None else equations.geometry.mass_matrix()
     M = _transposed(mass_matrix(equations, r)) if M is None else M
     B = constraint_jacobian(equations, rows)
     right = row_forces(equations, r, rows, B)
+    if impacts and law_forces(equations):
+        right = [_without(inputs.c[0], *pair) for pair in zip(right, law_forces(equations), strict=True)]
     hv = [row.rate for row in equations.rows]
     padding = [tape.zero] * equations.n_z
     out = [entry for line in M for entry in line] + f
@@ -414,10 +417,54 @@ def row_forces(
     B = constraint_jacobian(equations, rows) if B is None else B
     loaded = any(node.op == "input" and node.data[0] == "slip" for node in live(r))
     loaded = loaded or bool(_rubbing(equations, rows))
-    if loaded or any(node.op == "input" and node.data[0] == "lam" for node in live(equations.balance)):
+    if loaded or law_forces(equations):
         return jvps(r, [{inputs.lam[k]: 1.0} for k in rows])
     padding = [equations.tape.zero] * equations.n_z
     return [[*line, *padding] for line in B]
+
+
+def law_forces(equations: Equations) -> list[list[Node]]:
+    """What laws that read multipliers add to ∂r/∂λ, column by column over all rows; empty where none reads any."""
+    if "law forces" not in equations.memory:
+        inputs, laws = Inputs.of(equations), _laws(equations) if equations.held_forces else []
+        reads = any(node.op == "input" and node.data[0] == "lam" for node in live(laws))
+        columns = jvps(laws, [{lam: 1.0} for lam in inputs.lam]) if reads else []
+        equations.memory["law forces"] = columns
+    found: list[list[Node]] = equations.memory["law forces"]
+    return found
+
+
+def follows_multipliers(equations: Equations) -> int:
+    """How the laws of forces follow multipliers: 0 not at all, 1 linearly, 2 in another way."""
+    columns = law_forces(equations)
+    entries = [entry for column in columns for entry in column]
+    bent = any(node.op == "input" and node.data[0] == "lam" for node in live(entries))
+    return 0 if not columns else 1 + int(bent)
+
+
+def _laws(equations: Equations) -> list[Node]:
+    """The balance with penalties behind their switches, without rows."""
+    switches = [(c, equations.tape.input("switch", c)) for c in range(len(equations.contacts))]
+    return _balance(equations, (), switches, ())
+
+
+def _bent_forces(equations: Equations) -> list[Node]:
+    """F(λ) − F(0) − F′(λ) λ of laws F that are not linear in multipliers; zeros for others."""
+    tape, inputs = equations.tape, Inputs.of(equations)
+    if follows_multipliers(equations) < 2:
+        return [tape.zero] * inputs.n
+    still: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s)}
+    laws = substitute(_laws(equations), still)
+    zero = substitute(laws, dict.fromkeys(inputs.lam, 0.0))
+    bent = [at - none for at, none in zip(laws, zero, strict=True)]
+    for lam, column in zip(inputs.lam, law_forces(equations), strict=True):
+        bent = [force - slope * lam for force, slope in zip(bent, column, strict=True)]
+    return bent
+
+
+def _without(part: Node, column: Sequence[Node], law: Sequence[Node]) -> list[Node]:
+    """Column less a part of what laws have in it."""
+    return [entry if slope.is_zero else entry - part * slope for entry, slope in zip(column, law, strict=True)]
 
 
 def _jacobian_rates(equations: Equations, rows: Sequence[int], B: Sequence[Sequence[Node]]) -> Sequence[Sequence[Node]]:

@@ -22,7 +22,7 @@ from mbd.scope import Triple
 from mbd.tape.derivatives import substitute, vjp
 from mbd.tape.node import Scalar
 
-__all__ = ["Wrench", "reaction"]
+__all__ = ["Wrench", "cut_reaction", "reaction"]
 
 
 Direction: TypeAlias = tuple[Triple, Triple]
@@ -39,7 +39,7 @@ class Wrench(NamedTuple):
 def reaction(joint: Joint, scope: DerivationContext, dynamics: Dynamics, work: Work, rows: Sequence[Row]) -> Wrench:
     """The reaction of a joint; `work` holds every force, with all rows and penalties."""
     if any(cut.name == joint.name for cut in scope.cuts):
-        return _of_cut_joint(joint, scope, rows)
+        return cut_reaction(joint, scope, rows)
     body = scope.bodies[joint.child.body.name]
     wrench, R = Wrench(*dynamics.joint_wrench(body, work)), scope.placement.axes(body).rotation
     if isinstance(joint, Reversed):
@@ -104,7 +104,7 @@ def _solved(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
     return b
 
 
-def _of_cut_joint(joint: Joint, scope: DerivationContext, rows: Sequence[Row]) -> Wrench:
+def cut_reaction(joint: Joint, scope: DerivationContext, rows: Sequence[Row]) -> Wrench:
     """From the multipliers of the joint's own rows."""
     tape = scope.tape
     R_free, p_free = placeholders(tape)

@@ -19,6 +19,7 @@ from mbd.joints.base import Joint
 from mbd.joints.named_angles import orientation_names
 from mbd.joints.screw import Screw
 from mbd.topology.graph import disconnected
+from mbd.topology.held_forces import names_of_held_forces
 from mbd.topology.plan import cut_names, is_planar, plan
 
 if TYPE_CHECKING:
@@ -119,10 +120,10 @@ def readable(model: Description) -> list[str]:
 
 def _unknown(model: Description, name: str, known: Iterable[str]) -> str:
     """What is wrong with the name of a quantity that a law of the motion refers to."""
-    if name in readable(model) and not name.endswith((".gap", ".gap_rate")):
+    if name in readable(model):
         return (
-            f"{name!r} is a result of the motion, on which its laws cannot depend; let a mbd.Controller read it, or a "
-            "mbd.Penalty give a force that follows places and rates"
+            f"{name!r} is a result of the motion, on which its laws cannot depend, but for the forces of constraints, "
+            "contacts and joints, such as 'foot.force'; let a mbd.Controller read it"
         )
     return nearest(name, known, "quantity")
 
@@ -249,6 +250,7 @@ def mention_faults(model: Description) -> list[str]:
     known = set(quantities(model))
     known |= {name for word in model.constraints for name in getattr(word, "quantity_names", ())}
     known |= set(model.parameters)
+    held = names_of_held_forces(model)
     known |= {name.removesuffix(".x") for name in known if name.endswith(".x") and f"{name[:-1]}z" in known}
     owners = {force.name for force in model.forces}
     words: list[Force | Constraint] = [*model.forces, *model.constraints]
@@ -267,7 +269,7 @@ def mention_faults(model: Description) -> list[str]:
                 )
                 continue
             state = isinstance(mention, str) and mention.rpartition(".")[0] in owners  # a first-order state of a force
-            if isinstance(mention, str) and mention not in known and not state:
+            if isinstance(mention, str) and mention not in known and mention not in held and not state:
                 found.append(f"'{word.name}': {_unknown(model, mention, known)}")
     if any(controller.reads for controller in model.controllers):
         known = set(readable(model))

@@ -16,6 +16,7 @@ from mbd.joints.planar import Planar
 from mbd.joints.reversed import Reversed
 from mbd.joints.translation import Translation
 from mbd.topology.graph import links_of, mobility, spanning_tree
+from mbd.topology.held_forces import reactions_read
 
 if TYPE_CHECKING:
     from mbd.description import Description
@@ -73,7 +74,8 @@ class Plan:
 
 def plan(model: Description) -> Plan:
     """The tree, the cut joints and the floating bodies of a model whose `cut` is 'auto', 'loops', 'all' or names."""
-    return _plan(model, cut_names(model) | {joint.name for joint in model.joints if needs_reaction(joint)})
+    loaded = {joint.name for joint in model.joints if needs_reaction(joint)}
+    return _plan(model, cut_names(model) | loaded | reactions_read(model))
 
 
 def uncut(model: Description) -> Plan:

@@ -14,7 +14,7 @@ __all__ = ["find_limits", "is_on", "load", "slides", "solve_directed", "whole"]
 
 def solve_directed(K: Balance, level: int) -> int:
     """Solve with the present branches and directions; friction that slides is put into K.impulse of its row."""
-    if K.n_frictions == 0:
+    if K.n_frictions == 0 and (K.loaded == 0 or level != 0):
         load(K, level)
         return solve_at(K, active_rows(K, K.active), level)
     status = 0

@@ -9,6 +9,7 @@ from mbd.kernel import codes
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.diagnostics.causes import Words, cause_of, last_events
+from mbd.simulation.diagnostics.circular import NEARLY, circular_laws
 from mbd.simulation.diagnostics.jamming import may_jam
 from mbd.simulation.diagnostics.residuals import residuals_of
 from mbd.simulation.run.data import RunData
@@ -73,6 +74,8 @@ def explanation(
     what = beyond or cause_of(Words(stepper, status, events, places or {}, swiftest), status)
     if status in STALLED and not beyond:
         what = may_jam(stepper) + what
+    if circular := circular_laws(stepper, NEARLY):
+        what = f"{circular}; {what}"
     return f"t = {time:.9g} s (last accepted {now:.9g} s): {what}"
 
 

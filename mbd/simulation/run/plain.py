@@ -10,7 +10,8 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector, read_only
 from mbd.compile.mechanism import Mechanism, ModeCode
-from mbd.equations.programs import mass_matrix
+from mbd.equations.equations import Equations
+from mbd.equations.programs import follows_multipliers, mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
@@ -24,7 +25,12 @@ from mbd.simulation.user_calls import call_user
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
-__all__ = ["MechanismSystem", "PlainScheme", "row_units", "unit_blocks"]
+__all__ = ["MechanismSystem", "PlainScheme", "has_rubbing", "row_units", "unit_blocks"]
+
+
+def has_rubbing(equations: Equations) -> bool:
+    """Whether forces follow multipliers: smooth friction of contacts by rows, and laws that read them."""
+    return any(c.drags and c.rows for c in equations.contacts) or follows_multipliers(equations) > 0
 
 
 class MechanismSystem(System):
@@ -50,7 +56,7 @@ class MechanismSystem(System):
         self.hold = np.zeros(len(self.slip)) if hold is None else hold
         self.blurs = blurs  # part of the forces that is round-off
         self.pairs = np.array([friction.partner >= 0 for friction in manager.frictions], dtype=bool)
-        self.rubs = any(contact.drags and contact.rows for contact in mechanism.equations.contacts)
+        self.rubs = has_rubbing(mechanism.equations)
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z

@@ -13,6 +13,7 @@ from mbd.equations.equations import Guard
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.kernel import codes
 from mbd.results.columns import ModelColumns
+from mbd.simulation.diagnostics.circular import circular_laws
 from mbd.simulation.diagnostics.energy import EnergyWatch
 from mbd.simulation.diagnostics.failures import attempt, crowded, explanation
 from mbd.simulation.diagnostics.fastest import stability
@@ -156,6 +157,8 @@ class Run(RunData):
                 self.stepper.add_mode()
             elif status == codes.DONE:
                 save(self)
+                if circular := circular_laws(self.stepper):
+                    return f"t = {self.now:.9g} s: {circular}", ""
                 if not arrive(self, target):
                     self.label = self.end
                     return "", f"reached t = {self.end:g} s"
@@ -166,6 +169,8 @@ class Run(RunData):
                 return self._explained(status), ""
             save(self)
             problem = crowded(self.events, self.now, self.dt) or self.room.check(self)
+            if not problem and (circular := circular_laws(self.stepper)):
+                problem = f"t = {self.now:.9g} s: {circular}"
             if not problem and self.limit is None and self.energy.is_due(self):
                 problem = self.energy.judge(self)
             if problem:

@@ -9,6 +9,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
+from mbd.equations.programs import follows_multipliers
 from mbd.errors import MemoryLimitError, ModelError
 from mbd.integrators.base import Integrator
 from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
@@ -19,7 +20,7 @@ from mbd.kernel.records import PROGRAMS, Kernel
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.simulation.run.call_table import CallTable
-from mbd.simulation.run.plain import MechanismSystem, PlainScheme, row_units, unit_blocks
+from mbd.simulation.run.plain import MechanismSystem, PlainScheme, has_rubbing, row_units, unit_blocks
 from mbd.simulation.run.shelves import Shelves, plan_of
 from mbd.simulation.tolerance.driven import driving_rows
 from mbd.tape.derivatives import live
@@ -51,7 +52,8 @@ def may_be_free(equations: Equations) -> bool:
 def follows(equations: Equations) -> int:
     """How frictions follow multipliers: 0 linearly, 1 as that of a pin does, 2 those of contacts that may pull."""
     limits = [friction.limit for friction in equations.frictions if friction.contact < 0]
-    if any(node.op == "input" and node.data[0] == "lam" for node in live(limits)):
+    bent = any(node.op == "input" and node.data[0] == "lam" for node in live(limits))
+    if bent or follows_multipliers(equations) > 1:
         return 1
     rubbing = [equations.contacts[friction.contact] for friction in equations.frictions if friction.contact >= 0]
     rubbing += [contact for contact in equations.contacts if contact.drags and contact.rows]
@@ -165,7 +167,7 @@ class Stepper:
             n_watched=self.mechanism.sizes["guards"],
             n_judged=layout.n_frictions
             + sum(contact.kind != "penalty" and contact.opens_on == "pull" for contact in self.manager.contacts),
-            rubs=int(any(contact.drags and contact.rows for contact in self.mechanism.equations.contacts)),
+            rubs=int(has_rubbing(self.mechanism.equations)),
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
             vector=int(self.mechanism.vector), treelike=0,

@@ -1,0 +1,71 @@
+"""Whether a law that reads the force of a constraint changes that force by more than it is itself.
+
+Such a law and the force are solved for together. With the law linearized at the multipliers, ``F′(λ) λ``, accelerations
+follow from
+
+    [M  Bᵀ + F′] (v̇)     (f)
+    [B     0   ] (λ)  = −(γ).
+
+Without the law the determinant has the sign of R = Bᵀ. Where it passes zero no force, or more than one, satisfies both;
+beyond that a law that followed the force with the smallest lag would run away from the solution. So the ratio of both
+determinants must be positive.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbd.equations.programs import law_forces
+from mbd.tape.derivatives import live
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.stepper import Stepper
+
+__all__ = ["NEARLY", "circular_laws"]
+
+LEFT = 0.01
+"""Part of the determinant without the law below which it counts as zero [-]."""
+NEARLY = 0.6
+"""The same where a run has failed, so that it has come near to zero [-]."""
+
+
+def circular_laws(stepper: Stepper, least: float = LEFT) -> str:
+    """A sentence that names the laws whose forces act back too strongly on what they read now; '' if none do."""
+    equations = stepper.mechanism.equations
+    if not equations.held_forces or not law_forces(equations):
+        return ""
+    v = stepper.kernel
+    # the saddle matrix of the rows that act now, without the law and with it
+    rows = [k for k in stepper.manager.active_rows(v.closed[: v.n_contacts], v.sticks[: v.n_frictions])
+            if not v.dropped[k]]  # fmt: skip
+    penalties = stepper.manager.penalties(v.closed[: v.n_contacts])
+    terms = stepper.mechanism.acceleration_terms(
+        float(v.time), v.q[: v.n_q], v.y[: v.n], v.params, v.anchors[: v.n_anchors], penalties, None,
+        v.lam[: v.n_rows],
+    )  # fmt: skip
+    n, m = v.n, len(rows)
+    if not m or not all(np.isfinite(part).all() for part in (terms.M, terms.R, terms.B)):
+        return ""
+    free, whole = np.zeros((n + m, n + m)), np.zeros((n + m, n + m))
+    for matrix, right in (free, terms.B[rows].T), (whole, terms.R[:, rows]):
+        matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, right, terms.B[rows]
+    # how the law changes its determinant
+    (sign, size), (other, changed) = np.linalg.slogdet(free), np.linalg.slogdet(whole)
+    ratio = sign * other * np.exp(min(changed - size, 50.0)) if sign != 0.0 and np.isfinite(size) else 1.0
+    if ratio >= least:
+        return ""
+    names = [effect.name for effect in equations.effects if _reads(effect.generalized())]
+    s = "s" * (len(names) == 1)
+    end = ", so that no force or several satisfy both" if ratio < LEFT else ", and by more as the loop gain comes to 1"
+    return (
+        f"{', '.join(map(repr, names))} read{s} {', '.join(map(repr, equations.held_forces))} and change{s} it at once "
+        f"by {1.0 - ratio:.3g} of what it is (the loop gain){end}; make the law weaker, or let it follow the force "
+        "with a lag: a sample (mbd.SampledLaw) or a first-order state (rates of a law or loss)"
+    )
+
+
+def _reads(forces: object) -> bool:
+    """Whether generalized forces depend on multipliers."""
+    return any(node.op == "input" and node.data[0] == "lam" for node in live(list(forces)))  # type: ignore[call-overload]
