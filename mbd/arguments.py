@@ -6,7 +6,6 @@ first asked of ``mbd``; a call that succeeds costs no more for it than a functio
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from collections.abc import Callable, Mapping
 from functools import wraps
@@ -109,7 +108,9 @@ def _meant(wrong: str, known: Mapping[str, Any]) -> str:
     for right, others in MEANT.items():
         if wrong in others and right in known:
             return f"; did you mean {right!r}?"
-    close = difflib.get_close_matches(wrong, known, n=1, cutoff=0.6)
+    from difflib import get_close_matches  # for errors alone
+
+    close = get_close_matches(wrong, known, n=1, cutoff=0.6)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 

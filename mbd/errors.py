@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -174,12 +173,12 @@ def _guesses(text: str, names: Sequence[str]) -> list[str]:
             if last.casefold() in words.split():
                 meant = (f"{owner}{'' if other[:1] in ('', ' ') else '.'}{other}" for other in others)
                 found += [each for each in meant if each in names][:3]
+    if found:
+        return found
+    from difflib import get_close_matches  # for errors alone
+
     own = [each for each in names if each.startswith(f"{owner}.")] if owner else []
-    return (
-        found
-        or difflib.get_close_matches(text, own, n=1, cutoff=0.8)
-        or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
-    )
+    return get_close_matches(text, own, n=1, cutoff=0.8) or get_close_matches(text, names, n=1, cutoff=0.6)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from difflib import get_close_matches
 from functools import cache
 
 import llvmlite.binding as llvm
@@ -60,6 +59,8 @@ def _turned_off(features: Mapping[str, bool]) -> list[str]:
     asked = [word.strip() for word in os.environ.get(TURNED_OFF, "").split(",") if word.strip()]
     for word in asked:
         if not word.startswith("-") or word[1:] not in features:
+            from difflib import get_close_matches  # for errors alone
+
             near = get_close_matches(word.lstrip("+-"), features, 3)
             hint = f"; did you mean {' or '.join(f'-{name}' for name in near)}?" if near else ""
             raise CapabilityError(

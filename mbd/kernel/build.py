@@ -15,6 +15,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING
 
+from mbd.compile.fingerprint import sources_of
 from mbd.kernel.schemes import contract
 
 if TYPE_CHECKING:  # the trees of the kernel's functions are made only where it is built
@@ -66,21 +67,22 @@ def mbd_kernel(K: Kernel) -> int:
 def source_digest() -> str:
     """Hash of what the kernel is made from: this folder, its printers, schemes from elsewhere and what they import."""
     folder, digest = Path(__file__).parent, hashlib.sha256(repr(contract.SCHEMES).encode())  # the order is the number
-    trees = (folder.parent / "trees").glob("*.py")
-    for path in sorted({*folder.rglob("*.py"), *trees, *_beside(contract.SCHEMES)}):
-        name = path.relative_to(folder) if path.is_relative_to(folder) else path.name
-        digest.update(f"{name}\n".encode() + path.read_bytes())
+    own, trees = sources_of(folder.as_posix()), sources_of((folder.parent / "trees").as_posix())
+    for path in [*own, *sorted({*trees, *_beside(contract.SCHEMES)})]:
+        name = path[len(folder.as_posix()) :] if path in own else path.rpartition("/")[2]
+        with open(path, "rb") as file:
+            digest.update(f"{name}\n".encode() + file.read())
     return digest.hexdigest()
 
 
-def _beside(modules: Sequence[str]) -> set[Path]:
+def _beside(modules: Sequence[str]) -> set[str]:
     """Files of modules outside of this folder, and of those whose functions they use."""
-    found: dict[str, Path] = {}
+    found: dict[str, str] = {}
     waiting = list(modules)
     while waiting:
         module = waiting.pop()
         if module not in found and not module.startswith("mbd.kernel."):
-            found[module] = Path(str(import_module(module).__file__))
+            found[module] = Path(str(import_module(module).__file__)).as_posix()
             waiting += [
                 each.__module__ for each in vars(import_module(module)).values() if isinstance(each, FunctionType)
             ]

@@ -28,7 +28,10 @@ def entry() -> Callable[[int], int]:
         code = shipped.load()
         if code is not None:
             return _called(load_object(code, ENTRY))
-        if is_allowed() and default_cache().load(tag_key(tag()), lasting=True) is None:
+        code = default_cache().load(tag_key(tag()), lasting=True)
+        if code is not None:
+            return _called(load_object(code, ENTRY))
+        if is_allowed():
             return _quick_entry()
     return _called(load_object(cached_object(tag(), kernel_object, lasting=True), ENTRY))
 
