@@ -15,12 +15,12 @@ from mbd.compile.host import host
 from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Library, call, emit_object, load_object
-from mbd.compile.lowering import LARGE, MANY_ZEROS
+from mbd.compile.lowering import LARGE, MANY_RUNS, MANY_ZEROS
 from mbd.errors import ModelError, UnknownNameError
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape
 from tests.compile.chains import chain, compile_functions
-from tests.compile.graphs import by_llvm, graphs, run
+from tests.compile.graphs import Graph, by_llvm, graphs, run
 
 NONE = ObjectCache()
 
@@ -53,6 +53,20 @@ def test_big_functions_are_cut_and_small_ones_are_not():
     whole = by_llvm({"r": big.outputs}, big.layout, large=10 * LARGE)["r"]
     cut = by_llvm({"r": big.outputs}, big.layout)["r"]
     assert np.array_equal(results(whole, big), results(cut, big))
+
+
+@given(graphs(size=60))
+@settings(max_examples=20)
+def test_values_among_many_runs_of_zeros_keep_their_bits(graph):
+    """Zeros are then cleared at the beginning, in one piece and in parts."""
+    alone, zero = run(by_llvm({"f": graph.outputs})["f"], graph), graph.outputs[0].tape.zero
+    for runs in (MANY_RUNS - 1, MANY_RUNS, 3 * MANY_RUNS):
+        gaps = [(graph.outputs[k % len(graph.outputs)], MANY_ZEROS * (k > 2) + k % 3) for k in range(runs + 6)]
+        outputs = [node for output, gap in gaps for node in (output, *[zero] * gap)]
+        expected = np.concatenate([[alone[k % len(alone)], *[0.0] * gap] for k, (_, gap) in enumerate(gaps)])
+        mixed = Graph(tuple(outputs), graph.block, graph.parameters)
+        for cut in ({}, {"large": 0, "part": 9}):
+            assert np.array_equal(run(by_llvm({"f": outputs}, **cut)["f"], mixed), expected, equal_nan=True)
 
 
 @pytest.mark.parametrize("level", [0, 2])
