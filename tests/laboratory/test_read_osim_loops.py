@@ -95,8 +95,12 @@ def test_a_patella_follows_the_knee(tmp_path):
         place = [0.01 * beta**2 + 0.02 * beta + 0.05, 0.02 * beta - 0.4, 0.0]
         np.testing.assert_allclose(state["two.origin"], place, atol=1e-10)
     assert mbd.mobility(found.model).dof == 2
-    with pytest.raises(mbd.ModelError, match="none of its motions is the coordinate 'beta'"):
-        mbd.read_model(file(tmp_path, ["one", "two", "three"], joints, ""))
+    alone = mbd.read_model(file(tmp_path, ["one", "two", "three"], joints, ""))  # without it beta moves by itself
+    place = [0.01 * 0.3**2 + 0.02 * 0.3 + 0.05, 0.02 * 0.3 - 0.4, 0.0]
+    own = alone.joints["beta"].coordinate_names[0]
+    state = mbd.assemble(alone.model, {"hip.angle": 0.0, "knee.angle": 0.2, own: 0.3})
+    np.testing.assert_allclose(state["two.origin"], place, atol=1e-10)
+    assert mbd.mobility(alone.model).dof == 3
 
 
 def test_a_body_that_is_held_to_itself_is_named(tmp_path):

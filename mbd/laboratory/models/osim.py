@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from mbd.laboratory.models.osim_elements import (
     unlike,
 )
 from mbd.laboratory.models.osim_file import OsimFile, OsimJoint, body_named, body_of_socket
+from mbd.laboratory.models.osim_functions import has_corners
 from mbd.laboratory.models.osim_joints import connect, joints_of, tree_of
 from mbd.laboratory.models.osim_muscles import is_muscle, muscles_of
 from mbd.laboratory.models.report import ImportedModel
@@ -57,6 +59,10 @@ def read_osim(path: Path, stops: bool, repair: bool) -> ImportedModel:
     title = plain(source.attributes.get("name", "")) or plain(path.stem) or "model"
     file = OsimFile(source, int(version) < 40000, stops, repair, Model(title, gravity=gravity))
     file.report.approximated += repaired
+
+    bent = sum(1 for each in _within(source) if each.tag == "PiecewiseLinearFunction" and _is_bent(each))
+    if bent:
+        file.report.approximated.append(f"{bent} <PiecewiseLinearFunction> as splines through their points")
 
     # bodies, joints from the ground outwards, couplings, markers, muscles, the report
     joints = tree_of(file, joints_of(file, _bodies(file)))
@@ -146,6 +152,8 @@ def _summary(file: OsimFile, joints: list[OsimJoint], couplers: list[Coupler], m
         first.append(
             f"motions that are functions of coordinates, as rows: {listed(m.name for m, _ in file.dependents)}"
         )
+    if file.measured:
+        first.append(f"coordinates that no motion is by itself, of joints without mass: {listed(file.measured)}")
     if couplers:
         first.append(f"couplers as rows: {listed(each.name for each in couplers)}")
     coordinates = file.coordinates.values()
@@ -183,6 +191,19 @@ def _summary(file: OsimFile, joints: list[OsimJoint], couplers: list[Coupler], m
                 if child.children and not child.find("objects")
                 else []
             )
+
+
+def _within(element: Element) -> Iterator[Element]:
+    """All elements of joints and constraints."""
+    for child in element:
+        if child.tag not in ("ForceSet", "ControllerSet"):
+            yield child
+            yield from _within(child)
+
+
+def _is_bent(function: Element) -> bool:
+    x, y = (child.text.split() if (child := function.find(axis)) else [] for axis in "xy")
+    return len(x) == len(y) > 2 and has_corners(np.array(x, dtype=float), np.array(y, dtype=float))
 
 
 def _six(tensor: Matrix) -> tuple[float, ...]:

@@ -118,6 +118,8 @@ class OsimFile:
     posture: dict[str, Any] = field(default_factory=dict)
     dependents: list[tuple[Joint, Motion]] = field(default_factory=list)
     """Joints of motions that are functions of coordinates."""
+    measured: list[str] = field(default_factory=list)
+    """Coordinates that no motion is by itself, each of a joint that carries a body without mass."""
     loops: list[tuple[str, Any, Any, Any]] = field(default_factory=list)
     """Name, kind and the two ends of joints that close loops."""
     carriers: set[str] = field(default_factory=set)

@@ -12,11 +12,15 @@ from mbd.errors import ModelError
 from mbd.forces.samples import Samples
 from mbd.laboratory.models.xml import Element
 
-__all__ = ["Curve", "Linear", "Polynomial", "function_of", "is_left_out", "simm_spline"]
+__all__ = ["Curve", "Linear", "Polynomial", "Powers", "function_of", "has_corners", "is_left_out", "simm_spline"]
 
+MAX_ORDER = 12
+"""Order of a polynomial of several coordinates that is read."""
+STRAIGHT = 1e-6
+"""Part of the largest value by which points may be off a line that they lie on [-]."""
 FUNCTIONS = (
     "Constant", "LinearFunction", "PolynomialFunction", "SimmSpline", "NaturalCubicSpline", "natCubicSpline",
-    "NatCubicSpline", "MultiplierFunction",
+    "NatCubicSpline", "MultiplierFunction", "PiecewiseLinearFunction", "MultivariatePolynomialFunction",
 )  # fmt: skip
 """Functions that are read."""
 
@@ -54,6 +58,28 @@ class Polynomial:
 
 
 @dataclass(frozen=True)
+class Powers:
+    """``Σ c q₁^k₁ … q_n^k_n`` over all powers up to an order; those of the last coordinate run first."""
+
+    coefficients: tuple[float, ...]
+    powers: tuple[tuple[int, ...], ...]
+
+    def __call__(self, *q: Any) -> Any:
+        total: Any = 0.0
+        for coefficient, powers in zip(self.coefficients, self.powers, strict=True):
+            term: Any = coefficient
+            for x, power in zip(q, powers, strict=True):
+                for _ in range(power):
+                    term = term * x
+            total = total + term
+        return total
+
+    def scaled(self, factor: float) -> Powers:
+        """The function times a number."""
+        return Powers(tuple(factor * coefficient for coefficient in self.coefficients), self.powers)
+
+
+@dataclass(frozen=True)
 class Curve:
     """A factor times a spline of one coordinate."""
 
@@ -74,7 +100,7 @@ def is_left_out(owner: Element) -> bool:
     return len(inside) == 1 and inside[0].tag not in FUNCTIONS
 
 
-def function_of(owner: Element, arguments: int, what: str) -> Linear | Polynomial | Curve:
+def function_of(owner: Element, arguments: int, what: str) -> Linear | Polynomial | Powers | Curve:
     """The function in an element of its own, or within <function>.
 
     Raises
@@ -90,7 +116,8 @@ def function_of(owner: Element, arguments: int, what: str) -> Linear | Polynomia
     if function.tag not in FUNCTIONS:
         raise function.wrong(
             f"is the function of {what}, which cannot be stated exactly; there are Constant, LinearFunction, "
-            "PolynomialFunction, SimmSpline and MultiplierFunction"
+            "PolynomialFunction, MultivariatePolynomialFunction, SimmSpline, PiecewiseLinearFunction and "
+            "MultiplierFunction"
         )
     if function.tag == "Constant":
         return Linear((0.0,) * arguments, _values(function, "value", what, 1)[0])
@@ -100,6 +127,8 @@ def function_of(owner: Element, arguments: int, what: str) -> Linear | Polynomia
     if function.tag == "LinearFunction":
         *slopes, offset = _values(function, "coefficients", what, arguments + 1)
         return Linear(tuple(slopes), offset)
+    if function.tag == "MultivariatePolynomialFunction":
+        return _powers(function, arguments, what)
     if arguments != 1:
         raise function.wrong(f"is a function of {what} of one coordinate, got {arguments}")
     if function.tag == "PolynomialFunction":
@@ -109,10 +138,30 @@ def function_of(owner: Element, arguments: int, what: str) -> Linear | Polynomia
         raise function.wrong(
             f"of {what} needs at least two points with increasing x and as many y, got {len(x)} and {len(y)}"
         )
+    if function.tag == "PiecewiseLinearFunction" and not has_corners(x, y):
+        slope = float((y[-1] - y[0]) / (x[-1] - x[0]))
+        return Linear((slope,), float(y[0] - slope * x[0]))
     try:
         return Curve(simm_spline(x, y))
     except (ModelError, np.linalg.LinAlgError) as error:
         raise function.wrong(f"of {what} is no spline of finite numbers: {error}") from None
+
+
+def has_corners(x: Vector, y: Vector) -> bool:
+    """Whether points do not lie on one line, but for the digits of a file."""
+    line = y[0] + (y[-1] - y[0]) * (x - x[0]) / (x[-1] - x[0])
+    return bool(np.abs(y - line).max() > STRAIGHT * np.abs(y).max())
+
+
+def _powers(function: Element, arguments: int, what: str) -> Powers:
+    """A polynomial of several coordinates."""
+    dimension, order = (int(_values(function, tag, what, 1)[0]) for tag in ("dimension", "order"))
+    if dimension != arguments or not 0 <= order <= MAX_ORDER:
+        raise function.wrong(
+            f"of {what} needs the dimension {arguments} and an order from 0 to {MAX_ORDER}, got {dimension} and {order}"
+        )
+    powers = [p for p in np.ndindex(*(order + 1,) * dimension) if sum(p) <= order]
+    return Powers(_values(function, "coefficients", what, len(powers)), tuple(powers))
 
 
 def _values(function: Element, tag: str, what: str, count: int | None = None) -> tuple[float, ...]:

@@ -180,8 +180,10 @@ def _custom(file: OsimFile, joint: OsimJoint) -> list[Motion]:
             continue
         axis = np.array(numbers_of(element, "axis", 3))
         size = float(np.linalg.norm(axis))
+        if size == 0.0:
+            raise element.wrong(f"of joint {joint.name!r} needs an axis, got one without a direction")
         if abs(size - 1.0) > UNIT:
-            raise element.wrong(f"of joint {joint.name!r} needs an axis of length 1, got {size:.6g}")
+            file.report.approximated.append(f"axis of {what} has the length {size:.3g}; only its direction is used")
         x, y, z = map(float, axis / size)
         motion.axis = (x, y, z)
         motions.append(motion)
@@ -268,19 +270,29 @@ def _float(file: OsimFile, joint: OsimJoint) -> None:
 
 
 def _drivers(file: OsimFile, joint: OsimJoint, motions: list[Motion]) -> dict[str, OsimCoordinate]:
-    """By motion, the coordinate that it is."""
+    """By motion, the coordinate that it is; a coordinate that no motion is gets a joint of its own."""
     found: dict[str, OsimCoordinate] = {}
     for coordinate in joint.coordinates:
         driven = [each for each in motions if each.is_driven and each.coordinates == [coordinate]]
-        if not driven and coordinate.coupled:
-            continue  # all motions follow from what determines it, as those of a patella
-        if not driven:
-            raise joint.element.wrong(
-                f"cannot be stated exactly: none of its motions is the coordinate {coordinate.name!r} itself, by a "
-                "LinearFunction with the slope 1 or -1"
-            )
-        found[driven[0].label] = coordinate
+        if driven:
+            found[driven[0].label] = coordinate
+        elif not coordinate.coupled:  # else all motions follow from what determines it, as those of a patella
+            _measured(file, joint, coordinate, motions)
     return found
+
+
+def _measured(file: OsimFile, joint: OsimJoint, coordinate: OsimCoordinate, motions: list[Motion]) -> None:
+    """A joint that carries a body without mass, and whose coordinate is one that motions are functions of."""
+    own = [each for each in motions if coordinate in each.coordinates and each.constant is None]
+    if not own:
+        file.report.left_out.append(f"coordinate {coordinate.name!r}, of which no motion is a function")
+        return
+    called = _joint_name(file, coordinate.name, joint)
+    carrier = RigidBody(_carrier(file, joint), 0.0, (0.0,) * 6)
+    kind = Revolute if any(each.turns for each in own) else Prismatic
+    base = file.body(joint.parent[0])
+    file.joints[called] = coordinate.joint = kind(called, base.origin, carrier.origin, axis=own[0].axis)
+    file.measured.append(coordinate.name)
 
 
 def _joint_name(file: OsimFile, wanted: str, joint: OsimJoint) -> str:

@@ -33,6 +33,8 @@ CURVES = {
     "Schutte1993Muscle_Deprecated": "de groote", "Delp1990Muscle_Deprecated": "de groote",
 }  # fmt: skip
 """Curves that stand for those of each kind of muscle."""
+VELOCITY = 10.0
+"""Largest velocity of fibers that is taken where a file has none [1/s]."""
 SAME = ("DeGrooteFregly2016Muscle", "Millard2012EquilibriumMuscle")
 """Kinds whose curves these are; those of others are taken as De Groote's, and said."""
 
@@ -45,7 +47,7 @@ def is_muscle(element: Element) -> bool:
 def muscles_of(file: OsimFile) -> dict[str, Muscle]:
     """Muscles by name; what of them is approximated or left out is in the report."""
     found: dict[str, Muscle] = {}
-    others, off, pathless = list[str](), list[str](), list[str]()
+    others, off, pathless, slow = list[str](), list[str](), list[str](), list[str]()
     surfaces = surfaces_of(file)
     taken = {*file.bodies, *file.joints, *file.carriers, *(each.name for each in file.held), "ground"}
     for element in objects_in(file.source, "ForceSet"):
@@ -67,7 +69,7 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
             bodies = [(point.frame if isinstance(point, ViaPoint) else point).body for point in points]
             between = [*surfaces.between(path, name, bodies), []]
             whole = [part for point, over in zip(points, between, strict=True) for part in (point, *over)]
-            found[name] = _muscle(file, element, name, whole)
+            found[name] = _muscle(file, element, name, whole, slow)
         except ModelError as error:
             if str(error).startswith(file.source.file):
                 raise
@@ -79,6 +81,8 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
         )
     if others:
         report.approximated.append(f"curves of De Groote and Fregly stand for others: {listed(others)}")
+    if slow:
+        report.approximated.append(f"velocity of fibers, of which there is none, as {VELOCITY:g} 1/s: {listed(slow)}")
     if pathless:
         report.left_out.append(f"muscles without a <GeometryPath>: {listed(pathless)}")
     if off:
@@ -86,7 +90,7 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
     return found
 
 
-def _muscle(file: OsimFile, element: Element, name: str, points: list[Any]) -> Muscle:
+def _muscle(file: OsimFile, element: Element, name: str, points: list[Any], slow: list[str]) -> Muscle:
     curves = CURVES[element.tag]
     rigid = flag_of(element, "ignore_tendon_compliance")
     instant = flag_of(element, "ignore_activation_dynamics")
@@ -94,7 +98,10 @@ def _muscle(file: OsimFile, element: Element, name: str, points: list[Any]) -> M
     if curves == "millard" and not rigid and damping < 0.01:
         file.report.approximated.append(f"muscle {name!r} has no damping; it is taken as 0.1")
         damping = 0.1
-    velocity = number_of(element, "max_contraction_velocity", number_of(element, "Vmax", 10.0))
+    velocity = number_of(element, "max_contraction_velocity", number_of(element, "Vmax", VELOCITY))
+    if velocity <= 0.0:
+        slow.append(name)
+        velocity = VELOCITY
     return Muscle(
         name, points, number_of(element, "max_isometric_force", 1000.0),
         number_of(element, "optimal_fiber_length", 0.1), number_of(element, "tendon_slack_length", 0.2),
