@@ -5,11 +5,12 @@ The tangent pass (`mbd.sensitivity.tangent`) translates the kernel with other fu
 
 from __future__ import annotations
 
-from mbd.kernel.records import Kernel, Steps
+from mbd.kernel.records import DependentRows, Kernel, Steps
 
 __all__ = [
-    "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_rates", "follow_stages",
-    "further_corrections", "is_differentiated", "note_matrix", "note_solution", "note_step", "takes_part",
+    "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
+    "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections", "is_differentiated",
+    "note_matrix", "note_solution", "note_step", "takes_part",
 ]  # fmt: skip
 
 NOT_FOLLOWED = -3
@@ -35,6 +36,11 @@ def follow_event(K: Kernel) -> int:
     return 0
 
 
+def follows_rows(K: Kernel) -> bool:
+    """Whether derivatives of rows between events are stored; True where there are none."""
+    return True
+
+
 def note_matrix(K: Steps) -> None:
     """Newton's matrix has been made from what is in the block."""
 
@@ -51,6 +57,19 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
 def follow_rates(K: Kernel, t: float) -> int:
     """The consistent rates in K.jump and K.impulse of (q1, y1) with their derivatives; 0, or a status."""
     return 0
+
+
+def follow_factors(K: DependentRows, m: int) -> bool:
+    """Factors of [M Bᵀ; B 0] from K.acc, which have no derivatives; false where a pivot is missing."""
+    return False
+
+
+def follow_solution(K: DependentRows, m: int) -> None:
+    """K.rhs ← A⁻¹ K.rhs with these factors, and the derivatives of both."""
+
+
+def follow_move(K: Steps, h: float, weights: int, count: int) -> None:
+    """h times the weighted slopes of the first stages into K.spare."""
 
 
 def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:

@@ -37,7 +37,7 @@ from mbd.kernel.stepping.restart import (
     measure_accepted,
     raise_scales,
 )
-from mbd.kernel.tangent_rules import follow_rates, is_differentiated
+from mbd.kernel.tangent_rules import follow_factors, follow_move, follow_rates, follow_solution, is_differentiated
 
 __all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -92,9 +92,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         explicit_move(K, h, s * stages, s)
         if not (free and stage_in_chart(K, t, s)):
             place_in_chart(K, s)
-            status = explicit_rates(K, t)
-            if status == 0:
-                status = follow_rates(K, t)
+            status = follow_rates(K, t) if is_differentiated() else explicit_rates(K, t)
             if status != 0:
                 return status
         for i in range(n):
@@ -108,7 +106,9 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         if status != 0:
             find_sizes(K)
             return status
-    if K.n_active == 0 and K.n_frictions == 0:
+    if is_differentiated():
+        status = follow_rates(K, t1)
+    elif K.n_active == 0 and K.n_frictions == 0:
         status = explicit_rates(K, t1)
         K.impulse[: K.n_rows] = 0.0
     else:
@@ -116,8 +116,6 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         note_uneven(K)
         if status == 0 and K.uneven_masses == 1 and factor_saddle(K, K.n_active, False, LOSS_AT_ONCE):
             polish_with_rows(K, K.n_active)
-    if status == 0:
-        status = follow_rates(K, t1)
     if status != 0:
         return status
     for i in range(n):
@@ -147,12 +145,15 @@ def explicit_move(K: Steps, h: float, weights: int, count: int) -> None:
     """h times the weighted slopes of the first stages: y1, and x in K.spare."""
     n_v = K.n_v
     width = n_v + K.n
-    K.spare[:width] = 0.0
-    for j in range(count):
-        weight = h * K.tableau[weights + j]
-        if weight != 0.0:
-            for i in range(width):
-                K.spare[i] += weight * K.stages[j * width + i]
+    if is_differentiated():
+        follow_move(K, h, weights, count)
+    else:
+        K.spare[:width] = 0.0
+        for j in range(count):
+            weight = h * K.tableau[weights + j]
+            if weight != 0.0:
+                for i in range(width):
+                    K.spare[i] += weight * K.stages[j * width + i]
     for i in range(K.n):
         K.y1[i] = K.y[i] + K.spare[n_v + i]
 
@@ -303,7 +304,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
                 return NOT_FINITE
             size = max(size, abs(h) / (16.0 * EPS * K.scale[n + row]))
         straight = return_straight(K)
-        if not straight and not factor_saddle(K, m, True, LOSS_AT_ONCE):
+        if not straight and not factor_returns(K, m):
             return SINGULAR
         if size <= 1.0 or size >= before:
             break
@@ -311,7 +312,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
         if straight:
             K.rhs[:n] = K.spare[1 : n + 1]
         else:
-            solve_kkt(K, n + m, K.rhs)
+            solve_returns(K, m)
         displace(K, K.q1, K.rhs)
     if size > 1e3:  # coordinates may have grown since their sizes were noted
         raise_scales(K, True)
@@ -327,7 +328,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
         K.rhs[:n] = 0.0
         for k in range(m):
             K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
-        solve_kkt(K, n + m, K.rhs)
+        solve_returns(K, m)
     fastest = 0.0
     change = 0.0
     for i in range(n):
@@ -349,6 +350,21 @@ def return_straight(K: Equations) -> bool:
         return False
     call_on(K, K.returns_program, K.acc, K.spare)
     return bool(K.spare[0] == 1.0)
+
+
+def factor_returns(K: DependentRows, m: int) -> bool:
+    """Factors of [M Bᵀ; B 0] from K.acc in K.kkt; false where a pivot is missing."""
+    if is_differentiated():
+        return follow_factors(K, m)
+    return bool(factor_saddle(K, m, True, LOSS_AT_ONCE))
+
+
+def solve_returns(K: DependentRows, m: int) -> None:
+    """K.rhs ← [M Bᵀ; B 0]⁻¹ K.rhs."""
+    if is_differentiated():
+        follow_solution(K, m)
+    else:
+        solve_kkt(K, K.n + m, K.rhs)
 
 
 def explicit_error(K: Memory, h: float) -> None:

@@ -49,12 +49,12 @@ from mbd.kernel.stepping.accept_restart import accept_for_restart, event_at_star
 from mbd.kernel.stepping.candidate import accept_guards
 from mbd.kernel.stepping.charts import divides_further, turned_end, wants_row
 from mbd.kernel.stepping.contact_step import relax_pace
-from mbd.kernel.stepping.observe import is_awaited, store_row
+from mbd.kernel.stepping.observe import is_awaited, store_passed_row, store_row
 from mbd.kernel.stepping.restart import active_rows, consistent, largest_force, take_consistent
 from mbd.kernel.stepping.starting import find_mode, restart, still_dependent
 from mbd.kernel.stepping.step_retry import is_shortened, part_end, step_end, tried_step
 from mbd.kernel.stepping.trial_step import try_step
-from mbd.kernel.tangent_rules import follow_candidate, follow_event, note_step
+from mbd.kernel.tangent_rules import follow_candidate, follow_event, follows_rows, note_step
 
 __all__ = ["advance"]
 
@@ -495,5 +495,8 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         return -1
     K.steps_since_row += 1
     if (K.vector == 0 and wants_row(K, h)) or K.steps_since_row >= K.stride:
-        store_row(K)
+        if follows_rows(K):
+            store_row(K)
+        else:
+            store_passed_row(K)
     return -1

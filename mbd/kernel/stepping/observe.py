@@ -7,12 +7,17 @@ from mbd.kernel.contact.cones import phase_of
 from mbd.kernel.records import Reals, Switching
 from mbd.kernel.stepping.candidate import carry
 
-__all__ = ["is_awaited", "store_row", "store_state"]
+__all__ = ["is_awaited", "store_passed_row", "store_row", "store_state"]
 
 
 def store_row(K: Switching) -> None:
     """One row of results: the accepted state."""
     store_state(K, K.q, K.y, K.rate, K.lam)
+
+
+def store_passed_row(K: Switching) -> None:
+    """The same for a row between events of which only the values are asked (see `tangent_rules.follows_rows`)."""
+    store_row(K)
 
 
 def store_state(K: Switching, q: Reals, y: Reals, rate: Reals, lam: Reals) -> None:

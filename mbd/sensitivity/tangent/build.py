@@ -35,10 +35,11 @@ HELD = (
     "events.guard_round_off.guard_round_off", "singular.newmark_step.steps_to_singularity",
     "schemes.iteration.overturns", "schemes.iteration.is_small", "rules.note_step", "rules.keep_candidate",
     "rules.restore_candidate", "rules.take_again", "rules.keep_stages", "rules.restore_stages", "rules.prepare_metric",
-    "rules.prepare_corrections", "rules.prepare_rates", "schemes.runge_kutta.explicit_rates",
+    "rules.prepare_rates", "schemes.runge_kutta.explicit_rates",
     "schemes.runge_kutta.rates_at_end", "schemes.runge_kutta.find_sizes", "schemes.runge_kutta.note_uneven",
     "schemes.radau_end.end_rates", "stepping.mass_ratios.polish_with_rows", "stepping.restart.holds_rows",
-    "rules.prepare_newton", "rules.prepare_stages",
+    "rules.prepare_newton", "rules.prepare_stages", "stepping.observe.store_passed_row",
+    "rules.follow_factors", "rules.solve_by_value",
 )  # fmt: skip
 """Functions without derivatives: steps are tried and judged, and instants found, by values alone.
 

@@ -27,6 +27,7 @@ from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.tangent.margins import refuse_turning_points
 from mbd.sensitivity.tangent.run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
+from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.simulate import INSTANT
 
 __all__ = ["AnotherRun", "tangent_run"]
@@ -94,7 +95,7 @@ def tangent_run(
     contacts = [contact.name for contact in programs.equations.contacts]
     of_e = np.array([restitutions.get(name, np.zeros(count)) for name in contacts]).reshape(len(contacts), count)
     of_q = charted.base(np.array(rows.record.q[0])) @ start.q
-    runs = list[tuple[TangentRun, int]]()
+    runs, states = list[tuple[TangentRun, int]](), list[dict[str, tuple[Any, Matrix]]]()
     for first in range(0, count, DIRECTIONS):
         some = slice(first, min(first + DIRECTIONS, count))
         run = _again(rows)
@@ -106,11 +107,12 @@ def tangent_run(
         run.seed(start.p[:, some], of_q[:, some], start.y[:, some], start.anchors[:, some], of_e[:, some])
         _require_same(rows, run)
         runs.append((run, some.stop - some.start))
+        states.append(run.at_state())
+        keep_idle(run.stepper)
 
     def joined(parts: Sequence[Matrix]) -> Matrix:
         return np.concatenate([part[..., :width] for part, (_, width) in zip(parts, runs, strict=True)], axis=-1)
 
-    states = [run.at_state() for run, _ in runs]
     at_end = {name: (number, joined([each[name][1] for each in states])) for name, (number, _) in states[0].items()}
     end = _motion(charted, at_end, start.p)
     last, located = rows.mode(len(rows.record.time) - 1), rows.record.settings.get("contact") != "nonsmooth"

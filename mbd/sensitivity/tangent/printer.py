@@ -32,7 +32,7 @@ HELD_ARRAYS = frozenset(
     (
         "scale", "known", "weight", "blurs", "typical", "largest", "error", "closing_gap", "deepest", "sinking",
         "contact_step", "closing_rate", "largest_rate", "contact_steps", "least_contact_step", "doubt", "seen",
-        "row_bounds",
+        "row_bounds", "tableau",
     )
 )  # fmt: skip
 """Arrays whose numbers have no derivatives: what only decides, and sizes of steps by their error."""
@@ -57,8 +57,6 @@ entry:
   %columns = load ptr, ptr %p3
   %p4 = getelementptr i64, ptr %program, i64 4
   %numbers = load ptr, ptr %p4
-  %p5 = getelementptr i64, ptr %program, i64 5
-  %found = load ptr, ptr %p5
   %there = icmp ne ptr %code, null
   br i1 %there, label %evaluate, label %lines
 evaluate:
@@ -68,7 +66,7 @@ lines:
   %k = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %k.next, %store ]
   %first = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %last, %store ]
   %more = icmp slt i64 %k, %size
-  br i1 %more, label %line, label %copy
+  br i1 %more, label %line, label %end
 line:
   %end.at = getelementptr i64, ptr %ends, i64 %k
   %last = load i64, ptr %end.at
@@ -96,21 +94,10 @@ add:
   %e.next = add i64 %e, 1
   br label %entries
 store:
-  %place = getelementptr {ROOM}, ptr %found, i64 %k
+  %place = getelementptr {ROOM}, ptr %of.out, i64 %k
   store {VECTOR} %sum, ptr %place, align 8
   %k.next = add i64 %k, 1
   br label %lines
-copy:
-  %c = phi i64 [ 0, %lines ], [ %c.next, %copy.one ]
-  %rest = icmp slt i64 %c, %size
-  br i1 %rest, label %copy.one, label %end
-copy.one:
-  %from = getelementptr {ROOM}, ptr %found, i64 %c
-  %moved = load {VECTOR}, ptr %from, align 8
-  %to = getelementptr {ROOM}, ptr %of.out, i64 %c
-  store {VECTOR} %moved, ptr %to, align 8
-  %c.next = add i64 %c, 1
-  br label %copy
 end:
   ret void
 }}

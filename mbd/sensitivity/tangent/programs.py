@@ -35,7 +35,7 @@ class Derivative:
 
     Attributes
     ----------
-    address : of ``[code, outputs, ends of their lines, columns, numbers, room]``, as `printer.PRODUCT` reads it
+    address : of ``[code, outputs, ends of their lines, columns, numbers]``, as `printer.PRODUCT` reads it
     """
 
     def __init__(
@@ -57,11 +57,11 @@ class Derivative:
         function, lines, columns, count = known
         size = first + count
         ends = np.searchsorted(lines + first, np.arange(size), side="right")
-        room, numbers = np.zeros((max(size, 1), LANES)), np.zeros(max(len(lines), 1))
-        self._function, self._keep = function, (ends, room)
+        numbers = np.zeros(max(len(lines), 1))
+        self._function, self._ends = function, ends
         self._lines, self._columns, self._numbers = lines + first, columns, numbers
         self._size = size
-        places = [each.ctypes.data for each in (ends, columns, numbers, room)]
+        places = [each.ctypes.data for each in (ends, columns, numbers)]
         self._words = np.array([0 if function is None else function.address, size, *places], dtype=np.int64)
         self.address = int(self._words.ctypes.data)
 

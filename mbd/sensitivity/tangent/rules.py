@@ -44,9 +44,9 @@ from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_bloc
 from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = [
-    "at_root", "follow_candidate", "follow_event", "follow_matrix", "follow_newton", "follow_rates", "follow_stages",
-    "further_corrections", "is_differentiated", "note_matrix", "note_solution", "note_step", "seeded", "takes_part",
-    "without_tangent",
+    "at_root", "every_row_place", "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move",
+    "follow_newton", "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections",
+    "is_differentiated", "note_matrix", "note_solution", "note_step", "seeded", "takes_part", "without_tangent",
 ]  # fmt: skip
 
 BALANCE = 9
@@ -92,7 +92,7 @@ def takes_part(value: float) -> bool:
 
 
 # where numbers lie in K.starts: inputs of the last of Newton's matrices | W | the block of the solution | what is noted
-# of a step (2) | the candidate | columns of K₀⁻¹ or stages
+# of a step (2), and of the run (1) | the candidate | columns of K₀⁻¹ or stages
 
 
 def n_inputs(K: Kernel) -> int:
@@ -108,6 +108,16 @@ def solution_place(K: Kernel) -> int:
 def step_place(K: Kernel) -> int:
     """Where what is noted of a step begins in K.starts."""
     return int(solution_place(K) + n_inputs(K))
+
+
+def every_row_place(K: Kernel) -> int:
+    """Where K.starts says whether all rows are stored with their derivatives."""
+    return int(step_place(K) + 2)
+
+
+def follows_rows(K: Kernel) -> bool:
+    """Whether rows between events are stored with their derivatives; those at events are in any case."""
+    return bool(K.starts[every_row_place(K)] == 1.0)
 
 
 def note_step(K: Kernel) -> None:
@@ -129,7 +139,7 @@ def restore_candidate(K: Kernel) -> None:
 
 def carry_candidate(K: Kernel, out: bool) -> None:
     """The values of the candidate there or back."""
-    o = carry(K.q1, K.starts, step_place(K) + 2, K.n_q, out)
+    o = carry(K.q1, K.starts, every_row_place(K) + 1, K.n_q, out)
     o = carry(K.y1, K.starts, o, K.n, out)
     o = carry(K.rate1, K.starts, o, K.n, out)
     o = carry(K.aux1, K.starts, o, K.n, out)
@@ -142,7 +152,7 @@ def carry_candidate(K: Kernel, out: bool) -> None:
 def metric_place(K: Kernel) -> int:
     """Where columns of K₀⁻¹, or stages, begin in K.starts."""
     kept = K.n_q + 3 * K.n + K.n_rows + K.n_v + K.n_watched + K.n_frictions
-    return int(step_place(K) + 2 + kept)
+    return int(every_row_place(K) + 1 + kept)
 
 
 def follow_candidate(K: Kernel, h: float, t1: float) -> int:
@@ -243,16 +253,17 @@ def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
             swap = b[k]
             b[k] = b[p]
             b[p] = swap
-    for k in range(n):
-        left = b[k]
-        for i in range(k + 1, n):
-            b[i] -= plain_A[i * n + k] * left
+    for i in range(1, n):  # by rows: a sum of vectors stays in registers
+        total = b[i]
+        for k in range(i):
+            total -= plain_A[i * n + k] * b[k]
+        b[i] = total
     for c in range(n):
-        k = n - 1 - c
-        left = b[k] * plain_A[k * n + k]
-        b[k] = left
-        for i in range(k):
-            b[i] -= plain_A[i * n + k] * left
+        i = n - 1 - c
+        total = b[i]
+        for k in range(i + 1, n):
+            total -= plain_A[i * n + k] * b[k]
+        b[i] = total * plain_A[i * n + i]
 
 
 def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int:
@@ -261,10 +272,10 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
     With the position correction W in the metric of Newton's matrix K₀ at the noted inputs, ``K₀ W = (0, g)``, with K
     at the solution, and with r, h, ḣ as the prediction and ``−K₀⁻¹ δK₀ W`` change them,
 
-        K (δv̇, δλ) = −(δr + r_x Z δg, (δḣ + ḣ_x Z δg)/c_C)   δh + B (c_K δv̇ + Z δg) = 0   Z = K₀⁻¹ (0, 1)
+        K (δv̇, δλ) + (r_x Z, ḣ_x Z/c_C) δg = −(δr, δḣ/c_C)   c_K B δv̇ + B Z δg = −δh   Z = K₀⁻¹ (0, 1)
 
-    solved at once: δg by the Schur complement of `prepare_corrections`. Where coordinates do not add, and with friction
-    in a plane in space, K is nearly the derivative, and corrections follow.
+    is one system. Where coordinates do not add, and with friction in a plane in space, K is nearly the derivative, and
+    corrections follow.
     """
     if sharing(K):
         return NOT_FOLLOWED
@@ -289,13 +300,12 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
     for k in range(m):
         place = K.o_lam + K.rows[k]
         K.block[place] = moved(K.block[place], K.starts[o + place])
-    if prepare_newton(K, n + m) != 0:
-        return NOT_FOLLOWED
     by_v = without_tangent(c_C)
     by_x = without_tangent(c_K)
-    if corrects and prepare_corrections(K, m, by_v, by_x) != 0:
+    size = n + 2 * m if corrects else n + m
+    if prepare_newton(K, m, size, by_v, by_x) != 0:
         return NOT_FOLLOWED
-    # rates and multipliers, then what they change where positions are corrected
+    o_Z = metric_place(K)
     exact = K.vector == 1 and K.n_cones == 0  # is the matrix the derivative itself?
     before = 1e300
     for _ in range(MAX_CORRECTIONS):
@@ -304,9 +314,15 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
             K.rhs[i] = -derivative_of(K.out[i])
         for k in range(m):
             K.rhs[n + k] = right_hand_side(K, k, m, by_v, by_x)
-        solve_plain(K.kkt, n + m, K.pivots, K.rhs)
-        if corrects:
-            correct_positions(K, m, by_x)
+        for k in range(size - n - m):
+            K.rhs[n + m + k] = 0.0 if K.row_level[K.rows[k]] == 1 else -derivative_of(K.out[n + k])
+        solve_plain(K.kkt, size, K.pivots, K.rhs)
+        for i in range(K.n_v if corrects else 0):
+            total = 0.0
+            for k in range(m):
+                total += without_tangent(K.starts[o_Z + k * (n + m) + i]) * K.rhs[n + m + k]
+            K.shift1[i] += total
+            K.block[K.o_x + i] += total
         change_of = 0.0
         largest = 0.0
         for i in range(n):
@@ -333,17 +349,58 @@ def right_hand_side(K: Kernel, k: int, m: int, c_C: float, c_K: float) -> float:
     return -derivative_of(K.out[K.n + k]) / (c_C if K.row_level[K.rows[k]] == 1 else c_K)
 
 
-def prepare_newton(K: Kernel, size: int) -> int:
-    """Factors of Newton's matrix at the block, whose entries stay in K.out; 0, or that it is singular."""
+def prepare_newton(K: Kernel, m: int, size: int, c_C: float, c_K: float) -> int:
+    """Factors of the matrix of `follow_newton` at the block, with δg where it is that large; 0, or it is singular."""
+    n = K.n
+    whole = n + m
     call(K, K.tangent_program, K.out)
-    K.kkt[: size * size] = K.out[: size * size]
+    if size == whole:
+        K.kkt[: whole * whole] = K.out[: whole * whole]
+    else:
+        K.spare[: whole * whole] = K.out[: whole * whole]
+        K.block_c_K = 0.0  # what K is less then is the part of it that positions make
+        call(K, K.tangent_program, K.out)
+        K.block_c_K = c_K
+        enlarge(K, m, size, c_K)
     K.order_start = 0
     return factor(K.kkt, size, K.pivots)
 
 
-# behind the candidate in K.starts: Z (m, n_v) | Q = K⁻¹ (r_x, ḣ_x/c_C) Z (m, n + m) | B (m, n_v)
+def enlarge(K: Kernel, m: int, size: int, c_K: float) -> None:
+    """``[K P; c_K B  B Z]`` with ``P = (r_x Z, ḣ_x Z/c_C)`` in K.kkt; K is in K.spare, what it is at c_K = 0 in K.out.
+
+    A row on velocities corrects no positions: its part of δg is 0.
+    """
+    n = K.n
+    whole = n + m
+    o_Z = metric_place(K)
+    inverse = 1.0 / c_K
+    for i in range(whole):
+        K.kkt[i * size : i * size + whole] = K.spare[i * whole : i * whole + whole]
+        for j in range(K.n_v):
+            K.spare[i * whole + j] = (K.spare[i * whole + j] - K.out[i * whole + j]) * inverse
+        for k in range(m):
+            total = 0.0
+            for j in range(K.n_v):
+                total += K.spare[i * whole + j] * K.starts[o_Z + k * whole + j]
+            K.kkt[i * size + whole + k] = total
+    for i in range(m):
+        o = (whole + i) * size
+        K.kkt[o : o + size] = 0.0
+        if K.row_level[K.rows[i]] == 1:
+            K.kkt[o + whole + i] = 1.0
+        else:
+            for j in range(K.n_v):
+                K.kkt[o + j] = c_K * K.out[(n + i) * whole + j]
+            for k in range(m):
+                total = 0.0
+                for j in range(K.n_v):
+                    total += K.out[(n + i) * whole + j] * K.starts[o_Z + k * whole + j]
+                K.kkt[o + whole + k] = total
+
+
 def prepare_metric(K: Kernel, m: int) -> int:
-    """W and Z of `follow_newton`, and factors of K₀."""
+    """Factors of K₀, columns Z of its inverse behind the candidate in K.starts, and W of `follow_newton` from them."""
     n = K.n
     size = n + m
     at = n_inputs(K)
@@ -353,21 +410,20 @@ def prepare_metric(K: Kernel, m: int) -> int:
     if factor(K.kkt, size, K.pivots) != 0:
         return 1
     shift = solution_place(K) + at - K.n_v
-    for k in range(m):
-        total = 0.0
-        for j in range(K.n_v):
-            total += K.out[(n + k) * size + j] * K.starts[shift + j]
-        K.work[n + k] = total
-    K.work[:n] = 0.0
-    solve(K.kkt, size, K.pivots, K.work)
-    K.starts[at : at + size] = K.work[:size]
-    K.starts[at + size : at + size + K.n_v] = 0.0  # what rows make of W is left to g
+    K.starts[at : at + size + K.n_v] = 0.0  # what rows make of W is left to g
     o_Z = metric_place(K)
     for k in range(m):
         K.work[:size] = 0.0
-        K.work[n + k] = 0.0 if K.row_level[K.rows[k]] == 1 else 1.0  # those on velocities correct no positions
+        K.work[n + k] = 1.0
         solve(K.kkt, size, K.pivots, K.work)
-        K.starts[o_Z + k * K.n_v : o_Z + k * K.n_v + K.n_v] = K.work[: K.n_v]
+        g = 0.0
+        for j in range(K.n_v):
+            g += K.out[(n + k) * size + j] * K.starts[shift + j]
+        for i in range(size):
+            K.starts[at + i] += K.work[i] * g
+            K.starts[o_Z + k * size + i] = K.work[i]
+        if K.row_level[K.rows[k]] == 1:  # those on velocities correct no positions
+            K.starts[o_Z + k * size : o_Z + k * size + size] = 0.0
     return 0
 
 
@@ -391,70 +447,6 @@ def begin_corrections(K: Kernel, m: int) -> bool:
         K.block[K.o_x + i] += found - K.shift1[i]
         K.shift1[i] = found
     return True
-
-
-def prepare_corrections(K: Kernel, m: int, c_C: float, c_K: float) -> int:
-    """Q, B and factors of the Schur complement ``S = B (Z − c_K Q)``, in K.spare; 0, or that S is singular.
-
-    Newton's matrix is in K.out; what it is less with c_K = 0 is the part of it that positions make.
-    """
-    n = K.n
-    n_v = K.n_v
-    size = n + m
-    o_Z = metric_place(K)
-    o_Q = o_Z + m * n_v
-    o_B = o_Q + m * size
-    K.spare[: size * size] = K.out[: size * size]
-    K.block_c_K = 0.0
-    call(K, K.tangent_program, K.out)
-    K.block_c_K = c_K
-    for k in range(m):
-        for j in range(n_v):
-            K.starts[o_B + k * n_v + j] = K.out[(n + k) * size + j]
-        for i in range(size):
-            total = 0.0
-            for j in range(n_v):
-                part = K.spare[i * size + j] - K.out[i * size + j]
-                total += part / c_K * K.starts[o_Z + k * n_v + j]
-            K.work[i] = total
-        solve(K.kkt, size, K.pivots, K.work)
-        K.starts[o_Q + k * size : o_Q + k * size + size] = K.work[:size]
-    for i in range(m):
-        for k in range(m):
-            total = 0.0
-            for j in range(n_v):
-                column = K.starts[o_Z + k * n_v + j] - c_K * K.starts[o_Q + k * size + j]
-                total += K.starts[o_B + i * n_v + j] * column
-            if K.row_level[K.rows[i]] == 1:
-                total = 1.0 if i == k else 0.0
-            K.spare[i * m + k] = total
-    return factor(K.spare, m, K.columns)
-
-
-def correct_positions(K: Kernel, m: int, c_K: float) -> None:
-    """δW of ``δh = 0`` into the block, with what it changes of the rates and multipliers in the right-hand side."""
-    n = K.n
-    n_v = K.n_v
-    size = n + m
-    o_Z = metric_place(K)
-    o_Q = o_Z + m * n_v
-    o_B = o_Q + m * size
-    for k in range(m):
-        K.work[k] = 0.0
-        if K.row_level[K.rows[k]] == 0:
-            K.work[k] = -derivative_of(K.out[n + k])
-            for j in range(n_v):
-                K.work[k] -= c_K * without_tangent(K.starts[o_B + k * n_v + j]) * K.rhs[j]
-    solve_plain(K.spare, m, K.columns, K.work)
-    for i in range(n_v):
-        total = 0.0
-        for k in range(m):
-            total += without_tangent(K.starts[o_Z + k * n_v + i]) * K.work[k]
-        K.shift1[i] += total
-        K.block[K.o_x + i] += total
-    for k in range(m):
-        for i in range(size):
-            K.rhs[i] -= without_tangent(K.starts[o_Q + k * size + i]) * K.work[k]
 
 
 def further_corrections() -> int:
@@ -504,17 +496,23 @@ def prepare_rates(K: Kernel, t: float, m: int) -> int:
 
 
 def follow_rates(K: Kernel, t: float) -> int:
-    """``[M R; B 0] (δv̇, δλ) = −δ(M v̇ + f + R λ, B v̇ + γ)`` with v̇ and λ held; `consistent` where friction follows λ."""
+    """Consistent rates of (q1, y1) in K.jump, multipliers in K.impulse: `consistent` where friction follows λ, else
+
+    ``[M R; B 0] (δv̇, δλ) = −δ(M v̇ + f + R λ, B v̇ + γ)`` with v̇ and λ held.
+    """
     n = K.n
     m = K.n_active
     if K.n_frictions > 0 or K.loaded > 0 or K.rubs == 1 or K.n_dropped > 0 or prepare_rates(K, t, m) != 0:
         return consistent(K, t, K.q1, K.y1)
     fill_block(K, t, K.q1, K.y1)
-    for i in range(n):
-        K.block[K.o_a + i] = without_tangent(K.rhs[i])
     K.block[K.o_lam : K.o_lam + K.n_rows] = 0.0
+    K.impulse[: K.n_rows] = 0.0
+    for i in range(n):
+        K.jump[i] = without_tangent(K.rhs[i])
+        K.block[K.o_a + i] = K.jump[i]
     for k in range(m):
-        K.block[K.o_lam + K.rows[k]] = without_tangent(K.rhs[n + k])
+        K.impulse[K.rows[k]] = without_tangent(K.rhs[n + k])
+        K.block[K.o_lam + K.rows[k]] = K.impulse[K.rows[k]]
     call(K, BALANCE, K.out)
     for i in range(n):
         K.rhs[i] = -derivative_of(K.out[i])
@@ -522,12 +520,68 @@ def follow_rates(K: Kernel, t: float) -> int:
         K.rhs[n + k] = -derivative_of(K.out[n + K.rows[k]])
     solve_plain(K.kkt, n + m, K.pivots, K.rhs)
     for i in range(n):
-        K.jump[i] = without_tangent(K.jump[i]) + K.rhs[i]
-    for k in range(K.n_rows):
-        K.impulse[k] = without_tangent(K.impulse[k])
+        K.jump[i] += K.rhs[i]
     for k in range(m):
         K.impulse[K.rows[k]] += K.rhs[n + k]
     return 0
+
+
+# an explicit step -----------------------------------------------------------------------------------------------------
+def follow_move(K: Kernel, h: float, weights: int, count: int) -> None:
+    """h times the weighted slopes of the first stages into K.spare, as `schemes.runge_kutta.explicit_move` has it."""
+    width = K.n_v + K.n
+    for i in range(width):
+        total = 0.0
+        for j in range(count):
+            if K.tableau[weights + j] != 0.0:
+                total += K.tableau[weights + j] * K.stages[j * width + i]
+        K.spare[i] = h * total
+
+
+def follow_factors(K: Kernel, m: int) -> bool:
+    """LU factors of ``A = [M Bᵀ; B 0]`` from K.acc, which have no derivatives; false where a pivot is missing."""
+    n = K.n
+    size = n + m
+    K.order_start = 0
+    for i in range(n):
+        K.kkt[i * size : i * size + n] = K.acc[i * n : i * n + n]
+    for k in range(m):
+        row = K.acc_B + K.rows[k] * n
+        o = (n + k) * size
+        K.kkt[o : o + size] = 0.0
+        for i in range(n):
+            K.kkt[o + i] = K.acc[row + i]
+            K.kkt[i * size + n + k] = K.acc[row + i]
+    return bool(factor(K.kkt, size, K.pivots) == 0)
+
+
+def solve_by_value(K: Kernel, size: int) -> None:
+    """K.work ← A⁻¹ K.work with the factors in K.kkt."""
+    solve(K.kkt, size, K.pivots, K.work)
+
+
+def follow_solution(K: Kernel, m: int) -> None:
+    """``A u = b → A δu = δb − δA u`` of b in K.rhs, with the factors of `follow_factors` and A from K.acc."""
+    n = K.n
+    size = n + m
+    for i in range(size):
+        K.work[i] = without_tangent(K.rhs[i])
+    solve_by_value(K, size)
+    for i in range(n):
+        total = derivative_of(K.rhs[i])
+        for j in range(n):
+            total -= derivative_of(K.acc[i * n + j]) * without_tangent(K.work[j])
+        for k in range(m):
+            total -= derivative_of(K.acc[K.acc_B + K.rows[k] * n + i]) * without_tangent(K.work[n + k])
+        K.rhs[i] = total
+    for k in range(m):
+        total = derivative_of(K.rhs[n + k])
+        for j in range(n):
+            total -= derivative_of(K.acc[K.acc_B + K.rows[k] * n + j]) * without_tangent(K.work[j])
+        K.rhs[n + k] = total
+    solve_plain(K.kkt, size, K.pivots, K.rhs)
+    for i in range(size):
+        K.rhs[i] += without_tangent(K.work[i])
 
 
 # a step of several stages ---------------------------------------------------------------------------------------------

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Guard
 from mbd.kernel.records import TABLE
 from mbd.sensitivity.tangent.build import entry, plain_entry
 from mbd.sensitivity.tangent.interpreted import Table
 from mbd.sensitivity.tangent.printer import LANES
-from mbd.sensitivity.tangent.programs import balance_function, derivatives_of_modes, derivatives_of_programs
+from mbd.sensitivity.tangent.programs import (
+    Derivative,
+    balance_function,
+    derivatives_of_modes,
+    derivatives_of_programs,
+)
+from mbd.sensitivity.tangent.rules import every_row_place
 from mbd.simulation.run.call_table import BOUND, PLACES
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.stepper import Stepper
@@ -42,33 +48,60 @@ class Kept:
         self._room[:] = kept
 
 
+def _read(places: Mapping[str, slice]) -> Iterator[slice]:
+    """Parts of a shelf without those arrays that are written before they are read: rows and events."""
+    last = 0
+    for name in ("store", "log"):
+        if name in places:
+            yield slice(last, places[name].start)
+            last = places[name].stop
+    yield slice(last, None)
+
+
 class TangentStepper(Stepper):
     """A run's numbers with the derivatives of each: those of an array (L,) are (L, `LANES`).
 
     rooms : of derivatives, for each shelf of arrays (see `mbd.simulation.run.shelves`); those of integers are empty
     """
 
-    places: Sequence[int] = ()
+    places: Sequence[int] | None = None
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
-        self.judges_starts = False
         plan, reals = self.shelves.plan, TABLE.real_arrays
         self.rooms = [
             np.zeros((length if own and own.keys() <= set(reals) else 0, LANES))
             for length, own in zip(plan.lengths, plan.places, strict=True)
         ]
+        self._cleared = [room[part] for room, own in zip(self.rooms, plan.places, strict=True) for part in _read(own)]
         self.functions.append(balance_function(self.mechanism))  # see `rules.BALANCE`
-        K, layout = self.kernel, self.mechanism.layout
-        sizes = 2 * layout.size + 10 * (layout.n + layout.n_rows + layout.n_v + 1) + layout.n_q
-        sizes += K.n_watched + K.n_frictions + layout.n_rows * (2 * layout.n_v + layout.n + layout.n_rows)
-        K.starts = np.zeros(sizes)  # see `rules`
-        self._of = {name: (K_array, room) for name, K_array, room in self._on_shelves()}
-        bases = np.array([*(room.ctypes.data for room in self.rooms), 0])
+        self._shelved = {name: (K_array, room) for name, K_array, room in self._on_shelves()}
         self._words = np.zeros(len(PLACES), dtype=np.int64)
-        self._words[BOUND] = bases[plan.shelf] + LANES * plan.offset
         self._programs: list[Any] = []
+        self._of_modes: dict[Hashable, list[Derivative]] = {}
         self.scheme = Kept(self)
+        self._begin()
+
+    def _begin(self) -> None:
+        """No derivatives yet, in arrays that are as they were."""
+        plan = self.shelves.plan
+        self._of = dict(self._shelved)
+        bases = np.array([*(room.ctypes.data for room in self.rooms), 0])
+        self._words[BOUND] = bases[plan.shelf] + LANES * plan.offset
+
+    def begin_again(self, parameters: Vector, end: float) -> None:
+        super().begin_again(parameters, end)
+        for room in self._cleared:
+            room[:] = 0.0
+        self._begin()
+
+    def _lengths(self, given: dict[str, int]) -> dict[str, int]:
+        K, size = self.kernel, self.mechanism.layout.size
+        unknowns = K.n + 2 * K.n_rows  # of `rules.follow_newton`
+        starts = 2 * size + 10 * (K.n + K.n_rows + K.n_v + 1) + K.n_q + K.n_watched + K.n_frictions
+        own = {"kkt": unknowns * unknowns, "rhs": unknowns, "pivots": unknowns}
+        more = {name: max(length, given.get(name, 0)) for name, length in own.items()}
+        return given | more | {"starts": starts + K.n_rows * (K.n_v + K.n + K.n_rows)}
 
     def _on_shelves(self) -> Iterator[tuple[str, Any, Lanes]]:
         """Names of arrays of reals, the arrays, and the derivatives of each."""
@@ -93,17 +126,28 @@ class TangentStepper(Stepper):
 
     def differentiate_by(self, places: Sequence[int]) -> None:
         """Parameters that have derivatives."""
-        self.places = tuple(places)
-        self._programs = list(derivatives_of_programs(self.mechanism, self.places))
-        assert len(self._programs) == len(self.functions)  # in the same order
+        common = len(self.functions) - self._n_of_modes
+        if tuple(places) != self.places:
+            self.places, self._of_modes = tuple(places), {}
+            self._programs = derivatives_of_programs(self.mechanism, self.places)
+        del self._programs[common:]
+        assert len(self._programs) == common  # in the same order
+
+    def follow_rows(self) -> None:
+        """Store the derivatives of all rows, not only of those at events."""
+        self.kernel.starts[every_row_place(self.kernel)] = 1.0
 
     def add_mode(self) -> None:
         known = len(self.functions)
         super().add_mode()
         code, others = self.modes[-1], len(self.functions) - known - 2
-        tangent, residual, turned = derivatives_of_modes(self.mechanism, code, self.stabilized, self.places)
+        key = (code.rows, code.penalties, code.sliding, code.given_rows)
+        if key not in self._of_modes:
+            self._of_modes[key] = derivatives_of_modes(self.mechanism, code, self.stabilized, self.places or ())
+        tangent, residual, turned = self._of_modes[key]
         self._programs += [tangent, residual, *others * [turned], turned]  # others run without derivatives only
         self.functions.append(code.residual)  # see `rules.turned_program`
+        self._n_of_modes += 1
 
     def _advance_compiled(self) -> int:
         arrays = vars(self.kernel)
@@ -125,6 +169,8 @@ class TangentStepper(Stepper):
         return self.tangent("block")[self.mechanism.layout.shift :] if name == "shift1" else self.tangent(name)
 
     def _enter(self, address: int) -> int:
+        if self.kernel.many:  # a start is judged by its values
+            return super()._enter(address)
         return int(entry()(address, self._words.ctypes.data))
 
 
@@ -154,11 +200,13 @@ class TangentRun(Run):
         self.of_times: list[Lanes] = []
         self.of_rows: dict[int, Lanes] = {}
         self.stepper.differentiate_by(places)
+        if self.every_row:
+            self.stepper.follow_rows()
 
     def seed(self, of_parameters: Matrix, of_q: Matrix, of_y: Matrix, of_anchors: Matrix, of_e: Matrix) -> None:
         """Derivatives of the start; of q number by number."""
         own, width = self.stepper, of_q.shape[1]
-        own.tangent("params")[list(own.places), :width] = of_parameters
+        own.tangent("params")[list(own.places or ()), :width] = of_parameters
         for name, given in (("q", of_q), ("y", of_y), ("anchors", of_anchors), ("restitution", of_e)):
             own.tangent(name)[: len(given), :width] = given
 

@@ -194,7 +194,7 @@ class Stepper:
         given = own | {name: len(table) for name, table in tables.items()}
         given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
         given["chart"] = 1 if v.vector else max(block, 2 * v.n_q + 2 * v.n_v)
-        self.shelves = Shelves(plan_of(v, given))
+        self.shelves = Shelves(plan_of(v, self._lengths(given)))
         self.reals, self.integers, *_ = self.shelves.rooms
         vars(v).update(self.shelves.arrays)
         for name, table in tables.items():
@@ -211,6 +211,10 @@ class Stepper:
         v.row_unit = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
         if not v.n_anchors:
             v.anchors = np.zeros(0)
+
+    def _lengths(self, given: dict[str, int]) -> dict[str, int]:
+        """Lengths of arrays that do not follow from the sizes of the kernel alone."""
+        return given
 
     def place_of(self, name: str) -> slice:
         """Where a kept array stands in `reals` or `integers`."""
