@@ -239,7 +239,7 @@ def rows_of(
 def _submitted(executor: Executor, runs: Runs, case: tuple[Any, ...]) -> Future[Row]:
     try:
         return executor.submit(runs, case)
-    except Exception:
+    except Exception:  # raised again
         _ = runs.parcel  # an executor has its own words for what cannot be sent
         raise
 

@@ -37,7 +37,7 @@ def read_c3d(path: Path) -> Recording:
     check_parameters(path)
     try:
         file = ezc3d.c3d(str(path), extract_forceplat_data=True)
-    except Exception:
+    except Exception:  # of any kind: the reader is C++, with words of its own
         try:
             file = ezc3d.c3d(str(path), ignore_bad_formatting=True)
         except Exception as error:

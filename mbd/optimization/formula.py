@@ -83,7 +83,7 @@ def formula(given: Any, what: str, check: Callable[[str], None]) -> Formula:
         output = tape.lift(given(named))
     except MbdError as error:
         raise type(error)(f"{what}: {error}") from None
-    except Exception as error:
+    except Exception as error:  # the user's code may raise anything
         raise ModelError(
             f"{what}: its function of numbers by name raises {type(error).__name__}: {error}; write it as "
             "lambda n: n['speed'] ** 2, with mbd.sin, mbd.where, … of what it takes"

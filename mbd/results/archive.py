@@ -261,9 +261,7 @@ def read(
             meta = _words(members, source, kind, version, refusal)
             arrays = _arrays(members, judge(meta, members), meta)
         return make(meta, arrays)
-    except TrajectoryError:
-        raise
-    except PermissionError:
+    except (TrajectoryError, PermissionError):
         raise
     except Exception as error:  # of bytes from anywhere: zipfile, zlib, JSON raise what they like
         raise TrajectoryError(f"{refusal} ({_short(error)})") from error
