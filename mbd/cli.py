@@ -45,9 +45,6 @@ TOLD = (
 )  # fmt: skip
 """Errors of users' scripts that are reported in a sentence; ``--debug`` shows where they came from."""
 
-NEW_OBJECTS = 20_000
-"""Objects made between two searches for unreachable ones: Python's 700 cost a process of two seconds a tenth of it."""
-
 
 def _out(arguments: argparse.Namespace) -> Path:
     """The folder for results of a script, into which can be written."""
@@ -363,7 +360,7 @@ def _parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code: 0, or 1 after an error that was reported."""
     if argv is None:
-        gc.set_threshold(NEW_OBJECTS)
+        gc.set_threshold(20_000)  # Python's 700 cost a process of two seconds a tenth of it
     parser = _parser()
     arguments = parser.parse_args(argv)
     if not hasattr(arguments, "function"):

@@ -11,8 +11,6 @@ UNKNOWN = 4.0e9
 """Taken for the free memory where the system does not tell it [bytes]."""
 PROC, CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
 """Where Linux tells what it has, and what it allows to groups of processes."""
-UNLIMITED = 1 << 60
-"""Limits of control groups above this are none [bytes]."""
 
 
 def available() -> float:
@@ -63,7 +61,7 @@ def _left_in(group: Path, limit: str, usage: str, cached: str) -> float:
     """What one group has left, with pages of files that the system would give back."""
     try:
         most = (group / limit).read_text().strip()
-        if most == "max" or int(most) >= UNLIMITED:
+        if most == "max" or int(most) >= (1 << 60):  # limits above are none
             return float("inf")
         used = int((group / usage).read_text())
     except (OSError, ValueError):

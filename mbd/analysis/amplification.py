@@ -20,8 +20,6 @@ from mbd.state import Mode, State
 
 __all__ = ["LinearOscillator", "amplification_matrix", "oscillated"]
 
-WARM_UP = 4
-"""Steps after which the memory of a scheme has its final shape, a multistep scheme with up to so many steps [-]."""
 SUPERPOSITION, ROUND_OFF = 1e-4, 4e-15
 """Difference of a step from the sum of its parts, relative, above which the scheme is not linear; and the part of it
 that round-off explains where accelerations are (ω dt)² times displacements [-]."""
@@ -84,7 +82,8 @@ def amplification_matrix(integrator: Integrator, turn: float, damping: float = 0
         if a step fails, or is not linear in what the scheme carries.
     """
     system = LinearOscillator(turn, damping)
-    runs = [oscillated(integrator, turn, damping, np.array(start), WARM_UP) for start in ((1.0, 0.0), (0.3, 1.0))]
+    # steps after which the memory of a scheme has its final shape, a multistep scheme with up to so many steps
+    runs = [oscillated(integrator, turn, damping, np.array(start), 4) for start in ((1.0, 0.0), (0.3, 1.0))]
     states = [_numbers(*each) for run in runs for each in run]
     seen = np.array([numbers for numbers in states if len(numbers) == len(states[-1])])
     last = runs[0][-1]

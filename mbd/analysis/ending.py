@@ -22,14 +22,10 @@ __all__ = ["Summary", "ending", "summary"]
 REST = 1e-6
 """Kinetic energy over its largest of the run, below which a mechanism rests [-]."""
 
-STRETCH = 0.05
-"""Part of the run at its end over which it is to rest [-]."""
 
 FALLEN = 0.5
 """Height over that of the start below which a mechanism has fallen [-]."""
 
-SUNK = 0.25
-"""Depth of an ignored contact below its surface, over the height at the start, at which a mechanism has fallen [-]."""
 
 STEPS, PROGRESS = 3, 0.5
 """Steps that make a walk at least; distance of the last touchdown from the first over the way from each to the next."""
@@ -89,7 +85,7 @@ def _made(run: Trajectory) -> str:
 
 def _rest(run: Trajectory) -> str:
     kinetic = run.energy.kinetic
-    span = STRETCH * (run.time[-1] - run.time[0])
+    span = 0.05 * (run.time[-1] - run.time[0])  # part of the run at its end over which it is to rest
     most, last = float(np.max(kinetic)), float(np.max(kinetic[run.time >= run.time[-1] - span]))
     if most == 0.0:
         return "at rest throughout"
@@ -105,7 +101,7 @@ def _sunk(run: Trajectory, height: float) -> str:
     for contact in run.facts.contacts:
         name = f"{contact.name}.gap"
         if contact.place and contact.unit == "m" and name in run:
-            below = np.flatnonzero(run[name] < -SUNK * height)
+            below = np.flatnonzero(run[name] < -0.25 * height)  # fallen by a quarter of the height
             if len(below):
                 depth = -float(np.min(run[name]))
                 return f"fell at {run.time[below[0]]:.3g} s: '{contact.name}' gets {depth:.3g} m below its surface"

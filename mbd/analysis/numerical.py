@@ -34,8 +34,6 @@ STIFF = (1e3, 1e4, 1e5)
 """ω dt from which the limit at infinity is extrapolated; farther out, round-off grows like ε (ω dt)² [rad]."""
 SEEN = 2.0
 """ω t at which the error is measured for the order [rad]."""
-DAMPED = 0.1
-"""Damping ratio of the second oscillator on which the order is measured [-]."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +136,7 @@ def criteria(integrator: Integrator, damping: float = 0.0, turns: Sequence[float
     stretching, elongation = _leading(integrator, damping, "elongation")
     promised = integrator.order(LinearOscillator(1.0))
     return Criteria(
-        integrator, damping, min(_order(integrator, xi) for xi in (damping, DAMPED)), promised,
+        integrator, damping, min(_order(integrator, xi) for xi in (damping, 0.1)), promised,
         _at_infinity(integrator, damping), _stability_limit(integrator, damping), fading, coefficient, stretching,
         elongation, spectra, closed_form(integrator) if damping == 0.0 else None,
     )  # fmt: skip

@@ -34,8 +34,6 @@ SETTINGS = ("integrator", "dt", "tol", "until", "contact", "impact", "locate", "
 
 NOT_RUN = "not run: interrupted"
 
-KEPT = 16
-"""How many models, and sets of settings, a process keeps of those that it was sent."""
 
 Results: TypeAlias = Sequence[str] | Mapping[str, Callable[[Trajectory], float]]
 """What is kept of each run: names of quantities, at its end, or functions of the run by title."""
@@ -202,7 +200,7 @@ def _model(digest: str, data: bytes) -> Any:
 
 def _keep(store: OrderedDict[str, Any], digest: str, value: Any) -> None:
     store[digest] = value
-    while len(store) > KEPT:
+    while len(store) > 16:
         store.popitem(last=False)
 
 

@@ -15,17 +15,11 @@ if TYPE_CHECKING:
 
 __all__ = ["criteria_table", "linear_html", "linear_table"]
 
-MOVES = 0.1
-"""Part of the largest one that a coordinate must move to be named [-]."""
 NAMED = 4
 """Coordinates that are named in a line at most."""
 NULL = 3e-8
 """Eigenvalue, relative to the largest, that is reported as zero: double ones are known to √ε only [-]."""
 
-SHOWN = 11
-"""Lines of spectra in a table at most."""
-ROUND_OFF = 1e-11
-"""Damping ratio or elongation that is reported as zero [-]."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -82,7 +76,7 @@ def _plain(ratio: float) -> str:
 def _movers(shape: Mapping[str, complex]) -> str:
     """The coordinates that move most, those out of phase with a sign."""
     parts = sorted(shape.items(), key=lambda item: -round(abs(item[1]), 9))
-    shown = [(name, part) for name, part in parts if abs(part) >= MOVES]
+    shown = [(name, part) for name, part in parts if abs(part) >= 0.1]  # a tenth of the largest is worth naming
     words = [f"{'−' if part.real < 0.0 else ''}{name}" for name, part in shown[:NAMED]]
     return ", ".join(words + (["…"] if len(shown) > NAMED else [])) or "no coordinate"
 
@@ -108,7 +102,7 @@ def criteria_table(found: Criteria) -> str:
     ]  # fmt: skip
     lines += [f"  {what:<32}{came:>22}" + (f"{wanted:>22}" if wanted else "") for what, came, wanted in entries]
     lines.append(f"  {'ω dt':>10} {'spectral radius':>16} {'damping ratio':>14} {'elongation':>11}")
-    step = max(1, -(-len(found.spectra) // SHOWN))
+    step = max(1, -(-len(found.spectra) // 11))
     for each in found.spectra[::step]:
         radius = "fails" if np.isnan(each.radius) else f"{each.radius:.9f}"
         lines.append(f"  {each.turn:>10.4g} {radius:>16} {_small(each.damping):>14} {_small(each.elongation):>11}")
@@ -121,7 +115,7 @@ def _radius(value: float) -> str:
 
 
 def _small(value: float) -> str:
-    return "–" if np.isnan(value) else f"{value:.3e}" if abs(value) > ROUND_OFF else "0"
+    return "–" if np.isnan(value) else f"{value:.3e}" if abs(value) > 1e-11 else "0"
 
 
 def _limit(turn: float) -> str:

@@ -12,8 +12,6 @@ from mbd.notes import doubt
 
 __all__ = ["doubt_of_turning"]
 
-AHEAD = 1e-3
-"""How far the motion is followed, as an angle of the fastest turn [rad]."""
 CHANGED = 1e-5
 """Change of the derivatives within that, over their size, that counts as one [-]."""
 
@@ -28,7 +26,8 @@ def doubt_of_turning(found: Instant, terms: LinearTerms) -> None:
     turning = [k for k, name in enumerate(names) if ".angular_velocity." in name and abs(state.v[k]) > 1e-9 * speed]
     if not turning:
         return
-    step = AHEAD / float(np.max(np.abs(state.v[turning])))
+    # how far the motion is followed, as an angle of the fastest turn [rad]
+    step = 1e-3 / float(np.max(np.abs(state.v[turning])))
     turned = np.where(np.isin(np.arange(len(names)), turning), state.v[: len(names)], 0.0)
     ahead = replace(found, state=replace(state, q=configuration.compose(state.q, step * turned))).terms()
     pairs = [(getattr(terms, name), getattr(ahead, name)) for name in ("M", "C", "K", "B")]

@@ -32,10 +32,6 @@ from mbd.state import State, malformed
 
 __all__ = ["Mobility", "mobility"]
 
-WALKS = 6
-"""Postures nearby at which the rank is looked at [-]."""
-STRIDE = 0.2
-"""How far from one to the next, along the motions that the rows allow [m, rad]."""
 IN_PLANE = ("x", "y", "turn z", "turn about")
 """Parts of rows that hold places and angles of the plane x–y."""
 
@@ -247,7 +243,7 @@ def _generic(work: Posture, rows: list[int], active: list[int], here: Matrix) ->
     walker = replace(work, q=work.q.copy(), anchors=work.anchors.copy())
     free, random = np.ones(work.equations.n_v, dtype=bool), np.random.default_rng(3)
     best, most, last = here, rank_of(here), np.zeros(work.equations.n_v)
-    for _ in range(WALKS):
+    for _ in range(6):  # postures nearby
         before = walker.q.copy()
         B = _jacobian(walker, rows)
         _, sizes, right = np.linalg.svd(B) if len(B) else (None, np.zeros(0), np.eye(work.equations.n_v))
@@ -255,7 +251,8 @@ def _generic(work: Posture, rows: list[int], active: list[int], here: Matrix) ->
         if count == work.equations.n_v:
             break
         step = right[count:].T @ random.standard_normal(work.equations.n_v - count)
-        step *= STRIDE / float(np.linalg.norm(step)) * (-1.0 if step @ last < 0.0 else 1.0)  # on, not to and fro
+        # how far from one to the next, along the motions that the rows allow [m, rad]
+        step *= 0.2 / float(np.linalg.norm(step)) * (-1.0 if step @ last < 0.0 else 1.0)  # on, not to and fro
         last = step
         move(walker, step)
         if np.max(np.abs(close_nearby(walker, rows, free)), initial=0.0) > TOLERANCE:

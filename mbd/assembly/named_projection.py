@@ -21,8 +21,6 @@ from mbd.equal import RANK_RTOL
 
 __all__ = ["nearest_positions", "nearest_velocities"]
 
-STEPS = 100
-"""Most steps of the method of Gauss and Newton [-]."""
 SMALL = 1e-10
 """Change [m, rad] below which it has arrived."""
 LEAST = 1e-6
@@ -44,7 +42,7 @@ def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, fl
             return False
         off, slopes = _off(work, places, named)
         damping = 1e-3
-        for _ in range(STEPS):
+        for _ in range(100):  # steps of the method of Gauss and Newton
             q, anchors = work.q.copy(), work.anchors.copy()
             change = _step(_jacobian(work, rows), off, slopes, damping)
             move(work, change / max(1.0, 2.0 * float(np.max(np.abs(change), initial=0.0))))

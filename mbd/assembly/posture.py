@@ -29,14 +29,10 @@ PATIENCE = 20
 """Steps of Newton's method in which the largest residual of a start must come down to half [-]."""
 NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
-AWAY = 0.2
-"""Turn [rad] of the free angles out of a pose in which a joint is half a turn off."""
 TRIES, DESCENT = 4, 400
 """Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
 CLOSE = 1e-3
 """Row residual [m, rad] at the end of a descent from which Newton's method may go on."""
-RESTARTS = 12
-"""Other starts of Newton's method before positions count as out of reach [-]."""
 
 
 def position_rows(work: Posture) -> list[int]:
@@ -87,7 +83,7 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     if np.max(np.abs(misfit)) <= TOLERANCE:
         return misfit
     first, angles, moved = work.q, _angles(work), work.equations.configuration.compose
-    turns = np.random.default_rng(0).uniform(-1.5, 1.5, (RESTARTS, len(free)))
+    turns = np.random.default_rng(0).uniform(-1.5, 1.5, (12, len(free)))
     for turn in turns if bool((free & angles).any()) else ():
         work.q = moved(start, np.where(free & angles, turn, 0.0))
         choose_turns(work, rows)
@@ -221,7 +217,8 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
 
 def _turn_away(work: Posture, free: Matrix) -> None:
     """Leave a pose in which a joint is half a turn off, where its rows say nothing about the way back."""
-    move(work, np.where(free & _angles(work), AWAY * (1.0 + np.arange(len(free)) / 7.0), 0.0))
+    # turn [rad] of the free angles out of a pose in which a joint is half a turn off
+    move(work, np.where(free & _angles(work), 0.2 * (1.0 + np.arange(len(free)) / 7.0), 0.0))
 
 
 def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:

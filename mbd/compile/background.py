@@ -20,12 +20,6 @@ from mbd.compile import forking  # noqa: F401  (a fork stops the thread first, t
 
 __all__ = ["Job", "finish", "submit", "wake"]
 
-PAUSE = 0.001
-"""Seconds between two steps, in which others get at the locks that a step holds."""
-
-NICE = 10
-"""Priority of the thread, where the run has 0: on a machine that is busy it must not take half of the run's share."""
-
 
 class Job(Protocol):
     """Something to be done in steps."""
@@ -72,7 +66,7 @@ class _Worker:
             with self.stepping:
                 if not self.over and not self.step(job):
                     self.jobs.remove(job)
-            time.sleep(PAUSE)
+            time.sleep(0.001)  # seconds between two steps, in which others get at the locks that a step holds
 
     @staticmethod
     def step(job: Job) -> bool:
@@ -108,7 +102,8 @@ def _give_way() -> None:
     """Let the scheduler prefer everybody else to this thread, where threads have priorities of their own."""
     if sys.platform == "linux":
         with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
+            # on a busy machine it must not take half of the share of the run
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
 
 
 _WORKER = _Worker()

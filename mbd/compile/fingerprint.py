@@ -40,9 +40,6 @@ FIELDS = (
 PARTS = ("placement", "views", "inputs", "bodies", "carried")
 """The same of the scope of a `TreeGeometry`."""
 
-MARSHAL = 2
-"""Version of the format, the last one without references, whose bytes follow from the values alone."""
-
 
 class _Unknown(Exception):
     """Something met that has no digest."""
@@ -97,7 +94,8 @@ def fingerprint(equations: Equations) -> str | None:
         nodes = tuple(tape.keys())
     tables = [(table.name, tuple(table.flat)) for table in tape.tables]
     whole: Any = (source, nodes, tables, words)
-    return sha256(marshal.dumps(whole, MARSHAL)).hexdigest()
+    # the last version without references, whose bytes follow from the values alone
+    return sha256(marshal.dumps(whole, 2)).hexdigest()
 
 
 class _Reading:

@@ -276,8 +276,6 @@ def array_source(outputs: Sequence[Node]) -> tuple[str, dict[str, int], dict[str
     return "\n".join(lines) + "\n", kinds, tables
 
 
-MOST_KNOWN = 256
-"""Functions of one tape that are kept at most [-]."""
 _KNOWN: WeakKeyDictionary[Tape, dict[tuple[int, ...], ArrayFunction]] = WeakKeyDictionary()
 
 
@@ -325,7 +323,7 @@ def array_function(outputs: Sequence[Node]) -> ArrayFunction:
     key = tuple(node.index for node in outputs)
     made = known.get(key)
     if made is None:
-        if len(known) >= MOST_KNOWN:
+        if len(known) >= 256:  # functions of one tape that are kept at most
             known.clear()
         made = known[key] = ArrayFunction(outputs)
     return made

@@ -18,9 +18,6 @@ from mbd.tape.sympy import raise_to_sympy
 
 __all__ = ["Report", "report"]
 
-WHOLE = 120
-"""Operations up to which LaTeX writes whole formulas; beyond, what is used twice gets a name of its own."""
-
 
 FORMULAS = 300
 """Lines of formulas that a notebook sets; more of them it shows as text."""
@@ -150,7 +147,8 @@ def _formulas(equations: Equations, parts: Parts) -> tuple[list[str], list[str]]
     places = {name: str(k + 1) for k, name in enumerate(_numbered(equations))}
     named = [(letter, key, node) for letter, found in parts.items() for key, node in found.items()]
     outputs = [node for _, _, node in named]
-    shared = [] if operations(outputs) <= WHOLE else _shared(outputs)
+    # operations up to which LaTeX writes whole formulas; beyond, what is used twice gets a name of its own
+    shared = [] if operations(outputs) <= 120 else _shared(outputs)
     lines, known = [], dict(symbols)
     for k, node in enumerate(shared):
         (formula,) = raise_to_sympy([node], known)

@@ -79,8 +79,6 @@ class Correction:
 
 LARGEST = 20
 """Unknowns above which a system is not eliminated on the tape."""
-MOST_OPERATIONS = 1000
-"""Operations of an elimination with one solution above which making its code takes longer than it is likely to save."""
 
 
 def correction(
@@ -98,7 +96,8 @@ def correction(
         return None
     matrix, tail = _system(equations, rows, penalties, stabilized, sliding)
     inertia = substitute([matrix[k][k] for k in range(n)], {inputs.c[0]: 0.0, inputs.c[1]: 0.0})
-    found = factors(matrix, n, MOST_OPERATIONS, {k for k in range(n) if inertia[k].is_zero})
+    # beyond so many operations making the code takes longer than it is likely to save
+    found = factors(matrix, n, 1000, {k for k in range(n) if inertia[k].is_zero})
     if found is None:
         return None
     r, values = tail[:n], tail[n : n + m]

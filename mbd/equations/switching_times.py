@@ -35,10 +35,6 @@ MAX_JUMPS = 1_000_000
 """Instants of one switch at most [-]."""
 MIN_SAMPLES, MAX_SAMPLES = 4096, 1_048_576
 """Samples in time of an expression that is not linear in it [-]."""
-PER_STEP = 4.0
-"""Samples in a step of the run [-]."""
-BISECTIONS = 60
-"""Halvings of the time between two samples."""
 SMOOTH = 4
 """Derivatives of a cubic from which none jumps."""
 
@@ -359,7 +355,7 @@ class _Times:
 
     def _by_bisection(self, switch: Switch, starts: Vector, widths: Vector) -> tuple[Vector, Vector]:
         """Of any expression, as far as samples tell."""
-        count = float(np.clip(PER_STEP * widths.sum() / self.dt, MIN_SAMPLES, MAX_SAMPLES))
+        count = float(np.clip(4.0 * widths.sum() / self.dt, MIN_SAMPLES, MAX_SAMPLES))  # samples in a step of the run
         before, behind, targets = [], [], []
         for start, width in zip(starts, widths, strict=True):
             part = max(2, int(count * width / widths.sum()))
@@ -379,7 +375,7 @@ class _Times:
     def _bisected(self, s: Node, left: Vector, right: Vector, targets: Vector) -> Vector:
         """Where the expression passes each target between two times."""
         below = self.at(s, left) < targets
-        for _ in range(BISECTIONS):
+        for _ in range(60):  # halvings of the time between two samples
             middle = 0.5 * (left + right)
             same = (self.at(s, middle) < targets) == below
             left, right = np.where(same, middle, left), np.where(same, right, middle)

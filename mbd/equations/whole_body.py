@@ -20,8 +20,6 @@ from mbd.tape.node import Node, Scalar
 
 __all__ = ["offer_whole_body"]
 
-LEAST = 1e-3
-"""Part of the weight below which nothing is taken to push on the ground, so that there is no center of pressure [-]."""
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 
@@ -143,7 +141,8 @@ class _Whole:
     @cached_property
     def pressure(self) -> Triple:
         force, moment = self.loads
-        least = LEAST * self.mass * sqrt(self._gravity_squared)
+        # part of the weight below which nothing is taken to push on the ground, so that there is no center of pressure
+        least = 1e-3 * self.mass * sqrt(self._gravity_squared)
         acts = where(force[1] > least, 1.0, 0.0)  # 0/0 where nothing pushes
         up = force[1] * acts
         return (moment[2] * acts) / up, (0.0 * acts) / up, (-moment[0] * acts) / up

@@ -40,8 +40,6 @@ The wide one reaches stops and branches of laws that small motions do not.
 """
 EFFECT = 1e-6
 """Change relative to the largest of its kind from which on a parameter is seen to change something [-]."""
-SHARE = 1e-2
-"""Share of that change that two sides may differ by after it [-]."""
 WIDEST, GROWTH = 1e12, 30.0
 """Change of a parameter, over its value or 1, up to which an effect is looked for, and the factor of the next [-]."""
 
@@ -98,7 +96,7 @@ def moves_sides_alike(
         own, others, apart = (float(np.max(_largest(change, starts) / size)) for change in changes)
         effect = max(own, others)
         if effect > EFFECT:
-            return apart <= SHARE * effect
+            return apart <= 1e-2 * effect  # share of that change that two sides may differ by after it
         h *= GROWTH
     return _changes_both(mechanism, mirror, vector(value), vector(value + EFFECT * (abs(value) or 1.0)))
 

@@ -34,8 +34,6 @@ __all__ = ["Branch", "branch"]
 
 FIRST, LARGEST, SMALLEST = 0.02, 0.1, 1e-6
 """First, largest and least distance of two points in (c, p/σ) [-]."""
-GROWTH = 1.5
-"""Factor of the distance where corrections were few [-]."""
 SHORT = 1e-3
 """Part of the first distance from which a test function that jumps is no reason for a shorter one [-]."""
 TURN = 0.3
@@ -242,7 +240,7 @@ def branch(
             stopped = f"reached {parameter} = {to:g}"
             break
         curve.append(new)
-        ds = min(taken * (GROWTH if quick else 1.0), LARGEST)
+        ds = min(taken * (1.5 if quick else 1.0), LARGEST)
     stopped = stopped or f"ended after {len(curve)} points"
     return Branch(gait.name, parameter, tuple(curve), tuple(special), stopped, gait, given)
 

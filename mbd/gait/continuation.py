@@ -30,8 +30,6 @@ __all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected", "Forbidden", "wa
 
 CORRECTIONS, QUICK = 10, 4
 """Newton corrections of a point, and how many count as few."""
-HALVINGS = 1200
-"""Halvings of a range of the parameter, which lead down to the smallest number at most [-]."""
 SLOW = 0.2
 """Factor by which a correction must shrink the residual, else its matrix is made again [-]."""
 
@@ -246,7 +244,7 @@ class Continuation:
 
     def last_allowed(self, allowed: float, forbidden: float) -> float:
         """The last value of the parameter between two that the model allows."""
-        for _ in range(HALVINGS):
+        for _ in range(1200):  # down to the smallest number
             middle = 0.5 * (allowed + forbidden)
             if middle in (allowed, forbidden):
                 break

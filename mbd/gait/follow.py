@@ -36,8 +36,6 @@ BESIDE = 1e-3
 """Distance along the tangent at which a test function is asked for a second time [-]."""
 BACK = 0.02
 """Distance before a limit of events from which it is looked for [-]."""
-SMALLEST = 1e-4
-"""Least part of a step in the second parameter that is tried [-]."""
 SECANTS, LOCATED = 12, 1e-12
 """Evaluations of a margin at most, and the distance at which it counts as zero [-]."""
 
@@ -119,7 +117,7 @@ def follow(branch: Any, point: Any, parameter: str, to: float, steps: int) -> Po
             new, why = None, str(error)
         if new is None:
             share *= 0.5
-            if share < SMALLEST:
+            if share < 1e-4:  # least part of a step in the second parameter that is tried
                 break
             continue
         over.append(over[-1] + move)

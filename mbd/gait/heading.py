@@ -28,8 +28,6 @@ from mbd.gait.reflection import in_space
 
 __all__ = ["Heading", "heading_of"]
 
-STATES = 4
-"""States at which a mechanism is compared with itself after a turn [-]."""
 ROUNDS, FINE = 12, 1e-15
 """Newton steps by which a state is turned as another, and the last of them [rad]."""
 
@@ -110,7 +108,7 @@ def _is_the_same(heading: Heading, parameters: Vector) -> bool:
     mechanism, random = heading.mechanism, np.random.default_rng(13)
     layout, configuration = mechanism.layout, mechanism.equations.configuration
     defaults = np.array(configuration.defaults)
-    for _ in range(STATES):
+    for _ in range(4):  # states at which the mechanism is compared with itself
         q0, q = (configuration.compose(defaults, end) for end in random.uniform(-0.5, 0.5, (2, layout.n_v)))
         y, angle = random.uniform(-1.0, 1.0, layout.n), float(random.uniform(-3.0, 3.0))
         turn = np.eye(layout.n)

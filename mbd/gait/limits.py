@@ -20,12 +20,8 @@ from mbd.gait.special_points import SpecialPoint
 
 __all__ = ["changed_events", "limit_between", "limit_beyond"]
 
-HALVINGS = 60
-"""Halvings of a bracket at most."""
 NEAREST, FURTHEST = 1e-6, 2e-2
 """Distances along the tangent at which a limit is looked for ahead of the last gait [-]."""
-EARLY = 0.999
-"""Time of a step over that of before below which its foot touched down early [-]."""
 BY_OUTCOME = {"scuffs": "scuff", "falls": "fall", "misses": "lost event"}
 """Kinds of points at which a walk is lost, where its events do not tell."""
 
@@ -56,7 +52,7 @@ def _bracket(
 ) -> tuple[float, float, Corrected | None, Arrival | None]:  # fmt: skip
     """Places along the tangent up to and from which events are those of before and others, with what there is."""
     low, high, good = 0.0, ds, None
-    for _ in range(HALVINGS):
+    for _ in range(60):  # halvings of a bracket at most
         middle = 0.5 * (low + high)
         corrected = _corrected(given, last, middle)
         if isinstance(corrected, Corrected) and not changed_events(last.events, corrected.found.arrival.events):
@@ -124,7 +120,8 @@ def _kind(given: Continuation, last: BranchPoint, beyond: Arrival | None) -> tup
     if beyond is None:
         return "", ""
     known = BY_OUTCOME.get(beyond.outcome.kind, "")
-    early = given.map.section in given.map.feet and beyond.period < EARLY * last.period
+    # time of a step over that of before below which its foot touched down early
+    early = given.map.section in given.map.feet and beyond.period < 0.999 * last.period
     if known == "scuff" or (early and changed_events(last.events, beyond.events)):
         return "scuff", given.map.section
     before, after = Counter(last.events), Counter(beyond.events)

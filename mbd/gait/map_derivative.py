@@ -29,8 +29,6 @@ NEAR_ENOUGH, UNSEEN = 30.0, 1e-9
 """Factor by which what a parameter changes may differ from `STATE_STEP`, and the share of it that is no change [-]."""
 MAX_RESCALING, MAX_RESCALINGS, WIDEST = 1e5, 12, 1e15
 """Factor by which its difference changes at most at once, how often, and how wide it gets, over it or 1 [-]."""
-COARSE_STEP = 1e-5
-"""Difference where two runs a direction must do."""
 LEVELS = 3
 """Differences of each direction at most: h, 2h, 4h."""
 ENOUGH, CLOSER = 1e-9, 0.125
@@ -103,7 +101,7 @@ def map_derivative(
     found = measured(map_, chart, c, values) if base is None else base
     if isinstance(found, Arrival):
         raise SimulationError(f"the base of derivatives {found.outcome}")
-    scale = 1.0 if levels > 1 else COARSE_STEP / STATE_STEP
+    scale = 1.0 if levels > 1 else 1e-5 / STATE_STEP  # coarser where two runs must do
     units = np.eye(chart.size) if state else ()
     columns = [_Column(unit, "", scale * STATE_STEP) for unit in units]
     none = np.zeros(chart.size)

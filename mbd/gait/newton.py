@@ -22,8 +22,6 @@ from mbd.state import State
 
 __all__ = ["FixedPoint", "fixed_point"]
 
-MOST = 30
-"""Newton iterations [-]."""
 SHORTEST = 1.0 / 64.0
 """Least part of a Newton step that is tried [-]."""
 DECREASE = 0.25
@@ -104,7 +102,7 @@ def _search(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> N
     """Newton's method from the state of the point; its outcome tells how it ended."""
     found: Measured | Outcome | None = _measure(map_, point.chart, np.zeros(point.chart.size), values, point)
     walked = 0
-    for _ in range(MOST):
+    for _ in range(30):
         if not isinstance(found, Measured):
             assert found is not None
             point.outcome = map_.explained(point.state, found, values)

@@ -28,8 +28,6 @@ __all__ = ["Failed", "Search", "fallen_first", "first_found", "first_return", "g
 FIRST_STEPS, HALVINGS = 11.8, 9
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
 blur its instant; and how often they are halved until their error is below `tol`."""
-LATE = 10.0
-"""Latest time of a return, over that of the first, beyond which the walk is over [-]."""
 NEAR = 1e-2
 """Distance [m, rad] within which the rows of the section hold a start that is taken as one on it."""
 RESOLVED = 0.1
@@ -108,7 +106,8 @@ def with_step(search: Search, start: State, values: Values, dt: float | None) ->
     step = arrival.period / FIRST_STEPS if arrival.outcome.good else map_.dt
     if not arrival.outcome.good and arrival.outcome.kind != "numerical error":
         return search, float("nan")
-    longest = min(map_.longest, LATE * arrival.period) if arrival.outcome.good else map_.longest
+    # beyond, the walk is over
+    longest = min(map_.longest, 10.0 * arrival.period) if arrival.outcome.good else map_.longest
     before: Vector | None = None
     error = np.inf
     for _ in range(HALVINGS):

@@ -16,8 +16,6 @@ from mbd.tape.derivatives import jvps, live
 
 __all__ = ["depends_on_time", "moving_on", "reset_names"]
 
-SAMPLES = 2
-"""States at which rows with places of touchdown are moved along [-]."""
 FAR, FAR_STATES = 20.0, 8
 """How far along a coordinate [m, rad], and at how many states, nothing may change where the tape cannot decide."""
 SAME = 1e-10
@@ -111,7 +109,7 @@ def _follows(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
     compose = mechanism.equations.configuration.compose
     move = np.zeros(layout.n_v)
     move[k] = 0.7
-    for _ in range(SAMPLES):
+    for _ in range(2):  # states at which the rows are moved along
         ends = random.uniform(-0.5, 0.5, (2, layout.n_v))
         defaults = np.array(mechanism.equations.configuration.defaults)
         q0, q1 = (compose(defaults, end) for end in ends)

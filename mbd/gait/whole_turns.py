@@ -16,9 +16,6 @@ from mbd.gait.unmoved import reset_names
 
 __all__ = ["angles", "unwound", "whole_turn_changes_nothing"]
 
-STATES = 3
-"""States at which a mechanism is compared with itself after a whole turn of an angle [-]."""
-
 
 def angles(mechanism: Mechanism) -> list[int]:
     """Numbers of the increments that are angles of their own, none of a quaternion's."""
@@ -54,7 +51,7 @@ def _is_the_same(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
     layout, random = mechanism.layout, np.random.default_rng(17)
     defaults, move = np.array(configuration.defaults), np.zeros(layout.n_v)
     move[k] = 2.0 * np.pi
-    for _ in range(STATES):
+    for _ in range(3):  # states at which the mechanism is compared with itself
         touched, q = (configuration.compose(defaults, end) for end in random.uniform(-0.5, 0.5, (2, layout.n_v)))
         y = random.uniform(-1.0, 1.0, layout.n)
         turned = configuration.compose(q, move)

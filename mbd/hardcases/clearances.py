@@ -16,8 +16,6 @@ from mbd.hardcases.references import accuracy, numbers, published, size
 
 __all__ = ["CASES"]
 
-BEYOND = 1.5
-"""Times the last published impact, which is past the instant at which the impacts pile up."""
 
 CORNERS = ("front-top", "front-bottom", "rear-top", "rear-bottom")
 """As the reference counts them."""
@@ -125,7 +123,8 @@ def rattling(id: str, scheme: Any) -> Outcome:
         Figure("change with the order of the corners, relative [-]", difference(run, other), 1e-9),
         Figure("penetration [m]", deepest(run), 1e-10),
         *impact_figures(model, run),
-        *steady_figures(turning(id, scheme, float(steps[0]), beyond=BEYOND)[1]),
+        # past the instant at which the impacts pile up
+        *steady_figures(turning(id, scheme, float(steps[0]), beyond=1.5)[1]),
     ]
     late = run.time > 0.8 * run.time[-1]
     return Outcome(

@@ -21,9 +21,6 @@ from mbd.progress import counted
 
 __all__ = ["run"]
 
-INTERRUPTED = 130
-"""The exit code of a command that was stopped by Ctrl-C."""
-
 
 def run(
     names: Sequence[str] = (),
@@ -62,7 +59,7 @@ def run(
     if stopped:
         kept = f"; {markdown} is left as it was" if markdown else ""
         print(f"stopped after {len(verdicts)} of {len(able)} cases{kept}", file=sys.stderr)
-        return INTERRUPTED
+        return 130  # the exit code of a command that was stopped by Ctrl-C
     return 0 if all(verdict.passed for verdict in verdicts) else 1
 
 

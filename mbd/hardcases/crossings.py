@@ -9,9 +9,6 @@ import numpy as np
 
 __all__ = ["crossing", "falls"]
 
-PARTS = 1000
-"""Into which an interval is cut, four times: round-off is left."""
-
 
 def crossing(run: Any, value: Callable[[Any], Any], left: float, right: float) -> float:
     """The instant between two others at which a value changes its sign, by the run's own interpolation.
@@ -19,7 +16,7 @@ def crossing(run: Any, value: Callable[[Any], Any], left: float, right: float) -
     value : of what `run.at` gives, at many instants
     """
     for _ in range(4):
-        times = np.linspace(left, right, PARTS + 1)
+        times = np.linspace(left, right, 1001)  # four times: round-off is left
         positive = np.asarray(value(run.at(times))) > 0.0
         changed = np.flatnonzero(positive != positive[0])
         if not len(changed):

@@ -17,8 +17,6 @@ from mbd.compile.llvm import tag_key
 
 __all__ = ["build", "is_allowed", "keep", "start_build"]
 
-LONGEST = 600.0
-"""Seconds after which a build that has not ended is taken for dead, and another may begin."""
 
 PAUSE = 0.5
 """Seconds between two looks at whether another process has built the kernel."""
@@ -68,7 +66,8 @@ def keep(tag: str, make: Callable[[], bytes]) -> None:
     mark = store.directory / f"{key}.building"
     while store.load(key, lasting=True) is None:
         with contextlib.suppress(OSError):
-            if time.time() - mark.stat().st_mtime > LONGEST:
+            # seconds after which a build that has not ended is taken for dead, and another may begin
+            if time.time() - mark.stat().st_mtime > 600.0:
                 mark.unlink()
         try:
             mark.touch(mode=0o600, exist_ok=False)

@@ -13,8 +13,6 @@ from mbd.errors import ModelError
 __all__ = ["axis_of", "turn_of", "turn_words"]
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-TRAVELLED = 0.5
-"""How far the middle of the markers must move for the way to be taken as forward [m]."""
 
 
 def axis_of(word: str, what: str) -> Any:
@@ -63,7 +61,7 @@ def _ahead(markers: Mapping[str, Matrix], vertical: Any) -> tuple[Any, str]:
             ways.append(seen[-1] - seen[0])
         way = np.median(ways, axis=0)
         axis = max(level, key=lambda each: abs(way @ each))
-        if abs(way @ axis) >= TRAVELLED:
+        if abs(way @ axis) >= 0.5:  # half a metre of travel tells forward
             sign = 1.0 if way @ axis > 0.0 else -1.0
             word = ("-" if sign < 0.0 else "") + names[tuple(axis)]
             return sign * axis + 0.0, f"its {word} forward, along which the markers move {abs(way @ axis):.2g} m"

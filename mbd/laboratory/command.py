@@ -13,8 +13,6 @@ from mbd.laboratory.read import read
 
 __all__ = ["measured"]
 
-CUTOFF = 6.0
-"""Of the filter of coordinates before their rates are taken [Hz]."""
 PLATES = (".mot", ".sto")
 """Files of forces, looked for beside markers."""
 
@@ -39,5 +37,5 @@ def measured(path: str, model: Any, feet: Any = ()) -> Any:
         if not beside:
             raise ModelError(f"{Path(path).name} has no force plates, and no .mot or .sto lies beside it")
         loads = read(beside[0])
-    motion = inverse_kinematics(model, recording, cutoff=CUTOFF)
+    motion = inverse_kinematics(model, recording, cutoff=6.0)  # Hz, before rates are taken
     return inverse_dynamics(model, motion, plates=assign_plates(motion, loads, list(feet)))

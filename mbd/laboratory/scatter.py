@@ -28,8 +28,6 @@ SPLINE = 6.0
 DIFFERENCES = {4: SPLINE * 13.676571703571772, 5: SPLINE * 26.64328436439567}
 """Standard deviations of the kth differences of such h² s̈: √(1/π ∫ (6 (1 − cos θ)/(2 + cos θ))² (2 − 2 cos θ)ᵏ dθ), θ
 from 0 to π [-]."""
-NORMAL = 1.482602218505602
-"""Standard deviation of a normal distribution over its median absolute deviation [-]."""
 
 
 class Scatter(NamedTuple):
@@ -58,7 +56,8 @@ def scatter_of(time: Vector, coordinate: Vector, moment: Vector) -> Scatter | No
 
 
 def _deviation(values: Vector, order: int) -> float:
-    return NORMAL * float(np.median(np.abs(np.diff(values, order))))
+    # standard deviation of a normal distribution over its median deviation
+    return 1.482602218505602 * float(np.median(np.abs(np.diff(values, order))))
 
 
 def noise_remarks(equations: Equations, motion: Motion, effort: Matrix, driven: NDArray[np.bool_]) -> list[str]:

@@ -18,10 +18,6 @@ __all__ = ["Lines", "numbers_of", "read_lines"]
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d{1,4})?$")
 GAPS = {"", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "-nan(ind)", "missing"}
 """What stands for a value that was not measured."""
-SMALL = 10_000_000
-"""Size up to which no file is too large [bytes]."""
-SHARE = 0.05
-"""Part of the free memory that a text may fill before it is split [-]."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ def read_lines(path: Path) -> Lines:
     """
     try:
         size = path.stat().st_size
-        if size > SMALL and size > SHARE * available():
+        if size > 10_000_000 and size > 0.05 * available():
             raise TrajectoryError(f"{path.name} has {size / 1e6:.0f} MB, too large for the memory that is free")
         data = path.read_bytes()
     except OSError as error:

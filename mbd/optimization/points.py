@@ -24,8 +24,6 @@ BESIDE = 1e-3
 """Difference of an unknown, over its value or 1, at which numbers without derivatives are found again [-]."""
 CLOSER = 1e-5
 """The same for a user's function of numbers alone."""
-HALVINGS = 4
-"""How often the way to a gait is halved where Newton's method does not find it at once."""
 
 
 @dataclass(eq=False)
@@ -122,7 +120,8 @@ class GaitSource(Source):
                 done = target
             except GaitError:
                 share /= 2.0
-                if share < 0.5**HALVINGS:
+                # how often the way to a gait is halved where Newton's method does not find it at once
+                if share < 0.5**4:
                     raise
         return gait
 

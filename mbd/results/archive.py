@@ -44,12 +44,8 @@ COMPRESSION = 1
 """Level of zlib: higher levels take five times as long for a few percent [-]."""
 SAMPLE, WORTH = 1 << 15, 0.5
 """How much of an array is compressed to see whether that pays [bytes], and how small it must become for it [-]."""
-SHARE = 0.5
-"""Part of the free memory that the arrays of a file may fill [-]."""
 WORDS, TIMES = 200, 200
 """How many times larger than in the file the words, and the instants, may become [-]."""
-SMALL = 1 << 22
-"""Size below which no member is too large [bytes]."""
 META, HASH = "meta", "hash"
 """Members beside the arrays: words, and the hash of all others."""
 
@@ -187,7 +183,8 @@ class Members:
     def growth(self, name: str) -> float:
         """How many times larger than in the file a member becomes; 1 for a small one."""
         info = self._info(name)
-        return info.file_size / max(info.compress_size, 1) if info.file_size > SMALL else 1.0
+        # size below which no member is too large [bytes]
+        return info.file_size / max(info.compress_size, 1) if info.file_size > (1 << 22) else 1.0
 
     def read(self, name: str) -> NDArray[Any]:
         """The numbers of an array."""
@@ -297,7 +294,7 @@ def _arrays(members: Members, wanted: Iterable[str], meta: Mapping[str, Any]) ->
         if name == "time" and members.growth(name) > TIMES:
             raise Unreadable(f"its instants would take {size_in_words(members.size(name))}")
     size, free = sum(members.size(name) for name in names), available()
-    if size > SHARE * free:
+    if size > 0.5 * free:
         raise Unreadable(f"it needs {size_in_words(size)} of memory, of which {size_in_words(free)} are free")
     arrays = {name: members.read(name) for name in names}
     if HASH in members.names or meta.get("hashed"):

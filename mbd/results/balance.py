@@ -46,8 +46,6 @@ LEAST_SIZE = -1e6
 """Log |det| that stands for that of a singular matrix [-]."""
 SETTLED = 1e-13
 """Relative change of multipliers at which that ends [-]."""
-STICKS = 2
-"""Phase of a friction that sticks."""
 
 Flags = NDArray[np.bool_]
 
@@ -191,7 +189,7 @@ class Balance:
         closed, phase = mode[:contacts], mode[contacts:]
         every = [
             k for k, row in enumerate(self.equations.rows)
-            if (row.contact < 0 or closed[row.contact]) and (row.friction < 0 or phase[row.friction] == STICKS)
+            if (row.contact < 0 or closed[row.contact]) and (row.friction < 0 or phase[row.friction] == 2)  # it sticks
         ]  # fmt: skip
         if not every:
             return Held([], [])

@@ -42,8 +42,6 @@ RESOLVED = 0.05
 """Error of the work of an impact, over its largest, up to which rows tell it [-]."""
 UNSURE = 10.0
 """Gain of a penalty contact of a user's own law over its error below which it is not told [-]."""
-MOST_AGAIN = 20000
-"""Intervals of a power that are integrated again, at most: the longest ones."""
 
 
 def ledger(columns: ModelColumns) -> Ledger:
@@ -236,7 +234,7 @@ def _long(
     differ = np.where(known, np.abs(steps - plain), 0.0)
     if rate is None:
         differ[known & (differ <= ALIKE * np.max(np.abs(work)))] = np.inf  # few rows: both are the trapezoid
-    long = np.sort(np.argsort(-differ, kind="stable")[:MOST_AGAIN])
+    long = np.sort(np.argsort(-differ, kind="stable")[:20000])
     return np.asarray(long[differ[long] > least])
 
 

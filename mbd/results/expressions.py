@@ -36,8 +36,6 @@ KINDS = ("t", "q", "x", "v", "z", "a", "s", "lam", "anchor", "switch", "slip", "
 """Kinds of inputs."""
 MEMBERS = {"graph": ("i", 6), "graph numbers": ("f", 0), "graph outputs": ("i", 0), "graph terms": ("i", 0)}
 """Arrays, each with its kind and number of columns; those of tables besides."""
-HIGHEST = 3
-"""Highest derivative of a table."""
 
 
 @dataclass(frozen=True)
@@ -255,7 +253,7 @@ def _node(
         expect(0 <= line[4] < len(KINDS) and 0 <= line[5] < room[KINDS[line[4]]], "'graph'")
         data = KINDS[line[4]], line[5]
     elif op == "table":
-        expect(0 <= line[4] < len(tables) and 0 <= line[5] <= HIGHEST, "'graph'")
+        expect(0 <= line[4] < len(tables) and 0 <= line[5] <= 3, "'graph'")
         data = tables[line[4]], line[5]
     node = Node(tape, len(tape.nodes), op, tuple(made[place] for place in places), data)
     tape.nodes.append(node)

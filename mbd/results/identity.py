@@ -26,8 +26,6 @@ from mbd.trajectory import Trajectory
 
 __all__ = ["identity", "identity_of_model"]
 
-LENGTH = 24
-"""Hexadecimal digits of a digest [-]."""
 
 _LIBRARY = tuple(
     f"{Path(path).resolve()}{os.sep}"
@@ -44,7 +42,7 @@ SKIPPED = frozenset({"moved"})
 
 def identity(*values: Any) -> str:
     """The digest of some values."""
-    return _Reader().of(values)[:LENGTH]
+    return _Reader().of(values)[:24]
 
 
 def identity_of_model(model: Any, mechanism: Mechanism) -> dict[str, str]:

@@ -26,12 +26,8 @@ from mbd.results.record import Rows
 
 __all__ = ["Projection"]
 
-CORRECTIONS = 3
-"""Corrections of positions: an error of 0.01 is round-off after the third [-]."""
 LEAST_RANK = 0.05
 """Least singular value of rows, each over its largest length in the metric of inertia, from which they are followed."""
-SPREAD = 64
-"""Stored rows by which that length is found."""
 SMALL = 1e-12
 """Correction, of coordinates of size 1, that is no matter whatever the next one is [-]."""
 
@@ -71,7 +67,7 @@ class Projection:
         first, last = (self._missed(kept, rows, places.lower, ends) for ends in (places.lower, places.upper))
         aim, aim_rate = ((1.0 - theta) * a + theta * b for a, b in zip(first, last, strict=True))
         led, good, before = found, self._has_rank(kept, found), np.full(len(found), np.inf)
-        for _ in range(CORRECTIONS):
+        for _ in range(3):  # an error of 0.01 is round-off after the third
             x, sound = self._correction(kept, led, aim)
             size = np.max(np.abs(x), axis=1, initial=0.0)
             good &= sound & ((size < 0.5 * before) | (size <= SMALL))
@@ -97,7 +93,7 @@ class Projection:
         key = tuple(kept)
         if key not in self._longest:
             every = self.balance.states.rows
-            spread = every.part(np.unique(np.linspace(0, len(every) - 1, SPREAD).astype(np.intp)))
+            spread = every.part(np.unique(np.linspace(0, len(every) - 1, 64).astype(np.intp)))
             lengths = np.max(np.linalg.norm(np.nan_to_num(self._scaled(kept, spread)), axis=2), axis=0)
             self._longest[key] = np.where(lengths > 0.0, lengths, 1.0)
         return self._longest[key]

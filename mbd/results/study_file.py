@@ -22,8 +22,6 @@ __all__ = ["StudyFile"]
 
 SEAL = "seal"
 """The member of each line that is a hash of the others."""
-DIGITS = 16
-"""Hexadecimal digits of a seal [-]."""
 
 
 class StudyFile:
@@ -124,7 +122,7 @@ def _text(value: Any) -> str:
 
 def _seal(head: str, part: Mapping[str, Any]) -> str:
     """The hash of a part of the study with this head."""
-    return sha256(f"{head} {json.dumps(part)}".encode()).hexdigest()[:DIGITS]
+    return sha256(f"{head} {json.dumps(part)}".encode()).hexdigest()[:16]
 
 
 def _begun(path: Path) -> bool:

@@ -28,10 +28,6 @@ MOVES = 1e-8
 """Derivative, relative to its terms, that moves off such an edge [-]."""
 ROUND_OFF = 1e-11
 """What impulses and velocities may miss of their laws [-]."""
-MOST_NEWTON = 12
-"""Changes of all branches at once before every set of them is tried [-]."""
-MOST_CHOICES = 6561
-"""Sets of branches that are tried [-]."""
 
 
 class Unknown(Exception):
@@ -196,7 +192,7 @@ def chosen(programs: Programs, before: Motion, mode: Mode, law: Law, trivial: Co
     """
     _check_frictions(programs, law.held | law.free | law.parting)
     choice = Choice(law.held | law.free | law.parting, law.parting, np.zeros(len(programs.equations.frictions)))
-    for _ in range(MOST_NEWTON):
+    for _ in range(12):
         phase = _phase(programs, before, mode, choice, law, trivial)
         faults = _faults(programs, phase, mode, choice, law)
         if not faults:
@@ -250,7 +246,7 @@ def _choices(programs: Programs, law: Law) -> Iterator[Choice]:
     every, frictions = law.held | law.free | law.parting, programs.equations.frictions
     free, parting = sorted(law.free), sorted(law.parting)
     loose = [f for f, each in enumerate(frictions) if each.contact in every]
-    if 2 ** len(free + parting) * 3 ** len(loose) > MOST_CHOICES:
+    if 2 ** len(free + parting) * 3 ** len(loose) > 6561:
         return
     for signs in product((0.0, 1.0, -1.0), repeat=len(loose)):
         slip = np.zeros(len(frictions))

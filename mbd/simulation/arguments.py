@@ -23,8 +23,6 @@ HUGE = 1e6
 
 LARGEST_ERROR = 1e30
 """Error of coordinates above which nobody can mean to ask for it; products with it must stay finite [m, rad]."""
-MOST_STEPS = 1 << 53
-"""Steps between two rows above which there is no run of so many [-]."""
 
 CHOICES = {
     "contact": ("auto", "events", "nonsmooth"), "impact": ("newton", "poisson", "sequential"),
@@ -77,7 +75,7 @@ def _numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any,
     elif tol is None and (not is_number(dt) or not math.isfinite(dt) or dt <= 0.0):
         faults.append(f"dt must be a positive number of seconds, not {shown(dt)}; 1e-3 suits a walker")
     faults += _times(start, dt, until)
-    if not isinstance(store, Integral) or isinstance(store, bool) or not 1 <= int(store) <= MOST_STEPS:
+    if not isinstance(store, Integral) or isinstance(store, bool) or not 1 <= int(store) <= (1 << 53):
         faults.append(f"store must be a whole number of steps ≥ 1, not {shown(store)}")
     if not is_number(rest_speed) or not rest_speed >= 0.0:
         faults.append(f"rest_speed must be a speed ≥ 0, not {shown(rest_speed)}")

@@ -26,8 +26,6 @@ __all__ = ["LOSS", "Factors", "Pivot", "factors"]
 
 LOSS = 1e-8
 """Part of its terms that a pivot must keep: less, and half of all digits are lost [-]."""
-DIVISION = 16.0
-"""What a division costs, in multiplications: all that follows waits for it."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +180,8 @@ class _Pattern:
         beside = [self.A[row][c] for c in self.columns if c not in (column, without_column) and self.A[row][c]]
         long, wide = below.count(EXPRESSION), beside.count(EXPRESSION)
         subtractions, products = len(below) * len(beside) + len(below) + len(beside), long * wide + long + wide
-        return subtractions + products + (0.0 if self.A[row][column] == NUMBER else DIVISION + len(below))
+        # a division costs sixteen multiplications: all that follows waits for it
+        return subtractions + products + (0.0 if self.A[row][column] == NUMBER else 16.0 + len(below))
 
     def eliminate(self, row: int, column: int) -> None:
         self.rows.remove(row)

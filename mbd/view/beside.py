@@ -11,9 +11,6 @@ from typing import Any
 
 __all__ = ["beside"]
 
-PATIENCE = 60.0
-"""Seconds that a copy may take longer than its original, before the original does its work again."""
-
 
 @contextmanager
 def beside(write: Callable[[], object]) -> Iterator[None]:
@@ -30,7 +27,8 @@ def beside(write: Callable[[], object]) -> Iterator[None]:
             copy.terminate()
         raise
     if copy is not None:
-        copy.join(PATIENCE)
+        # seconds that a copy may take longer than its original, before the original does its work again
+        copy.join(60.0)
         if copy.exitcode is None:
             copy.terminate()
             copy.join()

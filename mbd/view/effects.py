@@ -19,9 +19,6 @@ __all__ = ["bars"]
 
 NOTE: dict[str, Any] = {"va": "center", "fontsize": 7.5}
 
-TALL = 0.32
-"""Height of a bar's row [inch]."""
-
 
 def bars(found: Effects, path: str | Path | None = None) -> Figure:
     """Three panels with a row for each effect: its share of the energy, the change without it, its operations.
@@ -30,7 +27,7 @@ def bars(found: Effects, path: str | Path | None = None) -> Figure:
     change is hatched where events differ or the run ends otherwise: then it is that until there.
     """
     each = found.contributions
-    with drawing(path, 9.4, 1.5 + TALL * len(each)) as figure:
+    with drawing(path, 9.4, 1.5 + 0.32 * len(each)) as figure:  # inches a row
         share, change, cost = figure.subplots(1, 3, sharey=True, width_ratios=[1.0, 1.5, 1.0])
         places = range(len(each))
         shades = [tone(CYCLE[2]) if one.name in found.droppable else tone(CYCLE[0]) for one in each]

@@ -21,8 +21,6 @@ from mbd.view.style import INK, NEUTRAL, PAPER, color, tone
 
 __all__ = ["Facets", "facets", "shaded", "size_of", "surfaces"]
 
-RADIUS = 0.016
-"""Of capsules, over the size of the mechanism [-]."""
 
 FINEST = 0.035
 """Longest edge of a facet, over the size of the mechanism [-]."""
@@ -50,7 +48,7 @@ def size_of(picture: Scene) -> float:
 
 def facets(picture: Scene) -> Facets:
     """Bodies, wheels, blades and joints of the first instant."""
-    r = RADIUS * size_of(picture)
+    r = 0.016 * size_of(picture)
     parts = [*_bodies(picture, r), *_joints(picture, r), *_around(picture, r)]
     return Facets(np.concatenate([part.corners for part in parts]), np.concatenate([part.color for part in parts]))
 

@@ -16,8 +16,6 @@ OBLIQUE = np.deg2rad(np.arange(-45.0, -66.0, -5.0))
 """Yaws tried, from halfway between the side and the front to nearly the front [rad]."""
 RAISED = 0.3
 """Pitch of a walker's first view [rad]."""
-INSTANTS = 40
-"""Pictures of a run that are judged, at most."""
 QUANTILE = 0.2
 """Part of the time in which the sides may be nearer to each other than what is compared."""
 NEAR = 0.01
@@ -37,7 +35,8 @@ def first_view(picture: Scene) -> tuple[float, float]:
     pairs = _pairs(picture)
     if not len(pairs):
         return FIRST
-    rows = np.unique(np.linspace(0, len(picture.positions) - 1, INSTANTS).round().astype(int))
+    # pictures of a run that are judged, at most
+    rows = np.unique(np.linspace(0, len(picture.positions) - 1, 40).round().astype(int))
     apart = picture.positions[rows][:, pairs[:, 1]] - picture.positions[rows][:, pairs[:, 0]]  # from left to right
     length = np.linalg.norm(apart, axis=-1)
     usual = np.maximum(length.mean(axis=0), 1e-9)

@@ -35,8 +35,6 @@ AT_POINT = {
     "largest multiplier": lambda point: point.multipliers.largest,
 }  # fmt: skip
 """Quantities of a branch at one of its points."""
-MOST = 6
-"""Angles that the phase plane shows."""
 FAR = 3.0
 """Modulus beyond which a multiplier is drawn at the edge of the picture [-]."""
 
@@ -79,7 +77,7 @@ def _angles(run: Trajectory) -> dict[str, str]:
     found = {name: f"{name}.rate" for name, kind in coordinates if kind == "rad" and f"{name}.rate" in run}
     joints = [name.removesuffix(".orientation.w") for name, _ in coordinates if name.endswith(".orientation.w")]
     found |= {f"{j}.rotation_vector.{axis}": f"{j}.angular_velocity.{axis}" for j in joints for axis in "xyz"}
-    return dict(list(found.items())[:MOST])
+    return dict(list(found.items())[:6])  # angles that the phase plane shows
 
 
 def _multipliers(axes: Any, gait: LimitCycle) -> None:

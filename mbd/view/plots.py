@@ -33,8 +33,6 @@ __all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait", "port
 MANY = 60
 """Events beyond this number are left to the contact bars, so that lines do not hide the curves."""
 
-LAYERS = 8
-"""Causes that a stack of energies shows one by one; beyond, those of a kind are one layer."""
 
 QUANTITIES = {
     "rad": "angle", "m": "length", "rad/s": "angular rate", "m/s": "speed", "rad/s²": "angular acceleration",
@@ -151,10 +149,6 @@ def _upright(axes: Any, times: Sequence[float], low: float, high: float, **look:
     axes.add_collection(lines, autolim=False)
 
 
-NAMED = 0.012
-"""Share of the time of a run that a letter of the name of a state takes in its bar [-]."""
-
-
 def _shade(axes: Any, run: Trajectory, wanted: Sequence[str]) -> None:
     """The times at which contacts are closed: of those asked for by name, else of feet, else of all; a shade a side."""
     contacts = [
@@ -189,7 +183,8 @@ def _bars(axes: Any, run: Trajectory) -> None:
             spans, shade = stretches(run.time, run[mode] == state), tone(CYCLE[number % len(CYCLE)])
             axes.broken_barh([(a, b - a) for a, b in spans], (row - 0.32, 0.64), color=shade, alpha=0.45, linewidth=0)
             for a, b in spans:
-                if b - a > NAMED * len(state) * whole:
+                # share of the time of a run that a letter of the name of a state takes in its bar
+                if b - a > 0.012 * len(state) * whole:
                     axes.text(0.5 * (a + b), row, as_label(state), ha="center", va="center", fontsize="x-small")
     axes.set_yticks(range(len(names)), [as_label(name) for name in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
@@ -259,7 +254,7 @@ def _mark_events(ledger: Ledger, upper: Any, lower: Any) -> None:
 def _spent(ledger: Ledger) -> list[Part]:
     """What took energy, as layers: each element, or each kind where there are many; little ones on top."""
     parts = [part for part in ledger.parts if part.kind in SPENT and np.any(part.energy)]
-    if len(parts) > LAYERS:
+    if len(parts) > 8:  # beyond, those of a kind are one layer
         sums = ledger.by_kind()
         parts = [Part(kind, kind, sums[kind]) for kind in dict.fromkeys(part.kind for part in parts)]
     return sorted(parts, key=lambda part: -float(np.max(np.abs(part.energy))))

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_forces", "with_forces"]
 
-LONGEST = 1.0 / 3.0
-"""The largest force, over the size of the mechanism [-]."""
 FORCE = "#009E73"
 
 
@@ -48,7 +46,8 @@ def draw_forces(axes: Any, picture: Scene, rows: Matrix, size: float) -> None:
     """
     pushes = [push for push in picture.pushes if np.any(push.force[0])]
     forces = [float(np.linalg.norm(push.force[0])) for push in pushes]
-    ends = [_arrow(axes, push, rows, LONGEST * size / max(forces)) for push in pushes]
+    # the largest force, over the size of the mechanism
+    ends = [_arrow(axes, push, rows, size / (3.0 * max(forces))) for push in pushes]
     if pushes:
         text, end = f"{max(forces):.3g} N", ends[int(np.argmax(forces))]
         axes.annotate(text, end, (4.0, 2.0), textcoords="offset points", color=tone(INK), fontsize=8.0, zorder=7)

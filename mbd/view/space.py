@@ -20,9 +20,6 @@ __all__ = ["TURN", "space", "surface"]
 TURN = 1e-4
 """Steps of directions and quaternions [-]."""
 
-COARSE = 5.0
-"""Steps of heights of a surface that moves, over those of places."""
-
 
 def space(picture: Scene, step: float) -> dict[str, Any]:
     """Solids, hinges and stops over time, facets of each kind of solid in use, ground axes (columns), camera views.
@@ -68,7 +65,7 @@ def surface(sheet: Sheet, upwards: Vector, step: float) -> dict[str, Any]:
     return {
         "times": [round(float(t), 9) for t in sheet.times], "rows": rows, "count": count, "holes": holes.tolist(),
         "at": _series(corners[0], step), "up": [finite(x) for x in upwards],
-        "risen": [packed(each, COARSE * step) for each in risen[1:]],
+        "risen": [packed(each, 5.0 * step) for each in risen[1:]],  # heights in coarser steps than places
     }  # fmt: skip
 
 

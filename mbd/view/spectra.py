@@ -25,8 +25,6 @@ HALF = float(np.pi)
 """ω dt of two steps a period, beyond which there is no period to speak of [rad]."""
 LONG = re.compile(r"\d+\.\d{5,}")
 """Numbers that are shortened in labels."""
-HIGHEST = 1.35
-"""Spectral radius up to which the axis goes [-]."""
 
 
 def spectra(found: Sequence[Criteria], path: str | Path | None = None) -> Figure:
@@ -47,7 +45,7 @@ def spectra(found: Sequence[Criteria], path: str | Path | None = None) -> Figure
                 axes.plot(each.turns, _above(values), style, color=shade, linewidth=width)
                 axes.plot(each.turns, _above(-values), ":", color=shade, linewidth=width)
         upper.axhline(1.0, color=tone(NEUTRAL), linewidth=0.7)
-        upper.set_ylim(0.0, HIGHEST)
+        upper.set_ylim(0.0, 1.35)
         upper.set_ylabel("spectral radius ρ")
         upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
         middle.set_ylabel("damping ratio of the scheme")

@@ -10,9 +10,6 @@ from mbd.view.scene import Scene
 
 __all__ = ["kept", "motion"]
 
-FARTHEST = 60
-"""Most pictures that one interval stands for."""
-
 
 def motion(picture: Scene) -> Matrix:
     """All that a page interpolates, (F, k), over the size of the mechanism: places, and quaternions by half of it.
@@ -51,7 +48,7 @@ def kept(time: NDArray[np.float64], moving: Matrix, tolerance: float) -> NDArray
 def _farthest(time: NDArray[np.float64], moving: Matrix, first: int, stop: int, tolerance: float) -> int:
     """The last picture to which one straight line leads from the first."""
     good = first + 1
-    for end in range(first + 2, min(stop, first + FARTHEST) + 1):
+    for end in range(first + 2, min(stop, first + 60) + 1):  # most pictures that one interval stands for
         share = (time[first + 1 : end] - time[first]) / (time[end] - time[first])
         line = moving[first] + share[:, None] * (moving[end] - moving[first])
         if float(np.max(np.abs(moving[first + 1 : end] - line))) > tolerance:

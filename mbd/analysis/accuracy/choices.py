@@ -33,12 +33,8 @@ PROBES = (2000, 20000, 200000)
 """Steps of the run that looks for time scales, until one succeeds."""
 PROBE_STEP = 1e-3
 """Its step where the end is an event [s]."""
-SEARCH = 200000
-"""Steps after which the event that ends the run is no longer waited for."""
 LEAST_ROWS, MOST_ROWS = 1500, 4000
 """Rows of the reference."""
-FEW = 20
-"""Steps of the run that only tells names and sizes, where values are published and steps given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +195,7 @@ def _probe(
     """
     scheme = GeneralizedAlpha(rho_inf=0.8)
     if isinstance(until, str):
-        latest = start.time + SEARCH * PROBE_STEP
+        latest = start.time + 200000 * PROBE_STEP  # the event that ends the run is no longer waited for then
         run = simulate(model, start, scheme, dt=PROBE_STEP, until=(until, latest), **options)
         if run.status != 1:
             raise ModelError(f"until: {until!r} did not happen before t = {latest:g} s; give (name, latest time)")
@@ -211,7 +207,7 @@ def _probe(
                          f"(name, latest time), not {until!r}")  # fmt: skip
     if steps is not None:
         dt = float(min(steps))
-        end = min(last, start.time + FEW * dt)
+        end = min(last, start.time + 20 * dt)
         run = simulate(model, start, scheme, dt, until=end, **options, on_failure="return")
         if stopped(run):
             raise KeyboardInterrupt

@@ -36,8 +36,6 @@ MOST_STRIDES = {"DOP853": 400, "Radau": 4000}
 """Strides within one step after which the method gives up: the scene is too stiff for it."""
 KEPT = 1000
 """Dense outputs of a course that are kept; only the last few are needed."""
-RETURNS = 4
-"""Corrections that bring a state back to its rows, at most; one does where they are smooth."""
 ON_ROWS = 1e-14
 """|h| and |ḣ|, relative to the size of the state, that need no correction."""
 
@@ -84,7 +82,7 @@ class Balance:
     def on_rows(self, t: float, q: Vector, y: Vector) -> tuple[Vector, Vector]:
         """The nearest positions and velocities that the rows allow."""
         n, n_v = self.layout.n, self.layout.n_v
-        for _ in range(RETURNS if len(self.rows) else 0):
+        for _ in range(4 if len(self.rows) else 0):  # one does where rows are smooth
             matrix, _, (h, rate, _), H = self._evaluate(t, q, y)
             h = np.where(self.held, h, 0.0)
             size = 1.0 + max(np.max(np.abs(q)), np.max(np.abs(y)))

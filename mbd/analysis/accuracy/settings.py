@@ -22,20 +22,10 @@ COUNT = 6
 """Steps, each half the one before."""
 TENTH = 10.0
 """The finest step is for an error this many times less than that wanted [-]."""
-MOST_STEPS = 400000
-"""Of the finest of these steps."""
-HIGH = 4
-"""Order from which a scheme gets steps of its own [-]."""
-LONGER = 16.0
-"""The largest of them over that of the other schemes [-]."""
-LEAST_ROWS_OF_ONE = 4
-"""The largest step is at most this part of the run [-]."""
 TOLERANCES = {False: (1e-3, 1e-4, 1e-5), True: (1e-3, 1e-5, 1e-7)}
 """Of schemes of low and of high order, over the middle range of the coordinates, where no error is wanted [-]."""
 PARTS = (1.0, 0.1, 0.01)
 """Tolerances where an error is wanted, over it and the middle range of the coordinates [-]."""
-LEAST_OF_LOW = 1e-6
-"""Least tolerance over the range that a scheme of order 2 is asked for: below it takes millions of steps [-]."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +50,7 @@ class Setting:
 
 def is_high(scheme: Integrator) -> bool:
     """Whether a scheme is of an order for which the steps of the others are far too short."""
-    return scheme.order() >= HIGH
+    return scheme.order() >= 4  # from order 4 on a scheme gets steps of its own
 
 
 def steps_of(probe: Trajectory, span: float) -> tuple[float, ...]:
@@ -74,7 +64,7 @@ def steps_of(probe: Trajectory, span: float) -> tuple[float, ...]:
 
 def long_steps(probe: Trajectory, span: float) -> tuple[float, ...]:
     """Those of schemes of high order: the largest 16 times longer, at most a quarter of the run."""
-    return _halved(rounded(min(LONGER * steps_of(probe, span)[0], span / LEAST_ROWS_OF_ONE)))
+    return _halved(rounded(min(16.0 * steps_of(probe, span)[0], span / 4)))  # at least four rows
 
 
 def steps_for(target: float, error: float, dt: float, span: float) -> tuple[float, ...]:
@@ -83,7 +73,7 @@ def steps_for(target: float, error: float, dt: float, span: float) -> tuple[floa
     >>> steps_for(1e-4, error=1e-3, dt=1e-3, span=1.0)
     (0.00256, 0.00128, 0.00064, 0.00032, 0.00016, 8e-05)
     """
-    finest = max(0.9 * dt * math.sqrt(target / TENTH / error), span / MOST_STEPS)
+    finest = max(0.9 * dt * math.sqrt(target / TENTH / error), span / 400000)  # so many of the finest steps at most
     least = rounded(min(finest, span / 2**COUNT))
     return tuple(least * 2.0**k for k in reversed(range(COUNT)))
 
@@ -98,7 +88,8 @@ def tolerances(scheme: Integrator, ranges: Sequence[float], target: float | None
     known, high = [each for each in ranges if each > 0.0], is_high(scheme)
     middle = sorted(known)[len(known) // 2] if known else 1.0
     wanted = TOLERANCES[high] if target is None else tuple(part * target for part in PARTS)
-    held = wanted if high else tuple(max(each, LEAST_OF_LOW) for each in wanted)
+    # below, a scheme of order 2 takes millions of steps
+    held = wanted if high else tuple(max(each, 1e-6) for each in wanted)
     return tuple(dict.fromkeys(rounded(each * middle) for each in held))
 
 

@@ -38,8 +38,6 @@ CHECKS = (2.0, 8.0, 32.0)
 """Steps between rows of the reference over those of the runs that check it, one after the other [-]."""
 NEAR = 3.0
 """Difference of such a run, over the bound of the reference, that is near enough [-]."""
-CHECK_SECONDS = 3.0
-"""Wall time of such a run after which no finer one is made [s]."""
 CLEAR = 10.0
 """An error is reported where it is this many times the bound of what it was judged by [-]."""
 WORDS = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}
@@ -203,7 +201,7 @@ def _by_another(found: Truth, run: Callable[[float], Trajectory], step: float) -
             return checked
         checked = _checked(other, found, checked)
         known = max(checked.values(), default=0.0) if checked is not None else np.inf
-        if known <= NEAR * found.error or other.stats["wall_seconds"] > CHECK_SECONDS:
+        if known <= NEAR * found.error or other.stats["wall_seconds"] > 3.0:  # no finer one is made after 3 s
             break
     return checked
 

@@ -13,9 +13,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Change", "Contribution", "Together"]
 
-MOST = 0.5
-"""Share of the instants between shifted events above which the others say too little of a run [-]."""
-
 
 @dataclass(frozen=True)
 class Change:
@@ -58,7 +55,7 @@ class Change:
     @property
     def telling(self) -> bool:
         """Whether it is comparable, and at most of the instants: where events are far apart the others say little."""
-        return self.comparable and self.left_out <= MOST
+        return self.comparable and self.left_out <= 0.5  # else the others say too little of a run
 
     def within(self, tolerance: float) -> bool:
         """Whether it is the run of the whole scene, but for that much of the ranges."""

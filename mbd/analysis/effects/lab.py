@@ -33,10 +33,6 @@ from mbd.trajectory import Trajectory
 
 __all__ = ["effects"]
 
-INSTANTS = 4001
-"""Instants at which outputs are compared."""
-LONGER = 2.0
-"""A scene whose end is an event is waited for this much longer without an effect [-]."""
 EACH, STEPS = 0.25, (500, 20000)
 """A timed run takes about this long [s], but has at least and at most so many steps."""
 OPTIONS = ("contact", "impact", "locate", "parameters", "rest_speed", "backend")
@@ -118,11 +114,12 @@ class Bench:
         if not self.whole.time[-1] > self.whole.time[0]:
             raise ModelError(f"until must be after the start at {self.whole.time[0]:g} s, not {self.until!r}")
         self.outputs = _outputs(self.whole, outputs)
-        self.instants = np.linspace(float(self.whole.time[0]), float(self.whole.time[-1]), INSTANTS)
+        self.instants = np.linspace(float(self.whole.time[0]), float(self.whole.time[-1]), 4001)
         self.scales = ranges(self.whole, self.outputs, self.instants)
         if isinstance(self.until, str):  # without an effect it may never happen
             begin, end = float(self.whole.time[0]), float(self.whole.time[-1])
-            self.until = (self.until, begin + LONGER * (end - begin))
+            # a scene whose end is an event is waited for this much longer without an effect
+            self.until = (self.until, begin + 2.0 * (end - begin))
         again = self.run(self.scene).stats  # all code has been made
         self.steps = int(np.clip(EACH * again["steps"] / again["wall_seconds"], *STEPS))
 

@@ -34,8 +34,6 @@ __all__ = ["Fit", "bounds", "fit"]
 
 ALIKE = 1e-8
 """Singular value of the scaled derivatives, over the largest, below which the data cannot tell directions apart [-]."""
-SHARE = 0.1
-"""Part in such a direction from which on a parameter is named [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,7 +319,7 @@ class _Search:
         weak = strengths <= ALIKE * max(strengths[0], 1e-300)
         groups, unknown = [], np.zeros(len(found.x), dtype=bool)
         for line in directions[weak]:
-            members = np.abs(line) > SHARE
+            members = np.abs(line) > 0.1
             groups.append(tuple(name for name, is_in in zip(self.names, members, strict=True) if is_in))
             unknown |= members
         covariance = (directions.T * np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, strengths) ** 2)) @ directions

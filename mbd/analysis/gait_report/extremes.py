@@ -12,12 +12,8 @@ from mbd.results.interpolation import OneSide
 
 __all__ = ["largest"]
 
-FINE = 1001
-"""Samples of the whole interval among which the largest is looked for first [-]."""
 FEWEST = 9
 """Samples of a part between two events at least, and of each refinement [-]."""
-REFINEMENTS = 4
-"""How often the neighbourhood of the largest sample is sampled again, each time four times as finely [-]."""
 
 
 def largest(values: Callable[[Vector, OneSide], Vector], begin: float, end: float, breaks: Sequence[float]) -> float:
@@ -33,10 +29,11 @@ def largest(values: Callable[[Vector, OneSide], Vector], begin: float, end: floa
     knots = np.unique([begin, *(time for time in breaks if begin < time < end), end])
     best = (-np.inf, knots[:2])
     for first, last in pairwise(knots):
-        count = max(FEWEST, int(np.ceil(FINE * (last - first) / (end - begin))))
+        # samples of the whole interval among which the largest is looked for first
+        count = max(FEWEST, int(np.ceil(1001 * (last - first) / (end - begin))))
         found, times = _sampled(values, first, last, count)
         best = max(best, _around(found, times), key=lambda one: one[0])
-    for _ in range(REFINEMENTS):
+    for _ in range(4):  # each four times as finely
         here, near = _around(*_sampled(values, float(best[1][0]), float(best[1][1]), FEWEST))
         best = max(best[0], here), near
     return float(best[0])

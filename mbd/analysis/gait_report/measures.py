@@ -32,8 +32,6 @@ CANCELS = 1e-3
 """Part of what braking and driving come to, below which their sum is none: they cancel [-]."""
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
-PANELS = 250
-"""Parts of a stride on each of which these points integrate a force, besides those that events make."""
 
 FORWARD = ("forward", "friction")
 """Parts of impulses along the way: in space, and in the plane."""
@@ -156,7 +154,8 @@ def _impulse(run: Trajectory, side: Side, stride: Stride) -> NDArray[np.float64]
     It is taken from one event to the next, at which forces may jump.
     """
     events = [event.time for event in run.events if stride.begin < event.time < stride.end]
-    knots = np.unique([*np.linspace(stride.begin, stride.end, PANELS + 1), *events])
+    # parts of a stride on each of which these points integrate a force, besides those that events make
+    knots = np.unique([*np.linspace(stride.begin, stride.end, 251), *events])
     half = np.diff(knots)[:, None] / 2.0
     times = knots[:-1, None] + half * (1.0 + POINTS)
     forces = forces_at(run, side, times.ravel())

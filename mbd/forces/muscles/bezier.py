@@ -12,8 +12,6 @@ from mbd.forces.samples import Samples
 
 __all__ = ["Corner", "corner", "curve"]
 
-POINTS = 100
-"""Intervals of the spline through one corner, which leave errors of some 1e-8."""
 OUTSIDE = 1.0
 """Length of the straight pieces in the table before the first and after the last corner, which continue [-]."""
 
@@ -40,7 +38,7 @@ def curve(*corners: Corner) -> Samples:
     """Corners one after another, straight before the first and after the last, as one function of x."""
     from scipy.interpolate import CubicSpline, PPoly
 
-    u = np.linspace(0.0, 1.0, POINTS + 1)
+    u = np.linspace(0.0, 1.0, 101)  # intervals of the spline through one corner, which leave errors of some 1e-8
     x, y, before, after = [], [], 0.0, 0.0
     for k, (across, up) in enumerate(corners):
         last = slice(None) if k == len(corners) - 1 else slice(-1)

@@ -14,8 +14,6 @@ from mbd.tape.functions import cosh, exp, log, minimum, sign, sinh, sqrt
 
 __all__ = ["CURVES", "Curves", "DeGrooteFregly", "Millard"]
 
-HALLEY_ITERATIONS = 4
-"""Corrections after which the velocity of a fiber is exact to 1e-15 for every damping > 0 and activation."""
 NEWTON_STEPS = 12
 """The same from rest with the velocity curve of Millard et al., for damping ≥ 0.01; 10 suffice for 0.1."""
 
@@ -106,7 +104,8 @@ class DeGrooteFregly(Curves):
         S = S + Q * self.D3
         size = abs(S)
         u = sign(S) * minimum(size / (P + Q), _asinh(size / Q))
-        for _ in range(HALLEY_ITERATIONS):
+        # corrections after which the velocity of a fiber is exact to 1e-15 for every damping > 0 and activation
+        for _ in range(4):
             bend = Q * sinh(u)
             off, slope = P * u + bend - S, P + Q * cosh(u)
             u = u - 2.0 * off * slope / (2.0 * slope * slope - off * bend)

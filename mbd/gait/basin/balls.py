@@ -27,14 +27,8 @@ __all__ = ["Ball", "ball_of"]
 
 LARGEST, SMALLEST = 0.1, 1e-6
 """Radii that are tried, in the W-norm of coordinates of the section [m, rad, m/s, rad/s]."""
-SAMPLES = 48
-"""Places on the surface that are drawn at random beside those on its axes [-]."""
 INSIDE = (1.0, 0.5, 0.1)
 """Radii of the samples over that of the ball [-]."""
-LEAST = 0.3
-"""Contraction below which nothing is won by asking for more [-]."""
-PART = 0.1
-"""Part of the linear contraction that every sample must show [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +92,14 @@ def ball_of(name: str, gait: LimitCycle, walked: Walked) -> Ball:
         )
     from scipy.linalg import solve_discrete_lyapunov
 
-    shrinks = max(float(np.sqrt(spectral)), LEAST)
+    shrinks = max(float(np.sqrt(spectral)), 0.3)  # nothing is won by asking for more
     W = np.asarray(solve_discrete_lyapunov(P.T / shrinks, np.eye(size)))
     W = 0.5 * (W + W.T)
     W = W / np.linalg.eigvalsh(W)[0]
     axes = np.linalg.eigh(W)[1]
-    wanted = 1.0 - PART * (1.0 - shrinks)
-    random = np.random.default_rng(7).normal(size=(SAMPLES, size))
+    wanted = 1.0 - 0.1 * (1.0 - shrinks)
+    # places on the surface that are drawn at random beside those on its axes
+    random = np.random.default_rng(7).normal(size=(48, size))
     directions = np.vstack([axes.T, -axes.T, random])
     directions /= np.sqrt(np.einsum("ni,ij,nj->n", directions, W, directions))[:, np.newaxis]
     radius, base = LARGEST, Ball(gait.chart, np.array(W, dtype=np.float64), 0.0, 0, 0.0)

@@ -21,8 +21,6 @@ from mbd.tape.node import Node
 
 __all__ = ["OntoSection"]
 
-CORRECTIONS = 20
-"""Of positions, at most [-]."""
 FINE = 1e-14
 """Residual below which nothing is corrected, so that states on the section stay as they are, to the bit [m, rad]."""
 DEPENDENT = 1e-13
@@ -65,7 +63,7 @@ class OntoSection:
         inputs = {"t": np.zeros(len(q)), "q": q, "v": v, "z": z, "anchor": anchors}
         good = np.ones(len(q), dtype=bool)
         if self._held[0]:
-            for _ in range(CORRECTIONS):
+            for _ in range(20):  # of positions, at most
                 h, G = self._rows(self._positions, self._held[0], inputs, parameters)
                 off = np.max(np.abs(h), axis=1)
                 moving = (off > FINE) & np.isfinite(off)

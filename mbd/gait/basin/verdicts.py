@@ -189,7 +189,8 @@ class _Points:
             return np.zeros(count, dtype=bool), np.zeros(count, dtype=np.int64)
         up = up / size[:, np.newaxis]
         was, now = (self.at(self.points, inputs, parameters) for inputs in (start, end))
-        moved = {**start, "q": start["q"] + AHEAD * self._rates(start)}
+        # time ahead at which it is looked where the highest point goes [s]
+        moved = {**start, "q": start["q"] + 1e-4 * self._rates(start)}
         soon = self.at(self.points, moved, parameters)
         heights = np.einsum("npk,nk->np", was, up)
         top, each = np.argmax(heights, axis=1), np.arange(count)
@@ -208,10 +209,6 @@ class _Points:
     def _rates(self, inputs: dict[str, Matrix]) -> Matrix:
         """q̇."""
         return self.equations.configuration.rates(inputs["q"], inputs["v"])
-
-
-AHEAD = 1e-4
-"""Time ahead at which it is looked where the highest point goes [s]."""
 
 
 def _up(map_: ReturnMap, changes: Changes, count: int) -> Matrix:

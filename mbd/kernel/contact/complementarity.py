@@ -32,8 +32,6 @@ __all__ = ["complementarity"]
 
 MAX_NEWTON = 12
 """Changes of all branches at once before and after the solution over cones [-]."""
-MAX_SINGLE = 4
-"""Changes of the worst branch that follow, for each contact and friction [-]."""
 NEARLY_SOLVED = 0.1
 """Part of the largest impulse that cones may miss laws by for their branches to be tried [-]."""
 ROUND_OFF = 1e-11
@@ -63,7 +61,8 @@ def choose_branches(K: Balance, level: int) -> int:
     status = change_branches(K, level, 0)
     if status == CONFLICT or status == NO_IMPACT:
         solve_cones(K, level, NEARLY_SOLVED)  # else from the last branches
-        again = change_branches(K, level, MAX_SINGLE * (K.n_contacts + K.n_frictions))
+        # changes of the worst branch that follow
+        again = change_branches(K, level, 4 * (K.n_contacts + K.n_frictions))
         if again != CONFLICT and again != NO_IMPACT:
             return again
         if level == 1 and status == NO_IMPACT and again == NO_IMPACT and solve_cones(K, level, CONE_TOLERANCE) == 1:

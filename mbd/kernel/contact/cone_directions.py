@@ -15,10 +15,6 @@ from mbd.kernel.records import Balance, ContactForces, ContactRows, Frictions
 
 __all__ = ["mass_of", "misses", "turn_directions"]
 
-MOST_TURNS = 60
-"""Rounds in which directions are looked for [-]."""
-FIRST_TURNS = 3
-"""Projections before Newton's method [-]."""
 EXACT = 1e-14
 """γ × e over its terms that is round-off [-]."""
 SMALL_TURN = 1e-6
@@ -151,10 +147,10 @@ def turn_directions(K: Balance, level: int) -> int:
     if count == 0:
         return 0
     best = find_misses(K, count)
-    for turn in range(MOST_TURNS):
+    for turn in range(60):  # rounds in which directions are looked for
         if best <= EXACT:
             return 0
-        by_newton = turn >= FIRST_TURNS and turn % 4 != 3
+        by_newton = turn >= 3 and turn % 4 != 3  # three projections come before Newton's method
         if by_newton:
             status = newton_turns(K, level, count)
             if status != 0:

@@ -32,14 +32,8 @@ CONE_TOLERANCE = 1e-10
 """Largest ‖F‖ that counts as solved, of the largest impulse."""
 CONE_EXACT = 1e-15
 """‖F‖ of the largest impulse below which there is nothing to gain."""
-CONE_ROUNDS = 48
-"""Newton steps and blocks of sweeps."""
-CONE_GROWTHS = 4
-"""Ways to grow: friction at once, in 8 parts, in 32, in 128."""
 CONE_SOFT = 1e-7
 """Velocity by which a soft contact gives way to its impulse, of the least that any contact alone does."""
-CONE_SWEEPS = 12
-"""Sweeps in a block."""
 CONE_REGULAR = 1e-9
 """ε, where the diagonal of the equations is 1."""
 CONE_RIGID = 1e-12
@@ -73,7 +67,7 @@ def cone_solve(
     for u in range(n):
         if work[n * n + 2 * n + u] > 0.0:
             least = min(least, 1.0 / work[n * n + 2 * n + u])
-    for growth in range(CONE_GROWTHS):
+    for growth in range(4):  # ways to grow: friction at once, in 8 parts, in 32, in 128
         if not (size < 1e300 and best > CONE_TOLERANCE):
             break
         if growth > 0:
@@ -98,7 +92,7 @@ def cone_iterate(
     o_best = n * n + 3 * n
     best = cone_faults(G, n, shift, z, owner, twin, limit, slope, work) / cone_size(n, z, size)
     work[o_best : o_best + n] = z[:n]
-    for turn in range(CONE_ROUNDS):
+    for turn in range(48):  # Newton steps and blocks of sweeps
         if best <= CONE_EXACT:
             break
         moved = False
@@ -208,7 +202,7 @@ def cone_sweep(
 
     Along the tangents only the `share` of ρ is taken: less goes slower, but with large friction does not go in circles.
     """
-    for _ in range(CONE_SWEEPS):
+    for _ in range(12):  # sweeps in a block
         for u in range(n):
             cone_project(G, n, z, owner, twin, limit, slope, work, share, u)
 

@@ -51,8 +51,6 @@ FARTHEST = 0.25
 """Turn of the direction that is held, from γ at the start of the step, beyond which γ turns away before zero [rad]."""
 TURNS_AWAY = -2
 """Of `come_to_zero`: what seemed to come to rest slides on."""
-MAX_CORRECTIONS = 8
-"""Corrections of a direction that is held [-]."""
 TOGETHER = 0.02
 """Part of its speed before the step at which another pair rests at the same instant [-]."""
 NOTHING = 1e-200
@@ -164,7 +162,7 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
     given_up = TURNS_AWAY if may_follow(K, K.event_index) else 0
     relaxation = 1.0
     whole = 0.0
-    for turn in range(MAX_CORRECTIONS):
+    for turn in range(8):  # corrections of a direction that is held
         f = K.event_index
         product = 0.0
         square = 0.0

@@ -15,8 +15,6 @@ from mbd.kernel.records import Complementarity
 
 __all__ = ["disc_length", "disc_slack", "minimize_within_discs"]
 
-MOST_STEPS = 80
-"""Steps of Newton's method [-]."""
 FALL = 0.1
 """Part of the present gap that the next step aims at [-]."""
 NO_GAP = 1e-15
@@ -138,7 +136,7 @@ def minimize_within_discs(K: Complementarity, unknowns: int, discs: int) -> int:
             return 1
         K.disc_force[i] = 1.0 / K.disc_left[i] if K.disc_left[i] > 1e-3 else 1e3
     small = 0
-    for _ in range(MOST_STEPS):
+    for _ in range(80):  # steps of Newton's method
         gap = 0.0
         for i in range(discs):
             gap += K.disc_force[i] * K.disc_left[i] / discs

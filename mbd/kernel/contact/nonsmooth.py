@@ -28,8 +28,6 @@ __all__ = ["keep", "closes_below_surface", "must_release", "put_back", "rebound"
 
 SUNK = 1e4
 """Depth over the round-off of a gap at which a correction of positions has failed [-]."""
-MOST_LIFTS = 20
-"""Corrections of positions at one instant [-]."""
 HELD = 1024.0 * EPS
 """What a row on positions is off by, relative to its terms, where it holds [-]."""
 RESTING = 2.0
@@ -128,7 +126,7 @@ def project_gaps(K: Switching) -> int:
         K.lifting[k] = 1 if (along or K.dropped[k] == 1) else 0
     status = NO_IMPACT
     left = 0.0
-    for _ in range(MOST_LIFTS):
+    for _ in range(20):  # corrections of positions at one instant
         for c in range(K.n_contacts):
             near = K.closing[c] > 0 or K.closed[c] == 1
             if K.kind[c] == 0 and not near and K.armed[c] == 1 and is_watched(K, c, K.guards0):

@@ -30,9 +30,6 @@ from mbd.kernel.stepping.starting import restart_after_event
 
 __all__ = ["handle_event", "land"]
 
-MOST_HALVED = 3
-"""How often a non-smooth step whose end has no impulses is halved [-]."""
-
 
 def same_instant(K: Guards) -> bool:
     """Count switches without progress in time; true when there were too many, or when they repeat themselves."""
@@ -185,7 +182,7 @@ def land(K: Kernel, h: float, t1: float) -> int:
         status = take_transitions(K)
     if status == 0:
         status = restart_after_event(K)
-    if (status == NO_IMPACT or status == CONFLICT) and K.halvings < MOST_HALVED:
+    if (status == NO_IMPACT or status == CONFLICT) and K.halvings < 3:
         K.halvings += 1
         K.halves_left = 2 ** (K.halvings + 1)
         K.n_shortened += 1

@@ -17,9 +17,6 @@ from mbd.kernel.stepping.restart import evaluate
 
 __all__ = ["find_due", "has_happened", "is_allowed", "is_due", "settle_fresh", "take_transitions"]
 
-MAX_ROUNDS = 64
-"""Rounds of one instant above which its transitions follow each other without end."""
-
 
 def find_due(K: Guards) -> None:
     """The next instant of a timer, K.due_time and K.due_guard; of several the first in the order of transitions."""
@@ -80,7 +77,7 @@ def take_transitions(K: Switching) -> int:
             K.happened[i] = 0
         if taken == 0:
             return 0
-        if K.n_rounds > MAX_ROUNDS:
+        if K.n_rounds > 64:  # transitions that follow each other without end
             return ENDLESS_TRANSITIONS
         store_taken(K)
         open_released(K)

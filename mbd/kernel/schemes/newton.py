@@ -45,8 +45,6 @@ from mbd.kernel.tangent_rules import (
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]
 
-MOST_HALVINGS = 10
-"""How often a Newton correction is halved before the iteration goes on from where it is."""
 FAR = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
 MOST_STRAIGHT = 2
@@ -102,7 +100,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
                 size = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
                 grown = size > FAR and size > 0.9 * size_before(K, m, c_C, c_K, tolerance)
             restore_scales(K)
-        if halvings < MOST_HALVINGS and iteration > 0 and (error < 0.0 or grown):
+        if halvings < 10 and iteration > 0 and (error < 0.0 or grown):
             if fixed:
                 K.inverse_pivot = 0.0
                 return UNSOUND

@@ -62,8 +62,6 @@ from mbd.kernel.tangent_rules import NOT_FOLLOWED, follow_stages, further_correc
 
 __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 
-MOST_RETREATS = 10
-"""How often a Newton correction is halved before the iteration goes on from where it is."""
 FAR_OFF = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
 SLOW = 0.5
@@ -166,7 +164,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
                 size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) / (size + 1e-300)
                 grown = size > 0.9
             restore_scales(K)
-        if retreats < MOST_RETREATS and iteration > 0 and (error < 0.0 or grown):
+        if retreats < 10 and iteration > 0 and (error < 0.0 or grown):
             retreat_stages(K, m, 0.5)  # a full Newton step jumped over a steep place
             retreats += 1
             continue

@@ -41,9 +41,6 @@ from mbd.kernel.tangent_rules import follow_factors, follow_move, follow_rates, 
 
 __all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
-MOST_RETURNS = 8
-"""Newton corrections of positions onto the rows after a step; it takes one or two [-]."""
-
 
 def runge_kutta_start(K: SingularSteps) -> int:
     """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""
@@ -291,7 +288,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
     before = 1e300
     size = 0.0
     straight = False
-    for _ in range(MOST_RETURNS):
+    for _ in range(8):  # Newton corrections of positions onto the rows after a step; it takes one or two
         evaluate(K, t1, K.q1, K.y1)
         K.n_residuals += 1
         size = 0.0

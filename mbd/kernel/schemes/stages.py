@@ -50,8 +50,6 @@ __all__ = [
 ]  # fmt: skip
 
 
-MOST_BENDS = 60
-"""Rounds of the iteration for E_j: it converges by a factor of half the largest increment or so [-]."""
 MOST_STRETCHED = 4.0
 """Size of a step over that of the last above which its stages predict nothing: a parabola would go far astray [-]."""
 
@@ -136,7 +134,8 @@ def load_state(K: Steps, i: int, h: float) -> None:
 def bend_stages(K: Steps, h: float) -> None:
     """E_j of all stages at their rates, by iteration; it takes as many rounds as the increments are large."""
     o_E = stage_place(K, STAGE_BEND)
-    for _ in range(MOST_BENDS):
+    # rounds of the iteration for E_j: it converges by a factor of half the largest increment or so
+    for _ in range(60):
         change = 0.0
         speed = 0.0
         for i in range(3):

@@ -28,8 +28,6 @@ NEXT_TO = 1e-3
 """The same above which restarts are well-conditioned [-]."""
 ELSEWHERE = -2.0
 """In place of the time to an event: it fires in this step, but not next to a singular configuration [-]."""
-MOST_ROOT_STEPS = 100
-"""Steps to the root of an event's measure on the interpolant; it takes about ten [-]."""
 
 
 def may_pass_events(K: DependentRows, h: float) -> bool:
@@ -94,7 +92,7 @@ def root_inside(K: Switching, e: int, t: float, h: float, low: float, high: floa
         return low if f_low <= 0.0 else high
     middle = low
     last = 0
-    for turn in range(MOST_ROOT_STEPS):
+    for turn in range(100):  # steps to the root of an event's measure on the interpolant; it takes about ten
         middle = (low * f_high - high * f_low) / (f_high - f_low)
         if turn % 3 == 2 or not low < middle < high:
             middle = 0.5 * (low + high)

@@ -30,8 +30,6 @@ BESIDE = 2.0
 """Steps to or from a singularity within which rows change too much from stage to stage for one matrix [-]."""
 BESIDE_NOISY = 1000.0
 """The same within which round-off of rows may keep the residuals of a step with one matrix from falling [-]."""
-MOST_STAGE_PROJECTIONS = 8
-"""Newton corrections of positions onto the rows of a stage; it takes one or two [-]."""
 
 
 def spans_singularity(K: DependentRows, h: float) -> bool:
@@ -113,7 +111,7 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afre
     for j in range(K.n_v):
         K.stages[o_U + j] *= 0.0 if afresh else 1.0
     before = 1e300
-    for turn in range(MOST_STAGE_PROJECTIONS):
+    for turn in range(8):  # Newton corrections of positions onto the rows of a stage; it takes one or two
         hold_block(K)
         load_stage(K, i, h, t1)
         compose(K, K.q1)

@@ -53,8 +53,6 @@ SMALLEST = 0.1
 """Part of a step below which none is made to lead up to a singularity [-]."""
 CLEAR = 0.06
 """Part of a step by which a singularity must be away from all nodes [-]."""
-LOOKS_AHEAD = 4
-"""Places along the motion at which w is found [-]."""
 NEAR_ENOUGH = 0.01
 """Part of a step by which the last of these may differ from where w vanishes [-]."""
 VANISHED = 0.2
@@ -211,7 +209,7 @@ def times_to_singularities(K: SingularSteps, m: int, unit: float) -> float:
         K.work[m + k] = NOWHERE
     ahead = unit
     first = NOWHERE
-    for _ in range(LOOKS_AHEAD):
+    for _ in range(4):
         evaluate_ahead(K, ahead)
         row_norms(K, m)
         first = NOWHERE

@@ -24,8 +24,6 @@ LONGER_PART = 1.02
 """Growth of the parts from one to the next, after a step has failed for how far it turns a joint [-]."""
 MOST_TURN = 2.356194490192345
 """Way at the speed with which it ends, above which a step is not accepted: three eighths of a turn [rad]."""
-MOST_PARTS = 1e4
-"""Parts of a step above which a motion is lost otherwise [-]."""
 
 
 def whole_step(K: Motion) -> float:
@@ -46,7 +44,7 @@ def turned_end(K: Motion, t1: float) -> float:
         part = min(part, K.part_turn)
         K.part_turn = LONGER_PART * part if part < QUARTER_TURN else 0.0
     parts = largest_turn(K, K.y, h) / part
-    if not 1.0 < parts < MOST_PARTS:
+    if not 1.0 < parts < 1e4:  # beyond, the motion is lost otherwise
         return t1
     count = 1.0
     while count < parts:

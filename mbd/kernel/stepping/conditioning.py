@@ -23,8 +23,6 @@ FEW_DIGITS = 1e-6
 """Smallest pivot of the scaled matrix below which solutions are corrected [-]."""
 HOPELESS = 0.1
 """Relative error of accelerations known beforehand above which they are refused [-]."""
-MOST_START_CORRECTIONS = 14
-"""Corrections by the balance [-]."""
 
 
 def is_ill_conditioned(K: Report) -> bool:
@@ -49,7 +47,7 @@ def refine_accelerations(K: Balance) -> int:
     if not error < HOPELESS:
         return ILL_CONDITIONED
     left = error
-    for _ in range(MOST_START_CORRECTIONS):
+    for _ in range(14):  # corrections by the balance
         polish_with_rows(K, m)
         left *= error
         if left < EPS:

@@ -25,8 +25,6 @@ GROWTH = 0.8
 """ζ in a whole step that the trapezoidal rule still follows; less where the error of a scheme is larger [-]."""
 TRAPEZOID = 1.0 / 12.0
 """Constant of its error, in h³ times the rate of accelerations [-]."""
-FEWEST = 1.0 / 4096.0
-"""Least part of D that is tried where accelerations are not finite at its other end [-]."""
 
 
 def note_unforeseen(K: Kernel, h: float, t1: float, at_y: int, at_D: int) -> bool:
@@ -45,7 +43,7 @@ def outgrows(K: Switching, h: float, t1: float, stretch: float, at_y: int, at_D:
     """Whether the change that was not predicted feeds itself by more than `GROWTH`; `note_unforeseen` has found it."""
     n = K.n
     part = 1.0
-    while part >= FEWEST:
+    while part >= 1.0 / 4096.0:  # least part of D that is tried where accelerations are not finite at its other end
         take_back(K, at_y, at_D, part, 0.5 * h * part)
         if consistent(K, t1, K.q1, K.y1) == 0:
             moved = growth_between(K, h, stretch, part, at_D, 0, K.n_v)

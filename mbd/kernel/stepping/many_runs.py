@@ -17,14 +17,8 @@ from mbd.kernel.stepping.candidate import carry
 
 __all__ = ["END_NUMBERS", "march_many"]
 
-MOST_EVENTS = 2000
-"""Events of a run above which Python judges whether they crowd."""
 NEVER = float("inf")
 """When a run ends that is not to end [s]."""
-PRIME = 2147483647
-"""Numbers of sequences are rests of a division by it, which a real holds exactly."""
-BASE = 31
-"""Factor from one event of a sequence to the next."""
 END_NUMBERS = 7
 """Numbers of an end before its row: status, flag of the event that ended it, steps, events, sequence, lines, time."""
 
@@ -52,7 +46,8 @@ def march(K: Kernel) -> int:
         status = advance_to_end(K)
         K.steps_left -= K.n_steps - before + 1
         see_events(K)
-        if K.fallback > 0 or K.n_lost > 0 or K.n_seen > MOST_EVENTS:
+        # events of a run above which Python judges whether they crowd
+        if K.fallback > 0 or K.n_lost > 0 or K.n_seen > 2000:
             return NEEDS_PYTHON
         if status == DONE or status == NEW_MODE:
             return status
@@ -127,7 +122,8 @@ def see_events(K: Kernel) -> None:
         flag = index + K.flag_user if kind == LOG_EVENT else index
         if (kind == LOG_CLOSED or kind == LOG_EVENT) and K.notify[flag] == 1:
             K.stopped_by = flag
-        K.sequence = (K.sequence * BASE + 5 * index + kind + 1) % PRIME
+        # modulo the largest prime below 2³¹, which a real holds exactly
+        K.sequence = (K.sequence * 31 + 5 * index + kind + 1) % 2147483647
         K.n_seen += 1
     K.n_logged = 0
     K.n_stored = 0

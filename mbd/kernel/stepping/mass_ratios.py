@@ -20,8 +20,6 @@ LOSS = 1e-4
 """Part of a diagonal entry that is left as its pivot below which rates are corrected [-]."""
 GREAT_LOSS = 1e-8
 """The same below which they are corrected until corrections are small [-]."""
-MAX_CORRECTIONS = 8
-"""Corrections of rates at one state [-]."""
 SMALL_CORRECTION = 1e-9
 """Correction over the largest rate, both as they are, after which none follows [-]."""
 
@@ -96,7 +94,7 @@ def polish_rates(K: Balance, kept: float) -> None:
     """
     n = K.n
     before = 1e300
-    for _ in range(MAX_CORRECTIONS if kept < GREAT_LOSS else 1):
+    for _ in range(8 if kept < GREAT_LOSS else 1):
         find_imbalance(K)
         for i in range(n):
             K.rhs[i] = -K.out[i]

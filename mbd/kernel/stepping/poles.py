@@ -21,10 +21,6 @@ from mbd.kernel.stepping.scales import still_energy
 
 __all__ = ["peaks_within"]
 
-HALVINGS = 12
-"""How often the part of the way around the largest accelerations is halved."""
-AT_LEAST_HALVED = 3
-"""Halvings after which the largest accelerations must be beyond those at the ends by `RISEN` to go on."""
 RISEN = 1.5
 """Accelerations within a step over those at its ends below which there is nothing to be found [-]."""
 BEYOND = 100.0
@@ -56,7 +52,7 @@ def peaks_within(K: Switching, h: float, at_y: int) -> bool:
     a0 = first
     a2 = NOT_FOUND
     a4 = last
-    for halving in range(HALVINGS):
+    for halving in range(12):
         a1 = pull_at(K, h, low + width, at_y)
         if a2 == NOT_FOUND:
             a2 = pull_at(K, h, low + 2.0 * width, at_y)
@@ -66,7 +62,8 @@ def peaks_within(K: Switching, h: float, at_y: int) -> bool:
         most = max(max(a1, a2), max(a3, max(a0, a4)))
         if most > BEYOND * BEYOND * ends:
             return h * h * most > max(motion_at(K, at_y), 2.0 * still_energy(K))
-        if halving >= AT_LEAST_HALVED and not rises and most < RISEN * RISEN * ends:
+        # halvings after which the largest accelerations must be beyond those at the ends by `RISEN` to go on
+        if halving >= 3 and not rises and most < RISEN * RISEN * ends:
             return False
         if most == a0 or most == a1:  # the part around the largest: two of the four intervals
             a4 = a2

@@ -29,8 +29,6 @@ from mbd.kernel.stepping.restart import (
 
 __all__ = ["try_step", "turns"]
 
-MOST_PASSES = 60
-"""Times that the end of a brief step is asked for the rates that lead there, where these change its forces much [-]."""
 SETTLED = 1e-9
 """Change of these rates, over the largest, at which they are what leads there [-]."""
 BLURRED = 256.0 * EPS
@@ -121,7 +119,8 @@ def brief_step(K: Balance, h: float, t1: float) -> int:
     K.rate1[: K.n] = K.rate[: K.n]
     turning = turns(K)
     unsettled = turning
-    for passed in range(MOST_PASSES if turning else 2):
+    # times that the end of a brief step is asked for the rates that lead there, where these change its forces much
+    for passed in range(60 if turning else 2):
         fill_block(K, K.time, K.q, K.y)
         for i in range(K.n_v):
             K.block[K.o_x + i] = h * (K.y[i] + h * (K.rate[i] / 3.0 + K.rate1[i] / 6.0))

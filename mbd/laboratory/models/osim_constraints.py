@@ -33,8 +33,6 @@ __all__ = ["Coupler", "couplers_of", "hold", "loops_closed"]
 CLOSING = {"WeldConstraint": Weld, "PointConstraint": Spherical}
 """Joints that hold what these constraints hold; they close loops."""
 ORIGIN = (0.0, 0.0, 0.0)
-MAX_COUPLERS = 10
-"""Couplers one after another, from a coordinate that no joint is to one that is."""
 
 
 @dataclass
@@ -107,7 +105,7 @@ def hold(file: OsimFile, couplers: list[Coupler]) -> None:
 
 def _followed(coordinates: list[OsimCoordinate], function: Any) -> tuple[list[OsimCoordinate], Any]:
     """A function of a coordinate that no joint is, as a function of what its coupler makes it of."""
-    for _ in range(MAX_COUPLERS):
+    for _ in range(10):  # couplers one after another, from a coordinate that no joint is to one that is
         if len(coordinates) != 1 or coordinates[0].joint is not None or coordinates[0].coupled is None:
             break
         coupler = coordinates[0].coupled

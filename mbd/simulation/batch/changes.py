@@ -14,9 +14,6 @@ from mbd.errors import ModelError
 
 __all__ = ["Changes", "telling_values"]
 
-MOST_CHECKED = 2000
-"""Different sets of values that are judged one by one; of more, those with an extreme value [-]."""
-
 
 def telling_values(columns: Mapping[str, Vector], own: Mapping[str, float]) -> dict[str, float]:
     """A value of each column by which a mechanism is made: one that differs from the model's, where there is one.
@@ -59,7 +56,7 @@ class Changes:
             return
         table = np.column_stack(list(lists.values()))
         kinds, firsts = np.unique(table, axis=0, return_index=True)
-        if len(kinds) > MOST_CHECKED:
+        if len(kinds) > 2000:
             firsts = np.unique([pick(column) for column in lists.values() for pick in (np.argmin, np.argmax)])
         check, faults = model.parameter_check(), list[str]()
         for k in firsts:

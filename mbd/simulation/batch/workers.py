@@ -17,13 +17,6 @@ from mbd.simulation.run.run import Run
 
 __all__ = ["Interrupted", "Workers", "processors"]
 
-AT_ONCE = 4096
-"""Runs that a thread takes together at most."""
-LISTENING = 0.1
-"""Seconds between two instants at which the threads of a batch hear that somebody has interrupted it."""
-PARTS = 4
-"""Parts of the runs of each thread, so that one with short runs takes over from one with long ones [-]."""
-
 
 def processors() -> int:
     """How many processors this process may use."""
@@ -74,7 +67,8 @@ class Workers:
         Interrupted
             by Ctrl-C, with the runs that were over.
         """
-        size = max(min(AT_ONCE, -(-len(starts) // (PARTS * self.count))), 1)
+        # runs that a thread takes together at most; four parts each, so that one with short runs takes over
+        size = max(min(4096, -(-len(starts) // (4 * self.count))), 1)
         parts = [(first, min(first + size, len(starts))) for first in range(0, len(starts), size)] or [(0, 0)]
         count = min(self.count, len(parts))
         while len(self._many) < count:
@@ -106,7 +100,7 @@ class Workers:
                     try:
                         waiting_for = {pool.submit(work, many) for many in self._many[:count]}
                         while waiting_for:  # in short waits, since a long one would not hear Ctrl-C everywhere
-                            over_now, waiting_for = wait(waiting_for, LISTENING, FIRST_COMPLETED)
+                            over_now, waiting_for = wait(waiting_for, 0.1, FIRST_COMPLETED)
                             for task in over_now:
                                 task.result()
                     except BaseException:

@@ -10,8 +10,6 @@ from mbd.simulation.run.data import RunData
 
 __all__ = ["coarse_steps", "percent"]
 
-SAMPLES = 64
-"""Parts of a step at whose ends forces are evaluated [-]."""
 BLIND = 0.1
 """Step that is advised, over the present one, where forces do not show one [-]."""
 
@@ -51,7 +49,7 @@ def _resolving_step(run: RunData, record: Record, row: int) -> float:
     if not run.mechanism.vector or not h > 0.0:
         return blind
     mode = run.manager.mode(record.closed[row])
-    s = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None]
+    s = np.linspace(0.0, 1.0, 65)[:, None]  # parts of a step at whose ends forces are evaluated
     one, other, slope, end = record.q[row - 1], record.q[row], h * record.v[row - 1], h * record.v[row]
     q = one + s * slope + s**2 * (3.0 * (other - one) - 2.0 * slope - end) + s**3 * (slope + end - 2.0 * (other - one))
     v = record.v[row - 1] + s * (record.v[row] - record.v[row - 1])

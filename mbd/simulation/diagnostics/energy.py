@@ -41,10 +41,6 @@ from mbd.simulation.run.data import EnergyFindings, RunData
 
 __all__ = ["EnergyWatch", "Judgement", "judgement", "kinds_of"]
 
-FIRST_LOOK = 20000
-"""Stored rows after which a run that goes on is looked at; the next looks at four times as many, and at its end."""
-LOOKS = 4
-"""Looks at a run that goes on."""
 SPREAD, EARLY = 30, tuple(2**k for k in range(10))
 """Rows of a look: so many from the last look to now, and the first rows of a run at these numbers."""
 TELLING = 0.1
@@ -131,13 +127,14 @@ class EnergyWatch(EnergyFindings):
     def __init__(self) -> None:
         super().__init__()
         self.rows = self.ledgers = 0
-        self._due, self._judgements, self._upto = FIRST_LOOK, 0, 0
+        # a run that goes on is looked at then, and at four times as many
+        self._due, self._judgements, self._upto = 20000, 0, 0
         self._seen = np.zeros((0, 3))  # T, V and the way of the fastest coordinate, of the rows looked at so far
         self._cleared = 0.0  # a rise of energy that a ledger has explained
 
     def is_due(self, run: RunData) -> bool:
         """Whether a run that goes on is to be looked at now."""
-        return run.stored >= self._due and self._judgements < LOOKS
+        return run.stored >= self._due and self._judgements < 4
 
     @np.errstate(all="ignore")
     def judge(self, run: RunData) -> str:

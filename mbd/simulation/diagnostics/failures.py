@@ -24,8 +24,6 @@ MOST_EVENTS = 5000
 STALLED = frozenset({codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.TOO_TIGHT, codes.TOO_NEAR,
 codes.TOO_SMALL, codes.DEPENDENT, codes.OUTGROWN, codes.GAINED})  # fmt: skip
 """What steps fail with where friction locks a motion."""
-LATEST = 12
-"""Events that a failure tells."""
 
 
 def attempt(run: RunData) -> Callable[[str, State], Failure]:
@@ -42,7 +40,7 @@ def attempt(run: RunData) -> Callable[[str, State], Failure]:
         return Failure(
             problem, final.time, time, final, candidate, residuals, residual, run.tried, run.dt,
             run.stepper.integrator, run.settings, dict(run.changed),
-            (*run.earlier, *run.events)[-LATEST:], happened[len(run.events) :], run.model,
+            (*run.earlier, *run.events)[-12:], happened[len(run.events) :], run.model,  # the latest twelve
         )  # fmt: skip
 
     return failure

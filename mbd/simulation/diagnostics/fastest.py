@@ -15,8 +15,6 @@ from mbd.simulation.run.data import RunData
 
 __all__ = ["Matrices", "fastest", "free_motions", "matrices", "resolving_dt", "sane_rows", "stability"]
 
-LOOKED_AT = 6
-"""Rows at which a motion is looked for that may be too fast."""
 LARGEST = 40
 """Coordinates and states above which the tangents take too long to derive and compile for a sentence [-]."""
 SANE = 1e6
@@ -103,7 +101,7 @@ def sane_rows(run: RunData) -> list[int]:
     wild = np.flatnonzero(~(speeds <= SANE * max(1e-3, float(early[0]) if len(early) else 0.0)))
     last = int(wild[0]) if len(wild) else len(speeds)
     last = min(last, run.energy.row) if run.energy.row > 0 else last
-    return sorted(set(np.linspace(0, last - 1, LOOKED_AT).astype(int).tolist())) if last > 0 else []
+    return sorted(set(np.linspace(0, last - 1, 6).astype(int).tolist())) if last > 0 else []
 
 
 def stability(run: RunData, record: Record) -> str:

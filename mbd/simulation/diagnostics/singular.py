@@ -26,8 +26,6 @@ SINGULAR_START = 1e-7
 """Smallest singular value of the rows at a start, over the largest, below which branches of motions cross there [-]."""
 FEW_ROWS, CLEARLY = 24, 1e3
 """Rows whose islands are looked at only where their smallest singular value is below so many times that bound [-]."""
-MOST_ROWS = 200
-"""Rows above which a start is not asked for that [-]."""
 STEP_FAILURES = frozenset(
     {
         codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.DEPENDENT, codes.CONFLICT, codes.TOO_NEAR,
@@ -144,7 +142,7 @@ def singular_start(run: RunData) -> list[str]:
     v, start = run.kernel, run.start
     acting = run.manager.active_rows(run.manager.flags(start.mode.closed))
     rows = [row for row in acting if not v.dropped[row]]
-    if not 0 < len(rows) <= MOST_ROWS or run.resumed or len(start.anchors) != v.n_anchors:
+    if not 0 < len(rows) <= 200 or run.resumed or len(start.anchors) != v.n_anchors:
         return []
     y = np.concatenate([start.v, start.z])
     terms = run.mechanism.acceleration_terms(start.time, start.q, y, run.first_parameters, start.anchors)

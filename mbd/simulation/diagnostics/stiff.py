@@ -10,10 +10,6 @@ from mbd.simulation.run.data import RunData
 
 __all__ = ["bounded_by_stability"]
 
-MANY = 1000
-"""Steps below which nobody waits for a run [-]."""
-LOOKED_AT = 5
-"""Rows at which the fastest motion is looked for; at most of them it bounds the step [-]."""
 NEAR = 0.6
 """Step over the largest stable one from which stability bounds it: the control of steps stays below that [-]."""
 ITERATIONS = 24
@@ -30,11 +26,12 @@ def bounded_by_stability(run: RunData, record: Record) -> list[str]:
     differences of f (Hairer & Wanner, Solving Ordinary Differential Equations II, IV.2), when the run is over.
     """
     limit, steps = run.stepper.own.abilities.stability, int(run.kernel.n_steps)
-    if not (run.kernel.explicit and run.kernel.adaptive) or steps < MANY or len(record.time) < 3:
+    # nobody waits for so few
+    if not (run.kernel.explicit and run.kernel.adaptive) or steps < 1000 or len(record.time) < 3:
         return []
     sizes = np.diff(record.time) * (len(record.time) - 1) / steps  # some rows may not be stored
     taken = np.flatnonzero(sizes > 0.0)
-    chosen = taken[np.linspace(0, len(taken) - 1, LOOKED_AT + 2).astype(int)[1:-1]]
+    chosen = taken[np.linspace(0, len(taken) - 1, 7).astype(int)[1:-1]]
     with np.errstate(all="ignore"):
         rates = np.array([_rate(run, record, int(row), float(sizes[row])) for row in chosen])
     stiff = rates * sizes[chosen] > NEAR * limit

@@ -19,8 +19,6 @@ NEAR = 8.0 * codes.EPS
 """Two instants are one where they differ by less, relative: round-off of a sum of steps [-]."""
 WINDOW = 64.0
 """Steps before and after a kink in which others are counted [-]."""
-CROWD = 32
-"""Kinks in that window above which one is stepped over as part of a dense signal."""
 CROWD_OF_JUMPS = 256
 """The same of forces that jump."""
 RESTARTS = 1
@@ -35,7 +33,7 @@ def _ends_of_steps(jumps: Sequence[Jump], dt: float, follows_tolerance: bool) ->
     kept = []
     for limit, group in (
         (CROWD_OF_JUMPS, [jump for jump in jumps if jump.level <= 0]),
-        (CROWD, [jump for jump in jumps if jump.level > 0]),
+        (32, [jump for jump in jumps if jump.level > 0]),  # a dense signal is stepped over
     ):
         if limit == CROWD_OF_JUMPS and follows_tolerance:
             kept += group

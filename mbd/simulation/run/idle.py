@@ -15,9 +15,6 @@ from mbd.simulation.run.stepper import Stepper
 
 __all__ = ["keep_idle", "stepper_of"]
 
-MAX_IDLE = 8
-"""Steppers of a mechanism that are kept at most [-]."""
-
 
 def stepper_of(
     kind: type[Stepper],
@@ -45,7 +42,7 @@ def keep_idle(stepper: Stepper) -> None:
     if stepper.key is None or not stepper.reusable:
         return
     idle = stepper.mechanism.idle
-    if len(idle) >= MAX_IDLE:
+    if len(idle) >= 8:
         idle.clear()
     idle[stepper.key] = stepper
 

@@ -19,9 +19,6 @@ from mbd.state import State
 
 __all__ = ["Ends", "ManyRuns", "may_be_many", "start_line"]
 
-STEPS_AT_ONCE = 1_000_000
-"""Steps of a call of the kernel, some 0.2 to 2 s, between which somebody may interrupt."""
-
 
 def may_be_many(run: Run, late_resets: bool = False) -> str:
     """Why runs like this one need Python between their steps; '' if they do not.
@@ -157,7 +154,8 @@ class ManyRuns:
         v.run, v.n_runs, v.begun = 0, count, 0
         self.interrupted, done = False, False
         while not done:
-            v.steps_left = STEPS_AT_ONCE
+            # steps of a call of the kernel, some 0.2 to 2 s, between which somebody may interrupt
+            v.steps_left = 1_000_000
             try:
                 status = stepper.march_many()
                 if status == codes.NEW_MODE:

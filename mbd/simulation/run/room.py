@@ -12,14 +12,8 @@ from mbd.simulation.run.data import RoomFindings, RunData
 
 __all__ = ["Room", "available", "memory"]
 
-SHARE = 0.25
-"""Part of the memory that is free which the rows of a run may fill: trial runs, and results, need some too."""
 EARLIEST, NOTABLE = 1 << 16, 1 << 25
 """Rows, and bytes of them, before which nothing is expected."""
-MANY = 1 << 22
-"""Rows above which a run that follows its error says how many they will be: nobody has chosen their number."""
-LARGE = 1.0e9
-"""Memory above which every run says how much it will need [bytes]."""
 
 
 class Room(RoomFindings):
@@ -58,7 +52,8 @@ class Room(RoomFindings):
 
     def _look(self, stored: int) -> None:
         """Ask for the free memory, of which these rows have taken some."""
-        self._most, self._seen = int(SHARE * (available() + stored * self.size)) // self.size, stored
+        # part of the memory that is free which the rows of a run may fill: trial runs, and results, need some too
+        self._most, self._seen = int(0.25 * (available() + stored * self.size)) // self.size, stored
 
     def check(self, run: RunData) -> str:
         """Look at a run that goes on; a sentence if it must not store any more rows."""
@@ -76,7 +71,8 @@ class Room(RoomFindings):
                 f"memory; the whole run needs about {rows:.2g} rows, {memory(rows * self.size)}; {_remedy(run)}"
             )
             return self.problem
-        is_large = (rows > MANY and run.kernel.adaptive) or rows * self.size > LARGE or rows > self.most
+        # where nobody has chosen their number, from 4 million rows on
+        is_large = (rows > (1 << 22) and run.kernel.adaptive) or rows * self.size > 1.0e9 or rows > self.most
         if is_large and not self.note:
             last = f"; it will be ended at {self.most} rows" if rows > self.most else ""
             self.note = (

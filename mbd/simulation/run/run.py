@@ -36,8 +36,6 @@ from mbd.trajectory import EventRecord, Trajectory
 
 __all__ = ["Run"]
 
-SHOW_EVERY = 0.1
-"""Wall time between two calls of progress and observers [s]."""
 INTERRUPTED = "interrupted"
 """The problem of a run that was interrupted, until its time is known."""
 OVERFULL = (
@@ -178,7 +176,7 @@ class Run(RunData):
                 return problem, ""
             if self.limit is not None and self.kernel.n_steps >= self.limit:
                 return "", f"stopped after {self.limit} steps at t = {self.now:g} s"
-            if perf_counter() - shown > SHOW_EVERY:
+            if perf_counter() - shown > 0.1:  # wall time between two looks [s]
                 shown = perf_counter()
                 self._show()
         return self._finish(f"ended by {ended!r} at t = {self.now:.6g} s")

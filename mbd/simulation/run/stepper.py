@@ -33,10 +33,6 @@ LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 TAKES_PART = 1e-7
 """Coefficient of a row below which another does not depend on it [-]."""
-MAX_KEPT_NUMBERS = 1 << 16
-"""Numbers in the arrays of a run up to which they are kept for another one [-]."""
-SUBSTEPS = 4
-"""Parts in which a step of a scheme of order 3 or more is looked at for guards [-]."""
 
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
@@ -67,7 +63,7 @@ class InitialArrays:
     """
 
     def __init__(self, kernel: Kernel, rooms: list[Any]) -> None:
-        self.is_small = sum(map(len, rooms)) <= MAX_KEPT_NUMBERS
+        self.is_small = sum(map(len, rooms)) <= (1 << 16)
         if self.is_small:
             self._values = dict(vars(kernel))
             self._places = [np.flatnonzero(room) for room in rooms]
@@ -299,7 +295,8 @@ class Stepper:
         v = self.kernel
         if v.auto:
             v.strategy = int(v.fallback > 0)
-        v.n_substeps = SUBSTEPS if self.integrator.order() > 2 and not v.strategy else 1
+        # parts in which a step of a scheme of order 3 or more is looked at for guards
+        v.n_substeps = 4 if self.integrator.order() > 2 and not v.strategy else 1
         return self._advance_compiled() if self.compiled else self._advance_plain()
 
     def keep_row(self) -> None:

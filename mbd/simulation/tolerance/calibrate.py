@@ -23,8 +23,6 @@ BEYOND = 3.0
 """Estimated error over the tolerance above which it counts as missed once repeats are used up [-]."""
 MOST_RUNS = 5
 """Runs in all, unless the last one came much nearer."""
-FURTHER_RUNS = 4
-"""Runs beyond these, each while the one before has come nearer [-]."""
 NEARER = 0.5
 """Error over that of the most accurate run before up to which a run has come nearer [-]."""
 FAR_FINER = 1.5
@@ -77,7 +75,7 @@ def calibrated(
         return _outcome([first], first, search, first.problem)
     trials = [] if first.problem else [first]
     wanted: float | None = first.allowed / (ratio if trials else PILOT)
-    for count in range(1, MOST_RUNS + FURTHER_RUNS):
+    for count in range(1, MOST_RUNS + 4):  # runs beyond these, each while the one before has come nearer
         if wanted is None or (count >= MOST_RUNS and not _coming_nearer(trials, tol)):
             break
         refused = _no_room(trials, wanted, power, order)

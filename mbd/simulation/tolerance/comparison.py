@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Gap", "gap"]
 
-SAMPLES = 64
-"""Rows of a run at which it is compared, about [-]."""
 MIDDLES = 32
 """Middles between rows at which it is compared, about, if what it gives there is in doubt [-]."""
 LATE, MAX_PARTS = 0.9, 8
@@ -42,8 +40,6 @@ MAX_PLACES = 512
 """Places between rows at which they are compared, about [-]."""
 TRUSTED = 0.02
 """Doubt of an interpolated coordinate, over the accuracy that is asked for, from which steps are taken again [-]."""
-DOUBTFUL = 16
-"""Instants at which steps are taken again, at most [-]."""
 ENOUGH = 0.5
 """Share of the instants up to which those in doubt are left out, as the others tell the error too [-]."""
 
@@ -123,7 +119,7 @@ def _named(run: Trajectory, other: Trajectory, names: tuple[str, ...], pairs: Ma
 def _rows(run: Trajectory, end: float) -> Vector:
     """Times of rows until the end, a bounded number of them."""
     count = int(np.searchsorted(run.time, end, side="right"))
-    chosen = np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).astype(np.intp))
+    chosen = np.unique(np.linspace(0, count - 1, min(count, 64)).astype(np.intp))
     return np.append(run.time[chosen], end)
 
 
@@ -214,7 +210,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     again = poor[doubt[poor] > TRUSTED * accuracy]
     sure[again] = False
     if len(again) > ENOUGH * len(sure) and Restepping.serves(columns):
-        again = again[np.argsort(-doubt[again], kind="stable")[:DOUBTFUL]]
+        again = again[np.argsort(-doubt[again], kind="stable")[:16]]
         q[again], sure[again] = columns.between(places.part(again), forces=False).q, True
     elif len(again) > ENOUGH * len(sure):
         sure[again] = True  # the polynomials are what there is

@@ -34,8 +34,6 @@ LEAST = 1e-5
 """Force of a drive, over the terms that cancel in it, below which it is measured by these [-]."""
 FREE = 1e-9
 """Part of a coordinate in a motion that all rows allow from which it is free [-]."""
-BENT = 64
-"""Rows of a run that are compared with the balance, at most [-]."""
 
 
 def driving_rows(equations: Equations) -> tuple[int, ...]:
@@ -92,7 +90,7 @@ def own_share(run: Trajectory) -> tuple[float, str]:
     step = np.diff(run.time)
     bent = np.max(np.abs(np.diff(lam, 2, axis=0)), axis=1, initial=0.0)
     bent[(step[1:] == 0.0) | (step[:-1] == 0.0)] = 0.0  # rows before and behind an event
-    chosen = 1 + np.sort(np.argsort(-bent, kind="stable")[:BENT])
+    chosen = 1 + np.sort(np.argsort(-bent, kind="stable")[:64])
     rows = columns.rows.part(chosen)
     solved = columns.balance.solve(rows)
     missed = np.where((solved.sound & solved.unique)[:, None], np.abs(rows.lam - solved.lam)[:, drives], 0.0)

@@ -20,8 +20,6 @@ __all__ = ["LONG", "foreseen"]
 
 LONG = 500_000
 """Rows that a pilot run is predicted from which looser runs are made first [-]."""
-LOOSE = 20_000
-"""Steps of the finest of the first three, about [-]."""
 FINER = 10.0
 """What a run allows over what the next one does [-]."""
 NEAREST = 100.0
@@ -42,7 +40,7 @@ def foreseen(
     pilot : a run that was ended because so many rows were predicted
     power : κ of the errors; order : of the scheme; names : of the results that the tolerance holds for
     """
-    looser = (pilot.source.room.expected / LOOSE) ** (order / power)
+    looser = (pilot.source.room.expected / 20_000) ** (order / power)  # steps of the finest of the first three, about
     allowed = pilot.allowed * FINER**2 * max(looser, NEAREST)
     trials: list[Trial] = []
     while allowed >= NEAREST * pilot.allowed:

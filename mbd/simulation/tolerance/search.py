@@ -47,8 +47,6 @@ NOTHING = 1e-6
 """Errors over the tolerance below which they do not tell runs apart [-]."""
 CHANGE = 1e4
 """Most by which the allowed error shrinks from one run to the next [-]."""
-LOOSER = 1e10
-"""Most by which it grows: no risk, as looser runs are judged by a finer one [-]."""
 LARGEST = 0.25
 """Longest step of a run that is looser than the first ones, over the length of the run [-]."""
 LEAST_ORDER, MOST_ORDER = 0.5, 1.5
@@ -117,7 +115,8 @@ class Search:
             return float(low.allowed * (high.allowed / low.allowed) ** min(max(part, 0.1), 0.9))
         base = under[-1] if under else known[0]
         reach = (goal / base.error) ** (1.0 / self.power)
-        return float(base.allowed * min(max(reach, 1.0 / CHANGE), LOOSER))
+        # no risk in growing: looser runs are judged by a finer one
+        return float(base.allowed * min(max(reach, 1.0 / CHANGE), 1e10))
 
     # errors ----------------------------------------------------------------------------------------------------------
     def estimated(self, trials: Sequence[Trial]) -> list[Trial]:
