@@ -5,7 +5,7 @@ The tangent pass (`mbd.sensitivity.tangent`) translates the kernel with other fu
 
 from __future__ import annotations
 
-from mbd.kernel.records import DependentRows, Kernel, Steps
+from mbd.kernel.records import DependentRows, Kernel, Reals, Steps
 
 __all__ = [
     "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
@@ -77,8 +77,8 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
     return NOT_FOLLOWED
 
 
-def follow_matrix(K: Steps, m: int, whole: bool) -> None:
-    """The position correction in K.work follows its matrix; `whole`: it is all of it, not a change."""
+def follow_matrix(K: Steps, m: int, x: Reals, whole: bool) -> None:
+    """A correction x follows its matrix; `whole`: x is all that positions are corrected by, not a change of it."""
 
 
 def takes_part(value: float) -> bool:

@@ -80,7 +80,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     moved = 1e300
     last = 0.0
     further = 0
-    for iteration in range(K.max_iterations):
+    for iteration in range(K.max_iterations + further_corrections()):
         tangent = not fresh
         if together:
             share_loads(K, m)
@@ -311,7 +311,7 @@ def solve_corrections(K: Steps, m: int, c_C: float, tangent: bool, shifting: boo
     """The change of the position shift in K.work, the corrections of rates and multipliers in K.rhs."""
     if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
         solve_with_factors(K, m, K.work, straight)
-        follow_matrix(K, m, tangent)
+        follow_matrix(K, m, K.work, tangent)
         for i in range(K.n_v if tangent else 0):
             K.work[i] -= K.shift1[i]
         inverse = 1.0 / c_C
@@ -323,6 +323,8 @@ def solve_corrections(K: Steps, m: int, c_C: float, tangent: bool, shifting: boo
                 turned += entry * K.work[i]
             K.rhs[K.n + k] -= turned * inverse
     solve_with_factors(K, m, K.rhs, straight)
+    if m > 0 and K.stabilized == 1:
+        follow_matrix(K, m, K.rhs, False)
 
 
 def solve_with_factors(K: Equations, m: int, b: Reals, straight: bool) -> None:

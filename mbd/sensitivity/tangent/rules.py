@@ -289,6 +289,8 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
         for i in range(K.n_v):
             corrects = corrects or K.starts[o + at - K.n_v + i] != K.shift1[i]
     if corrects:
+        if is_later_matrix(K):
+            return NOT_FOLLOWED
         corrects = begin_corrections(K, m)
     # values of the solution, derivatives of the prediction
     for i in range(n):
@@ -340,6 +342,14 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
         before = change_of
     finish(K, h)
     return 0
+
+
+def is_later_matrix(K: Kernel) -> bool:
+    """Whether the matrix noted last is that of an iterate, whose derivatives are not those of the prediction."""
+    later = False
+    for i in range(n_inputs(K)):
+        later = later or without_tangent(K.starts[i]) != without_tangent(K.block[i])
+    return later
 
 
 def right_hand_side(K: Kernel, k: int, m: int, c_C: float, c_K: float) -> float:
@@ -454,17 +464,18 @@ def further_corrections() -> int:
     return 3 if is_differentiated() else 0
 
 
-def follow_matrix(K: Kernel, m: int, whole: bool) -> None:
-    """``K W = b → K δW = δb − δK W`` of the position correction W, whose b is all but δK W.
+def follow_matrix(K: Kernel, m: int, x: Reals, whole: bool) -> None:
+    """``K x = b → K δx = δb − δK x`` of a correction x, whose derivatives are all but −K⁻¹ δK x.
 
-    ``δK W`` is the derivative of a program of the mode (see `programs`) that reads W behind the inputs of the matrix.
+    ``δK x`` is the derivative of a program of the mode (see `programs`) that reads x behind the inputs of the matrix,
+    and for the rows what is left of it without the position correction that was there, with `whole`.
     """
     size = K.n + m
     o = n_inputs(K)
     for i in range(size):
-        K.starts[o + i] = without_tangent(K.work[i])
+        K.starts[o + i] = without_tangent(x[i])
     for i in range(K.n_v):
-        K.starts[o + size + i] = without_tangent(K.work[i])
+        K.starts[o + size + i] = without_tangent(x[i])
         if whole:
             K.starts[o + size + i] -= without_tangent(K.shift1[i])
     call_on(K, turned_program(K), K.starts, K.spare)
@@ -472,7 +483,7 @@ def follow_matrix(K: Kernel, m: int, whole: bool) -> None:
         K.spare[i] -= without_tangent(K.spare[i])
     solve_kkt(K, size, K.spare)
     for i in range(size):
-        K.work[i] -= K.spare[i]
+        x[i] -= K.spare[i]
 
 
 # accelerations at a state ---------------------------------------------------------------------------------------------
