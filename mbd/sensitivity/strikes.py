@@ -36,12 +36,15 @@ def refuse_sided_impact(
 
     That is for contacts that close with the one that fired, which a direction moves apart, and where the phases of
     Poisson's law or of the sequential one lie on an edge between two choices. What comes to rest does so at once.
+    Phases beside impulses of the user's are not decided again here.
     """
     closing = {event.name for event in events if event.kind == "closed"}
     law = str(rows.record.settings.get("impact", "newton"))
     who = _partners(rows, programs, mode, closing)
     try:
         _refuse_chance(programs, before, mode, who, fired)
+        if any(programs.equations.contacts[push.contact].name in closing for push in programs.equations.impulses):
+            return
         if law == "sequential" and len(who.touched) > 1:
             sequential(programs, before, mode, who)
         elif law == "poisson":
