@@ -75,6 +75,18 @@ def test_a_start_on_an_event_that_changes_something_is_refused_and_one_that_leav
     assert math.isclose(found[RATE, RATE], math.cos(math.sqrt(30.0) * 0.1), rel_tol=1e-9)
 
 
+def test_a_contact_that_closes_as_the_run_starts_is_named_and_has_derivatives_once_it_is_closed():
+    model, body = mbd.Model("block"), mbd.PointMass("block", 2.0)
+    model.connect(mbd.Translation("slide", model.ground.origin, body.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin), friction=0.3))
+    asked = {"dt": 0.01, "until": 0.1, "wrt": ["gravity.y"], "of": ["slide.x"]}
+    with pytest.raises(mbd.errors.OneSidedError, match="'foot' happens as the run starts.*closed='foot'"):
+        mbd.sensitivities(model, mbd.assemble(model, {"slide.y": 0.0}, {"slide.x": 1.0}), **asked)
+    start = mbd.assemble(model, {"slide.y": 0.0}, {"slide.x": 1.0}, closed="foot")
+    found = mbd.sensitivities(model, start, **asked)["slide.x", "gravity.y"]
+    assert found == pytest.approx(0.5 * 0.3 * 0.1**2, rel=1e-12)
+
+
 def test_a_derivative_is_that_of_both_sides_or_it_is_refused():
     """Random blocks, from rest or not, to an instant of an event or another one."""
     random, judged, refused = np.random.default_rng(11), 0, 0

@@ -23,7 +23,7 @@ from mbd.sensitivity.one_sided import AT_ONCE, sided_end
 from mbd.sensitivity.passed import Instant, Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.resets import after_reset
-from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.sensitivity.tangent.margins import refuse_turning_points
 from mbd.sensitivity.tangent.run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
@@ -91,6 +91,9 @@ def tangent_run(
         where round-off makes the same run with derivatives another one.
     """
     _require_known_steps(rows)
+    if 0 in rows.events:
+        name = rows.events[0][0].name
+        raise sided(f"{name!r} happens as the run starts", f"start where it has happened, with closed={name!r}")
     charted, layout, count = Charted(programs), rows.mechanism.layout, len(start.t)
     contacts = [contact.name for contact in programs.equations.contacts]
     of_e = np.array([restitutions.get(name, np.zeros(count)) for name in contacts]).reshape(len(contacts), count)
