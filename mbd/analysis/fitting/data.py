@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,14 @@ class Data:
     def last(self) -> float:
         """Time of the last value [s]."""
         return max([*(float(times[-1]) for times, _ in self.columns.values()), *self.events.values()])
+
+    def until(self, time: float) -> Data:
+        """What was measured up to a time [s], over the same scales."""
+        columns = {
+            name: (times[times <= time], values[times <= time]) for name, (times, values) in self.columns.items()
+        }
+        columns = {name: seen for name, seen in columns.items() if len(seen[0])}
+        return replace(self, columns=columns, events={n: each for n, each in self.events.items() if each <= time})
 
     @classmethod
     def read(cls, table: Any, events: Any, sigma: Any) -> Data:

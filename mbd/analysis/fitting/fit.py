@@ -34,6 +34,10 @@ __all__ = ["Fit", "bounds", "fit"]
 
 ALIKE = 1e-8
 """Singular value of the scaled derivatives, over the largest, below which the data cannot tell directions apart [-]."""
+MAX_STEPS_OF_SPAN = 20
+"""Steps of a search over a part of the time: parameters that it does not tell of would wander on [-]."""
+SPANS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)
+"""Parts of the measured time that are fitted before all of it where the order of events changes [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +133,10 @@ def fit(
     (`scipy.optimize.least_squares`; Branch, Coleman & Li, SIAM J. Sci. Comput. 21, 1999) with the exact derivatives of
     the runs, through impacts and shifts of their instants (see `mbd.sensitivities`).
 
+    Where the order of events changes on the way, as of phases of a machine, the sum of squares is not smooth and may
+    have several minima. Then the data are also fitted over a growing time, from a sixteenth to all of it, each search
+    beginning where the last one ended, and the smaller sum stays.
+
     Parameters
     ----------
     data : a table, a dictionary or a pandas DataFrame, with a column 'time' [s] and columns by names of results; NaN
@@ -171,8 +179,6 @@ def fit(
     >>> print({name: round(value, 6) for name, value in found.values.items()})
     {'rod.center': 1.3, 'pin loss.coefficient': 0.2}
     """
-    from scipy.optimize import least_squares
-
     known = Data.read(data, events, sigma)
     guess, low, high = bounds(parameters)
     dt = 1e-3 if dt is None and tol is None else dt
@@ -181,10 +187,10 @@ def fit(
     first = search.residuals(guess)
     if not np.all(np.isfinite(first)):
         raise SimulationError(f"the run with the guesses does not reach the data: {search.problem}", search.run)
-    found = least_squares(
-        search.residuals, guess, search.slopes, (low, high), x_scale="jac", xtol=1e-9, ftol=1e-12, gtol=1e-12,
-        max_nfev=200,
-    )  # fmt: skip
+    order = order_of(search.run)
+    found = search.least(guess, low, high)
+    if order_of(search.made(found.x)) != order:
+        found = min(found, search.least_over_growing_spans(guess, low, high), key=lambda each: float(each.cost))
     return search.concluded(found)
 
 
@@ -294,6 +300,33 @@ class _Search:
             parts.append(np.array([(found - instant) / self.data.scales[name]]))
         return np.concatenate(parts)
 
+    def least(self, guess: Vector, low: Vector, high: Vector, most: int = 200) -> Any:
+        """The search from a guess within bounds, of at most so many steps."""
+        from scipy.optimize import least_squares
+
+        return least_squares(
+            self.residuals, guess, self.slopes, (low, high), x_scale="jac", xtol=1e-9, ftol=1e-12, gtol=1e-12,
+            max_nfev=most,
+        )  # fmt: skip
+
+    def least_over_growing_spans(self, guess: Vector, low: Vector, high: Vector) -> Any:
+        """The search from where those over the first parts of the time have ended, one after another."""
+        values, begin = guess, float(self.start.time)
+        for part in SPANS:
+            end = begin + part * (self.data.last - begin)
+            known = self.data.until(end)
+            if not known.count:
+                continue
+            search = replace(self, data=known, until=_end(known, None, self.dt, self.tol), runs=0, at=None)
+            if np.all(np.isfinite(search.residuals(values))):
+                values = search.least(values, low, high, MAX_STEPS_OF_SPAN).x
+            self.runs += search.runs
+        return (
+            self.least(values, low, high)
+            if np.all(np.isfinite(self.residuals(values)))
+            else self.least(guess, low, high)
+        )
+
     def slopes(self, values: Vector) -> Matrix:
         """Derivatives of the residuals (values, parameters)."""
         run = self.made(values)
@@ -344,6 +377,11 @@ class _Search:
         lengths = [len(seen) for _, seen in self.data.columns.values()] + [1] * len(self.data.events)
         parts = np.split(-residuals, np.cumsum(lengths)[:-1])
         return dict(zip([*self.data.columns, *self.data.events], parts, strict=True))
+
+
+def order_of(run: Trajectory | None) -> list[tuple[str, str]]:
+    """Kinds and names of the events of a run, one after the other."""
+    return [] if run is None else [(event.kind, event.name) for event in run.events]
 
 
 def instants_of(run: Trajectory) -> dict[str, float]:
