@@ -16,10 +16,13 @@ from mbd.integrators import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
-__all__ = ["check_arguments", "end_of"]
+__all__ = ["MAX_WAIT", "check_arguments", "end_of"]
 
 HUGE = 1e6
 """Step over the latest time above which a run is refused: ends and events are told apart to 1e-12 dt [-]."""
+
+MAX_WAIT = 1_000_000
+"""Steps in which an event must happen that ends a run without a latest time [-]."""
 
 LARGEST_ERROR = 1e30
 """Error of coordinates above which nobody can mean to ask for it; products with it must stay finite [m, rad]."""
@@ -116,7 +119,7 @@ def _callbacks(observers: Any, progress: Any) -> list[str]:
 def end_of(until: Any, manager: ActiveSetManager, dt: float, begin: float) -> tuple[float, str | None]:
     """Latest time, and the event that ends the run."""
     if isinstance(until, str):
-        until = (until, begin + 1e6 * dt)
+        until = (until, begin + MAX_WAIT * dt)
     if not isinstance(until, tuple):
         return float(until), None
     name, latest = until

@@ -92,8 +92,8 @@ def simulate(
     tol_of : names of the results that `tol` holds for, each in its own unit, at rows and between them: forces,
         reactions, multipliers, rates or energies too, or coordinates without one that does not matter, such as the
         angle of a fast spin; by default every coordinate
-    until : end time [s]; or the name of a contact or event, at whose first closing or crossing the run ends;
-        or (name, latest time)
+    until : end time [s]; or (name, latest time), name that of a contact or event, at whose first closing or crossing
+        the run ends if it happens before; or the name alone: a run in which it does not happen in 10⁶ steps has failed
     contact : 'events' locates the instants at which contacts close, open, stick and slip, which keeps the order of the
         scheme; 'nonsmooth' takes fixed steps and corrects positions and velocities at their ends, of first order at
         impacts but of bounded work whatever happens; 'auto' takes 'events', and non-smooth steps from where

@@ -10,6 +10,7 @@ import pytest
 import mbd
 from mbd.errors import MbdWarning
 from mbd.simulation.tolerance.comparison import MAX_PARTS, MAX_PLACES, _inside_steps
+from tests.simulation.vanishing import Units, driven as driven_scene
 
 SCHEMES = [
     mbd.HHT(0.05), mbd.HHT(0.3), mbd.GeneralizedAlpha(0.9), mbd.GeneralizedAlpha(0.3), mbd.Newmark(), mbd.RadauIIA(),
@@ -199,6 +200,17 @@ def test_a_driven_run_says_what_its_tolerance_holds_for():
     model, start, _, _ = chain(1, "auto")
     run = mbd.simulate(model, start, tol=1e-3, until=UNTIL)
     assert not any("the whole motion" in note for note in run.stats["notes"])
+
+
+@pytest.mark.parametrize("seed", [2, 8])
+def test_no_singular_pose_is_told_where_steps_are_only_long(seed):
+    """A step of a quarter of the run may seem to end next to one; a shorter try of it does not."""
+    scene = driven_scene("four-bar", seed, Units())
+    start = mbd.assemble(scene.model, **scene.start, project=True)
+    for scheme in (mbd.HHT(0.05), mbd.GeneralizedAlpha(0.5)):
+        run = mbd.simulate(scene.model, start, scheme, tol=1e-4, until=0.6)
+        assert run.stats["singular_steps"] == 0
+        assert not any("singular" in str(note) for note in run.stats["notes"])
 
 
 def test_multipliers_do_not_alternate_where_steps_change():

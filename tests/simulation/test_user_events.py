@@ -330,3 +330,18 @@ def test_a_run_until_an_event_of_the_user_ends_there():
     model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement"), direction=1))
     trajectory = run(model, {"slide.displacement": 1.0}, until="zero", dt=1e-3)
     assert trajectory.time[-1] == pytest.approx(0.75, abs=1e-4)
+
+
+def test_a_run_that_waits_for_an_event_in_vain_has_failed():
+    """With a latest time it has reached that; a name alone asks for the event. A batch tells the same of each run."""
+    model = oscillator(mbd.Event("high", mbd.measure(lambda x: x - 1.5, "slide.displacement"), direction=1))
+    start = mbd.assemble(model, {"slide.displacement": 1.0})
+    run = mbd.simulate(model, start, dt=0.01, until=("high", 2.0))
+    assert run.success and run.message == "'high' did not happen before t = 2 s"
+    settings = {"dt": 1e-3, "until": "high"}
+    with pytest.raises(
+        mbd.SimulationError, match=r"^'high' did not happen before t = 1000 s, in 1000000 steps; .*until="
+    ):
+        mbd.simulate(model, start, store=10_000, **settings)
+    found = mbd.batch(model, [start, mbd.assemble(model, {"slide.displacement": 2.0})], **settings)
+    assert list(found.outcome) == ["no event", "event"] and list(found.success) == [False, True]

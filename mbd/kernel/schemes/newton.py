@@ -210,7 +210,11 @@ def pass_singularity(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: fl
         K.inverse_pivot = 0.0
         return TOO_NEAR
     if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)):
-        return singular_newmark_step(K, h, t1)
+        known = K.near_singular
+        status = singular_newmark_step(K, h, t1)
+        if status != 0 and K.adaptive == 1:  # a step that is half as long is judged by itself
+            K.near_singular = known
+        return status
     return -1
 
 

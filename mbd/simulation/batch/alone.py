@@ -60,7 +60,10 @@ def made_alone(model: Any, start: State, arguments: dict[str, Any], terminal: fr
     if stopped(run):
         raise KeyboardInterrupt
     if not run.success:
-        return Alone("failed", run.final, "", run.message, run)
+        waited = isinstance(arguments["until"], str) and run.message.startswith(
+            f"{arguments['until']!r} did not happen"
+        )
+        return Alone("no event" if waited else "failed", run.final, "", run.message, run)
     if not run.message.startswith("ended by"):
         return Alone("end", run.final, "", run.message, run)
     last = [e.name for e in run.events if e.kind in ("closed", "event") and e.name in terminal]

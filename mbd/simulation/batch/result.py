@@ -72,6 +72,8 @@ class Batch:
         self.q, self.v, self.z = ends.row[:, 1:at_y], ends.row[:, at_y : at_y + v.n_v], ends.row[:, at_y + v.n_v :][:, : v.n - v.n_v]  # noqa: E501  # fmt: skip
         self.time, self.steps, self.events = ends.time, ends.steps, ends.events
         self.outcome[ends.status == codes.EVENT] = "event"
+        if isinstance(run.settings["until"], str):
+            self.outcome[self.outcome == "end"] = "no event"
         for code, name in NAMES.items():
             self.outcome[ends.status == code] = name
         names = [*run.manager.names, *(guard.name for guard in run.manager.guards)]
@@ -92,9 +94,8 @@ class Batch:
         with equations.tape.lock:
             function = array_function([equations.output(name) for name in self._names])
         found = function(ModelColumns.inputs(rows), self._runner.changes.all_vectors(len(row)))
-        whole = ends.status <= codes.LAST
         for name, column in zip(self._names, found, strict=True):
-            self.results[name] = np.where(whole, column, np.nan)
+            self.results[name] = np.where(self.success, column, np.nan)
 
     def take_alone(self, runs: Sequence[int], report: Callable[[int], None] | None) -> None:
         """Runs that `simulate` makes; Ctrl-C ends that."""

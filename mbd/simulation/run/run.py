@@ -13,6 +13,7 @@ from mbd.equations.equations import Guard
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.kernel import codes
 from mbd.results.columns import ModelColumns
+from mbd.simulation.arguments import MAX_WAIT
 from mbd.simulation.diagnostics.circular import circular_laws
 from mbd.simulation.diagnostics.energy import EnergyWatch
 from mbd.simulation.diagnostics.failures import attempt, crowded, explanation
@@ -99,6 +100,9 @@ class Run(RunData):
         problem, fed = self._in_words(problem), self._in_words(self._guarded(self._judge_energy)[0])
         if self.stop and not problem and not message.startswith("ended"):
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
+            if isinstance(self.settings["until"], str) and self.limit is None:
+                problem = f"{message}, in {MAX_WAIT} steps; if it may not happen, give the latest time as well: "
+                problem += f"until=({self.stop!r}, {self.end / 100.0:g})"
         if not problem:
             problem = fed or self._reversed() or overturned(self) or self._in_words(self._guarded(self._last_show)[0])
         if problem:
