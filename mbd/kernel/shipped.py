@@ -1,7 +1,7 @@
 """The kernel's object code that comes with a wheel: a first run on a machine that it suits builds nothing.
 
 A release writes it by ``python -m mbd.kernel.shipped`` for Linux on x86-64 processors of level 3 (AVX2 and FMA, since
-2013) and on all arm64 processors (ARMv8); LLVM makes both on any machine. It is used if the processor has these features
+2013) and on all arm64 processors; LLVM makes both on any machine. It is used if the processor has these features
 and the sources of the kernel are those that it was made from. A checkout has none; there, and on other machines, the
 kernel is built.
 """
