@@ -219,6 +219,8 @@ class Mode(Machine):
             for source in each.source:
                 ways[source].add(each.target)
         start = str(self.start)
+        if late := self._preceded():
+            return late
         if not ways[start] - {start}:
             return [f"Mode '{self.name}' never leaves {start!r}, in which it starts; give a Transition({start!r}, …)"]
         reached, waiting = {start}, [start]
@@ -232,6 +234,22 @@ class Mode(Machine):
             for state in self.states
             if state not in reached
         ]
+
+    def _preceded(self) -> list[str]:
+        """Transitions behind another one with the same cause, which always comes first."""
+        found, first = [], dict[tuple[str, str], Transition]()
+        for each in self.transitions:
+            for source in each.source if each.on is not None else ():
+                before = first.get((source, str(each.on)))
+                if before is not None:
+                    found.append(
+                        f"Mode '{self.name}' never goes from {source!r} to {each.target!r} on {each.on!r}: the "
+                        f"transition to {before.target!r} is first at the same instant; give that one an only_while=, "
+                        "or leave one out"
+                    )
+                elif each.only_while is None:
+                    first[source, str(each.on)] = each
+        return found
 
     # the promise of machines --------------------------------------------------------------------------------------
     @property

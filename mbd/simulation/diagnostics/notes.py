@@ -17,6 +17,7 @@ from mbd.results.record import EventRecord, Record
 from mbd.simulation.diagnostics.coarse import coarse_steps
 from mbd.simulation.diagnostics.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.diagnostics.half_turns import half_turns
+from mbd.simulation.diagnostics.idle_modes import idle_modes
 from mbd.simulation.diagnostics.impact_step import dt_of_impacts
 from mbd.simulation.diagnostics.redundant import redundancy
 from mbd.simulation.diagnostics.singular import singular_start
@@ -134,6 +135,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes += unresolved_turns(run, record)
     notes += _uncounted(run, record)
     columns = ModelColumns(record, equations)
+    notes += idle_modes(run, record, columns)
     turned = half_turns(columns)
     notes, doubts = notes + turned, doubts + turned
     for number, contact in enumerate(run.manager.contacts):
