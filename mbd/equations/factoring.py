@@ -24,14 +24,19 @@ class _Term(NamedTuple):
     rest: Node
 
 
-def factored(outputs: Sequence[Node], factors: Collection[Node]) -> list[Node]:
-    """The outputs with the factors moved outward through products, signs and sums of terms that share one."""
+def factored(outputs: Sequence[Node], factors: Collection[Node], known: dict[int, Node] | None = None) -> list[Node]:
+    """The outputs with the factors moved outward through products, signs and sums of terms that share one.
+
+    known : what became of nodes, by index, in an earlier call for the same factors; what this one finds is added
+    """
     if not outputs:
         return []
     tape = outputs[0].tape
     keys = {factor.index for factor in factors}
-    new: dict[int, Node] = {}
-    for node in live(outputs):
+    new: dict[int, Node] = {} if known is None else known
+    for node in live(outputs, new):
+        if node.index in new:
+            continue
         args = [new[arg.index] for arg in node.args]
         if node.op == "mul":
             new[node.index] = _product(tape, args[0], args[1], keys)

@@ -471,7 +471,8 @@ def _jacobian_rates(equations: Equations, rows: Sequence[int], B: Sequence[Seque
     inputs = Inputs.of(equations)
     hv = [equations.rows[k].rate for k in rows]
     if equations.compose is not None:
-        return [gradient(rate, inputs.x) for rate in hv]
+        known: dict[int, list[Node]] = equations.memory.setdefault("slopes of rates", {})
+        return [known.get(k) or known.setdefault(k, gradient(equations.rows[k].rate, inputs.x)) for k in rows]
     flat = _time_rates(equations, [entry for line in B for entry in line])
     found = [flat[k * equations.n_v : (k + 1) * equations.n_v] for k in range(len(B))]
     fast = [place for place, k in enumerate(rows) if equations.rows[k].is_velocity]

@@ -57,7 +57,8 @@ def seeded(equations: Equations, r: Sequence[Node]) -> Columns:
         known = equations.geometry.partials(r)
     sweeps: Sweeps = equations.memory.setdefault("sweeps of tangents", Sweeps())
     plain = [entry for column in sweeps(r, inputs.directions(known)) for entry in column]
-    entries = min(plain, factored(plain, inputs.c), key=lambda S: len(live([*r, *S])))
+    known_factors: dict[int, Node] = equations.memory.setdefault("factored tangents", {})
+    entries = min(plain, factored(plain, inputs.c, known_factors), key=lambda S: len(live([*r, *S])))
     return [entries[j * len(r) : (j + 1) * len(r)] for j in range(len(r))]
 
 
