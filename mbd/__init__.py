@@ -155,6 +155,7 @@ if TYPE_CHECKING:
     )
     from mbd.laboratory.assignment import assign_plates as assign_plates
     from mbd.laboratory.balance_result import InverseDynamics as InverseDynamics
+    from mbd.laboratory.film import film as film
     from mbd.laboratory.force_plate import ForcePlate as ForcePlate
     from mbd.laboratory.inverse_dynamics import inverse_dynamics as inverse_dynamics
     from mbd.laboratory.inverse_kinematics import inverse_kinematics as inverse_kinematics
@@ -235,6 +236,7 @@ _HOMES = {
     "mbd.laboratory.kinematics_result": "InverseKinematics",
     "mbd.laboratory.models.read_model": "read_model",
     "mbd.laboratory.models.write_model": "write_model",
+    "mbd.laboratory.film": "film",
     "mbd.laboratory.muscle_forces": "MuscleForces muscle_forces",
     "mbd.laboratory.models.report": "ImportReport ImportedModel",
     "mbd.laboratory.read": "read",

@@ -261,7 +261,7 @@ def gait_command(arguments: argparse.Namespace) -> int:
 
 def _walked(name: str, arguments: argparse.Namespace, progress: Any, changes: dict[str, Any]) -> Any:
     """A stored run, a recording with its model, or the run of a script."""
-    from mbd.laboratory.command import measured
+    from mbd.laboratory.command import is_model_file, measured, model_of_file
     from mbd.trajectory import load
 
     if is_run_file(name):
@@ -270,6 +270,8 @@ def _walked(name: str, arguments: argparse.Namespace, progress: Any, changes: di
         return Script.load(name).run(progress, changes)
     if arguments.model is None:
         return measured(name, None)
+    if is_model_file(arguments.model):
+        return measured(name, *model_of_file(arguments.model, arguments.feet))
     script = Script.load(arguments.model)
     script.require("model", "feet")
     return measured(name, script.names["model"], script.names["feet"])

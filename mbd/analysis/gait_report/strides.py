@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Interval", "Side", "Stride", "base_name", "of_side", "sides_of", "strides_between"]
 
+SHORT = {"left": "l", "right": "r"}
+"""Letters that stand for the words of sides in names of other programs."""
+
 Interval = tuple[float, float]
 
 JUST_STRUCK = 1e-6
@@ -55,21 +58,35 @@ class Side:
 
 
 def of_side(name: str, side: str) -> bool:
-    """Whether a name has the word of a side.
+    """Whether a name has the word of a side, or its letter before or after an underscore, as names in files have it.
 
-    >>> of_side("left knee.angle", "left"), of_side("lefty", "left")
-    (True, False)
+    >>> of_side("left knee.angle", "left"), of_side("lefty", "left"), of_side("knee_angle_l.angle", "left")
+    (True, False, True)
     """
-    return side in name.replace(".", " ").split()
+    words = name.replace(".", " ").split()
+    return side in words or any(_is_of(part, side) for word in words for part in _parts(word))
 
 
 def base_name(name: str, side: str) -> str:
     """A name without the word of its side.
 
-    >>> base_name("left knee", "left")
-    'knee'
+    >>> base_name("left knee", "left"), base_name("knee_angle_l", "left")
+    ('knee', 'knee')
     """
-    return " ".join(word for word in name.split() if word != side)
+    words = [word for word in name.split() if word != side]
+    if any(_is_of(part, side) for word in words for part in _parts(word)):
+        words = [part for word in words for part in word.split("_") if part and not _is_of(part, side)]
+        words = words[:-1] if len(words) > 1 and words[-1] == "angle" else words
+    return " ".join(words)
+
+
+def _parts(word: str) -> list[str]:
+    """What underscores part."""
+    return word.split("_") if "_" in word else []
+
+
+def _is_of(part: str, side: str) -> bool:
+    return part.lower() in (side, SHORT.get(side))
 
 
 def sides_of(run: Trajectory, names: Sequence[str], most: int | None = None) -> list[Side]:

@@ -11,6 +11,7 @@ from mbd.arrays import Matrix
 from mbd.bodies.marker import Marker
 from mbd.bodies.rigid_body import RigidBody
 from mbd.errors import ModelError
+from mbd.joints.free import Free
 from mbd.laboratory.models.inertia import possible_inertia
 from mbd.laboratory.models.osim_constraints import Coupler, couplers_of, hold, loops_closed
 from mbd.laboratory.models.osim_elements import (
@@ -76,7 +77,7 @@ def read_osim(path: Path, stops: bool, repair: bool) -> ImportedModel:
     markers = _markers(file)
     muscles = muscles_of(file)
     _summary(file, joints, couplers, markers, len(muscles))
-    return ImportedModel(file.model, file.bodies, file.joints, file.report, file.posture, muscles)
+    return ImportedModel(file.model, file.bodies, file.joints, file.report, file.posture, muscles, _driven(file))
 
 
 def _bodies(file: OsimFile) -> dict[str, Element]:
@@ -191,6 +192,15 @@ def _summary(file: OsimFile, joints: list[OsimJoint], couplers: list[Coupler], m
                 if child.children and not child.find("objects")
                 else []
             )
+
+
+def _driven(file: OsimFile) -> list[str] | None:
+    """Joints whose coordinates no function and no coupler determines; None where these are all."""
+    bound = {made.name for made, _ in file.dependents}
+    bound |= {each.joint.name for each in file.coordinates.values() if each.joint is not None and not each.free}
+    moving = [joint for joint in file.joints.values() if joint.freedoms and joint.name not in bound]
+    floating = [joint.name for joint in moving if isinstance(joint, Free) and joint.parent.body.name == "ground"]
+    return [joint.name for joint in moving if joint.name not in floating] if bound else None
 
 
 def _within(element: Element) -> Iterator[Element]:

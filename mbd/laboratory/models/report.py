@@ -38,6 +38,8 @@ class ImportedModel:
     model : a `Model` of plain words, to be changed like any other
     bodies, joints : by their names in the file
     report : what of the file is in it
+    driven : of an `.osim` with motions that are functions of coordinates or coupled, the joints whose coordinates are
+        free: ``mbd.inverse_dynamics(found.model, motion, joints=found.driven)``; None where all are
     muscles : `mbd.Muscle` by their names; they act after ``found.model.apply(*found.muscles.values())``, and
         `mbd.muscle_forces` takes them as they are
     posture : coordinates of the file's own posture, where it says one: ``mbd.assemble(found.model, found.posture)``
@@ -49,6 +51,7 @@ class ImportedModel:
     report: ImportReport
     posture: dict[str, Any] = field(default_factory=dict)
     muscles: dict[str, Any] = field(default_factory=dict)
+    driven: list[str] | None = None
 
     def __repr__(self) -> str:
         return f"ImportedModel '{self.model.name}': {len(self.bodies)} bodies, {len(self.joints)} joints\n{self.report}"

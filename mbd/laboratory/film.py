@@ -1,0 +1,88 @@
+"""A run as a laboratory would record it: markers with errors, and a force plate under each foot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mbd.arrays import Matrix, Vector
+from mbd.bodies.base import Frame
+from mbd.bodies.values import is_number, number, shown
+from mbd.errors import ModelError, nearest
+from mbd.laboratory.recording import PlateRecord, Recording
+from mbd.trajectory import Trajectory
+
+__all__ = ["film"]
+
+
+def film(
+    run: Any, markers: Mapping[str, Any] | Sequence[Any], rate: float = 100.0, scatter: float = 0.0, seed: int = 0
+) -> Recording:
+    """What cameras and force plates record of a run, to try an evaluation on a motion whose truth is known.
+
+    Each contact of a point with the ground has a plate of its own under it, which measures its normal force and its
+    friction without errors. ``recording.save("walk.trc")`` writes the markers, ``recording.save("walk.mot")`` the
+    plates, ``recording.save("walk.c3d")`` both.
+
+    Parameters
+    ----------
+    run : of `mbd.simulate`
+    markers : points by the laboratory's names: {'LKNE': 'left thigh.end', 'LTOE': left_foot.toe}, or points whose own
+        names the markers get: ['left thigh.end', left_foot.toe]
+    rate : frames a second [Hz]
+    scatter : standard deviation of the errors of each coordinate of a marker [m]
+    seed : of the errors, which are the same in each call
+
+    Raises
+    ------
+    ModelError
+        for points that the run lacks, and numbers that are not positive.
+
+    Examples
+    --------
+    >>> import mbd
+    >>> model = mbd.Model("ball")
+    >>> ball = mbd.PointMass("ball", mass=1.0)
+    >>> model.connect(mbd.Translation("air", model.ground.origin, ball.origin))
+    >>> run = mbd.simulate(model, mbd.assemble(model), dt=1e-3, until=0.5)
+    >>> film(run, {"BALL": ball.origin}, rate=10.0)["BALL"].shape
+    (6, 3)
+    """
+    if not isinstance(run, Trajectory):
+        raise ModelError(f"film: a run of mbd.simulate is expected, got {shown(run)[:80]}")
+    for value, what, least in ((rate, "rate", 1e-9), (scatter, "scatter", 0.0)):
+        if not is_number(value) or number(value, f"{what} of film") < least:
+            raise ModelError(f"{what} of film is a number {'> 0' if least else '≥ 0'}, got {shown(value)[:80]}")
+    if isinstance(markers, list | tuple):
+        markers = {getattr(point, "full_name", str(point)): point for point in markers}
+    if not isinstance(markers, Mapping) or not markers:
+        raise ModelError(
+            f"markers of film are points by name such as {{'LKNE': 'left thigh.end'}}, got {shown(markers)[:80]}"
+        )
+    first, last = float(run.time[0]), float(run.time[-1])
+    time = first + np.arange(int((last - first) * rate * (1.0 + 1e-12)) + 1) / rate
+    seen = run.at(np.minimum(time, last))
+    rng = np.random.default_rng(seed)
+    found = {}
+    for name, point in markers.items():
+        title = point.full_name if isinstance(point, Frame) else point
+        if not isinstance(title, str) or f"{title}.x" not in run:
+            points = [each.removesuffix(".x") for each in run.names if each.endswith(".x")]
+            raise ModelError(f"markers of film: {nearest(str(title), points, 'point', 'The run has')}")
+        found[name] = seen[title] + scatter * rng.standard_normal((len(time), 3))
+    places = [contact for contact in run.facts.contacts if contact.place and contact.unit == "m"]
+    plates = [_plate(run, seen, time, contact.name, contact.place) for contact in places]
+    return Recording(time, found, plates=tuple(plates))
+
+
+def _plate(run: Trajectory, seen: Any, time: Vector, contact: str, place: str) -> PlateRecord:
+    """The plate under a contact, whose force acts where it touches the level y = 0."""
+    along = "friction.forward" if f"{contact}.friction.forward" in run else "friction"
+    parts: list[Any] = [
+        np.nan_to_num(seen[f"{contact}.{part}"]) if f"{contact}.{part}" in run else np.zeros(len(time))
+        for part in (along, "force", "friction.sideways")
+    ]
+    force: Matrix = np.column_stack(parts)
+    return PlateRecord.at(f"{contact} plate", time, force, seen[place] * [1.0, 0.0, 1.0], height=0.0)
