@@ -81,11 +81,11 @@ class Instant:
         """Derivatives of balance and rows here; `extra` (m,) is added to the multipliers of the active rows."""
         mechanism, layout = self.mechanism, self.mechanism.layout
         mode = self.rows, self.penalties, self.sliding
-        key = f"linear {mode}"
-        with mechanism.equations.tape.lock:
-            if key not in mechanism.named:
-                mechanism.named[key] = scalar_function(linearization(mechanism.equations, *mode), layout, "linear")
-        return LinearTerms.of(self.evaluate(mechanism.named[key], extra), layout.n, layout.n_v, len(self.rows))
+        function = mechanism.kept(
+            (linearization, *map(tuple, mode)),
+            lambda: scalar_function(linearization(mechanism.equations, *mode), layout, "linear"),
+        )
+        return LinearTerms.of(self.evaluate(function, extra), layout.n, layout.n_v, len(self.rows))
 
     def evaluate(self, function: Any, extra: Vector | None = None) -> Vector:
         """What a program gives here; `extra` as for `terms`."""

@@ -233,12 +233,12 @@ def port_terms(found: Any, inputs: Sequence[Input], outputs: Sequence[Output]) -
     """Derivatives by the inputs that are in equations, and of the outputs, at an `Instant`."""
     mechanism, mode = found.mechanism, (found.rows, found.penalties, found.sliding)
     equations, given = mechanism.equations, tuple(each.node for each in inputs if each.node is not None)
-    key = f"ports {mode} {[node.index for node in given]} {[each.node.index for each in outputs]}"
-    with equations.tape.lock:
-        if key not in mechanism.named:
-            nodes = ports(equations, *mode, given, [each.node for each in outputs])
-            mechanism.named[key] = scalar_function(nodes, mechanism.layout, "ports")
-    out = found.evaluate(mechanism.named[key])
+    read = [each.node for each in outputs]
+    key = (ports, mode, tuple(node.index for node in given), tuple(node.index for node in read))
+    function = mechanism.kept(
+        key, lambda: scalar_function(ports(equations, *mode, given, read), mechanism.layout, "ports")
+    )
+    out = found.evaluate(function)
     return PortTerms.of(out, equations, len(found.rows), len(given), len(outputs))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.python import scalar_function
+from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import UnknownNameError
@@ -73,10 +73,10 @@ def conditions(mechanism: Mechanism, values: Mapping[str, float], rates: bool) -
         if not kinds <= allowed or (rates and kinds & {"q", "x"} and "v" not in kinds):  # a place is no rate
             wrong.append(name)
             continue
-        key = f"condition on {kind}: {node.index}"
-        function = mechanism.named.get(key)
-        if function is None:
-            function = scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
-            mechanism.named[key] = function
+
+        def made(node: Node = node) -> ScalarFunction:
+            return scalar_function([node, *gradient(node, inputs)], mechanism.layout, "condition")
+
+        function = mechanism.kept((Condition, kind, node.index), made)
         found.append(Condition(name, float(target), not rates and name in wrapped, function))  # modulo a turn
     return found, wrong

@@ -29,10 +29,8 @@ def opening(model: Any, mechanism: Mechanism, parameters: Vector, position: Mapp
     """
     if not isinstance(model, Description):
         return {}
-    known = mechanism.named.get("opening")
-    if known is None:
-        known = mechanism.named["opening"] = _cut_coordinates(model)
-    names, nodes, coordinates, defaults, inputs = known
+    made = mechanism.kept(_cut_coordinates, lambda: _cut_coordinates(model))
+    names, nodes, coordinates, defaults, inputs = made
     if not names:
         return {}
     given: dict[Node | tuple[str, int], float] = {("t", 0): 0.0}

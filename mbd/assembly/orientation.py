@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.pose import Posture
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.python import scalar_function
+from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.tape.derivatives import gradient
 
 __all__ = ["REVERSED", "faced", "facing_cosines", "reversed_joints"]
@@ -20,21 +19,19 @@ NEAR = 1e-3
 REVERSED = "{joint!r} is put together the wrong way round: its frames are {angle:.4g} rad from where it holds them"
 
 
-def _function(mechanism: Mechanism) -> Any:
+def _function(mechanism: Mechanism) -> ScalarFunction:
     """(cos θ of every facing, their gradients)."""
-    known = mechanism.named.get("facings")
-    if known is None:
-        equations = mechanism.equations
-        x = [equations.tape.input("x", k) for k in range(equations.n_v)]
-        nodes = [facing.cosine for facing in equations.facings]
-        slopes = [slope for node in nodes for slope in gradient(node, x)]
-        known = mechanism.named["facings"] = scalar_function([*nodes, *slopes], mechanism.layout, "facings")
-    return known
+    equations = mechanism.equations
+    x = [equations.tape.input("x", k) for k in range(equations.n_v)]
+    nodes = [facing.cosine for facing in equations.facings]
+    slopes = [slope for node in nodes for slope in gradient(node, x)]
+    return scalar_function([*nodes, *slopes], mechanism.layout, "facings")
 
 
 def _evaluated(mechanism: Mechanism, block: Vector, parameters: Vector) -> tuple[Vector, Matrix]:
     """cos θ and its gradient for every facing."""
-    function, count = _function(mechanism), len(mechanism.equations.facings)
+    function = mechanism.kept(_function, lambda: _function(mechanism))
+    count = len(mechanism.equations.facings)
     out = np.zeros(function.size)
     with np.errstate(all="ignore"):
         function(block, parameters, out)

@@ -9,6 +9,7 @@ before they cancel (`mbd.equations.row_sizes`).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,14 @@ DOUBTFUL = 1e-6
 """Largest derivative of a row, beside 1 and those of others, above which no closer look is needed [m, rad, -]."""
 
 
+@dataclass
+class _Last:
+    """What was found last: values of the parameters on which rows depend with trivial rows and faults; the manager."""
+
+    found: tuple[Vector, tuple[frozenset[int], list[str]]] | None = None
+    manager: ActiveSetManager | None = None
+
+
 def manager_of(mechanism: Mechanism, parameters: Vector) -> ActiveSetManager:
     """The active set of a mechanism in which the rows that are trivial with these parameters never act.
 
@@ -41,10 +50,10 @@ def manager_of(mechanism: Mechanism, parameters: Vector) -> ActiveSetManager:
         see `trivial_rows`.
     """
     trivial = trivial_rows(mechanism, parameters)
-    known: ActiveSetManager | None = mechanism.named.get("manager")
-    if known is None or known.trivial != trivial:
-        known = mechanism.named["manager"] = ActiveSetManager(mechanism.equations, trivial)
-    return known
+    last = mechanism.kept(_Last, _Last)
+    if last.manager is None or last.manager.trivial != trivial:
+        last.manager = ActiveSetManager(mechanism.equations, trivial)
+    return last.manager
 
 
 def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:
@@ -57,11 +66,12 @@ def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:
     """
     if not mechanism.equations.rows:
         return frozenset()
-    places = _places(mechanism)
+    places = mechanism.kept(_places, lambda: _places(mechanism))
     values = np.array(parameters[places])
-    known = mechanism.named.get("trivial rows")
+    last = mechanism.kept(_Last, _Last)
+    known = last.found
     if known is None or not np.array_equal(known[0], values):
-        known = mechanism.named["trivial rows"] = values, _found(mechanism, parameters)
+        known = last.found = values, _found(mechanism, parameters)
     _, (rows, faults) = known
     if faults:
         raise ModelError(faults)
@@ -70,13 +80,8 @@ def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:
 
 def _places(mechanism: Mechanism) -> list[int]:
     """Places of the parameters on which rows depend."""
-    known = mechanism.named.get("parameters of rows")
-    if known is None:
-        nodes = [row.rate if row.is_velocity else row.value for row in mechanism.equations.rows]
-        found = {node.data[1] for node in live(nodes) if node.op == "input" and node.data[0] == "p"}
-        known = mechanism.named["parameters of rows"] = sorted(found)
-    places: list[int] = known
-    return places
+    nodes = [row.rate if row.is_velocity else row.value for row in mechanism.equations.rows]
+    return sorted({node.data[1] for node in live(nodes) if node.op == "input" and node.data[0] == "p"})
 
 
 def _found(mechanism: Mechanism, parameters: Vector) -> tuple[frozenset[int], list[str]]:
@@ -92,7 +97,8 @@ def _found(mechanism: Mechanism, parameters: Vector) -> tuple[frozenset[int], li
     doubtful = [k for k in range(len(equations.rows)) if largest[k] <= bound and k not in normals]
     if not doubtful:
         return frozenset(), []
-    sizes, out = _sizes(mechanism, tuple(doubtful)), np.zeros(len(doubtful) * n_v)
+    chosen = tuple(doubtful)
+    sizes, out = mechanism.kept((_sizes, chosen), lambda: _sizes(mechanism, chosen)), np.zeros(len(doubtful) * n_v)
     trivial = np.ones(len(doubtful), dtype=bool)
     for block, slopes in zip(blocks, B, strict=True):
         with np.errstate(all="ignore"):
@@ -120,14 +126,8 @@ def _blocks(mechanism: Mechanism) -> list[Any]:
 
 def _sizes(mechanism: Mechanism, rows: tuple[int, ...]) -> ScalarFunction:
     """Σ|parts| of the derivatives of rows."""
-    key = f"sizes of rows {rows}"
-    known = mechanism.named.get(key)
-    if known is None:
-        with mechanism.equations.tape.lock:
-            nodes = [node for k in rows for node in parts_of_row(mechanism.equations, k)]
-            known = mechanism.named[key] = scalar_function(nodes, mechanism.layout, "row_sizes")
-    function: ScalarFunction = known
-    return function
+    nodes = [node for k in rows for node in parts_of_row(mechanism.equations, k)]
+    return scalar_function(nodes, mechanism.layout, "row_sizes")
 
 
 def parts_of_row(equations: Equations, k: int) -> list[Node]:

@@ -33,12 +33,8 @@ def whole_turns(angle: float) -> int:
 
 
 def _function(mechanism: Mechanism) -> ScalarFunction:
-    known = mechanism.named.get("turns")
-    if known is None:
-        angles = [turn.angle for turn in mechanism.equations.turns]
-        known = mechanism.named["turns"] = scalar_function(angles, mechanism.layout, "turns")
-    function: ScalarFunction = known
-    return function
+    angles = [turn.angle for turn in mechanism.equations.turns]
+    return mechanism.kept(_function, lambda: scalar_function(angles, mechanism.layout, "turns"))
 
 
 def _angles(mechanism: Mechanism, time: float, q: Vector, parameters: Vector, anchors: Vector) -> Vector:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from itertools import accumulate, pairwise
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 from weakref import ref
 
 import numpy as np
@@ -75,6 +75,7 @@ class AccelerationTerms:
     impulses: Vector
 
 
+T = TypeVar("T")
 Made = tuple[Mapping[str, Sequence[Node]], Facts]
 """Programs by name, and what else was found while they were made."""
 
@@ -100,7 +101,7 @@ class Mechanism:
         rare = {"scales": programs.scales} | ({"terms": programs.guard_terms} if self.judged else {})
         for name, make in rare.items():  # twice a restart, and nowhere else
             self._compiled(name, lambda name=name, make=make: ({name: make(equations)}, {}), rarely=True)  # type: ignore[misc]
-        self.named: dict[str, Any] = {}
+        self._kept: dict[Hashable, Any] = {}
         self.idle: dict[Hashable, Any] = {}  # what runs have left for the next ones
         self.notes: list[str] = []
         self.postponed: list[Postponed] = []
@@ -317,6 +318,21 @@ class Mechanism:
             facts = self._compiled((kind, mode, wanted), named)
             self.seconds += perf_counter() - started
             return facts, [self.common[name + own] for name in names if name + own in self.common]
+
+    def kept(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What somebody else makes of this mechanism once, kept with it.
+
+        Parameters
+        ----------
+        key : the function or class that it is made for, with what else it depends on
+        make : makes it; nobody else adds to the tape meanwhile
+        """
+        if key not in self._kept:
+            with self.equations.tape.lock:
+                if key not in self._kept:
+                    self._kept[key] = make()
+        found: T = self._kept[key]
+        return found
 
     @cached_property
     def turning(self) -> tuple[tuple[str, list[int]], ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.compile.backend import Function
 from mbd.compile.many import at_blocks, blocks_of
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
@@ -47,6 +48,7 @@ class _Rows:
     """
 
     mechanism: Mechanism
+    function: Function
     free: Sequence[int]
     own: Sequence[int]
     parameters: Vector
@@ -56,8 +58,7 @@ class _Rows:
 
     def at(self, time: Vector, q: Matrix, v: Matrix) -> tuple[Matrix, Matrix, Matrix, NDArray[np.float64]]:
         inputs = {"t": time, "q": q, "v": v, "anchor": np.tile(self.anchors, (len(time), 1))}
-        function = self.mechanism.named["closed loops"]["constraint_terms"]
-        out = at_blocks(function, blocks_of(self.mechanism.layout, inputs), self.parameters)
+        out = at_blocks(self.function, blocks_of(self.mechanism.layout, inputs), self.parameters)
         m = len(self.held)
         h, rate, bias = (out[:, k * m : (k + 1) * m] for k in range(3))
         return np.where(self.held, 0.0, h), rate, bias, out[:, 3 * m :].reshape(len(out), m, -1)
@@ -172,23 +173,23 @@ def _foreseen(q: Matrix, first: int, last: int, own: list[int]) -> Matrix:
 def _rows_of(mechanism: Mechanism, missing: Sequence[str], parameters: Vector) -> _Rows:
     equations = mechanism.equations
     rows = list(equations.bilateral)
-    with equations.tape.lock:
-        if "closed loops" not in mechanism.named:
-            functions = mechanism.backend.functions(mechanism.layout)
-            terms = constraint_terms(equations, rows)
-            functions.add({"constraint_terms": terms})
-            mechanism.named["closed loops"] = functions
-            entries = terms[3 * len(rows) :]
-            mechanism.named["closed loops B"] = [e.data if e.is_constant else None for e in entries]
+
+    def made() -> tuple[Function, list[float | None]]:
+        functions = mechanism.backend.functions(mechanism.layout)
+        terms = constraint_terms(equations, rows)
+        functions.add({"constraint_terms": terms})
+        return functions["constraint_terms"], [e.data if e.is_constant else None for e in terms[3 * len(rows) :]]
+
+    function, entries = mechanism.kept(_Rows, made)
     names = [c.name for c in equations.coordinates]
     places = {int(place): k for k, place in enumerate(equations.configuration.places) if place >= 0}
     own = [names.index(name) for name in missing]
     free = [places[place] for place in own]
     held = np.array([equations.rows[k].is_velocity for k in rows])
-    B = np.array(mechanism.named["closed loops B"], dtype=object).reshape(len(rows), -1)[:, free]
+    B = np.array(entries, dtype=object).reshape(len(rows), -1)[:, free]
     always = B.size > 0 and not any(entry is None for entry in B.ravel())
     inverse = np.linalg.pinv(B.astype(float)) if always else None
-    return _Rows(mechanism, free, own, parameters, np.zeros(mechanism.layout.n_anchors), held, inverse)
+    return _Rows(mechanism, function, free, own, parameters, np.zeros(mechanism.layout.n_anchors), held, inverse)
 
 
 def refuse_open_loops(frames: ClosedFrames, equations: Equations, time: Vector, missing: Sequence[str]) -> None:

@@ -184,13 +184,13 @@ def _forces(
 ) -> tuple[Matrix, NDArray[np.float64]]:
     """g (R, n_v) and R (R, n_v, m) of the rows that always act, whose multipliers are zero in the inputs."""
     equations, n_v, m = mechanism.equations, mechanism.equations.n_v, len(mechanism.equations.bilateral)
-    key = "inverse dynamics"
-    with equations.tape.lock:
-        if key not in mechanism.named:
-            functions = mechanism.backend.functions(mechanism.layout)
-            functions.add({"inverse_dynamics": _program(equations)})
-            mechanism.named[key] = functions
-    function, count = mechanism.named[key]["inverse_dynamics"], len(inputs["t"])
+
+    def made() -> Any:
+        functions = mechanism.backend.functions(mechanism.layout)
+        functions.add({"inverse_dynamics": _program(equations)})
+        return functions["inverse_dynamics"]
+
+    function, count = mechanism.kept(_program, made), len(inputs["t"])
     out = np.zeros((count, function.size))
     for first in range(0, count, CHUNK):
         part = slice(first, first + CHUNK)

@@ -88,13 +88,8 @@ class MarkerProgram:
 def marker_program(mechanism: Mechanism, points: Sequence[str], coordinates: Sequence[str], rows: Sequence[int],
                    gaps: Sequence[int]) -> MarkerProgram:  # fmt: skip
     """The program of some points (three scalars each), coordinates, rows and gaps of contacts, in this order."""
-    equations = mechanism.equations
-    key = f"markers {[*points]} {[*coordinates]} {[*rows]} {[*gaps]}"
-    with equations.tape.lock:
-        if key not in mechanism.named:
-            mechanism.named[key] = _made(mechanism, points, coordinates, rows, gaps)
-        made: MarkerProgram = mechanism.named[key]
-        return made
+    key = (MarkerProgram, *map(tuple, (points, coordinates, rows, gaps)))
+    return mechanism.kept(key, lambda: _made(mechanism, points, coordinates, rows, gaps))
 
 
 def _made(mechanism: Mechanism, points: Sequence[str], coordinates: Sequence[str], rows: Sequence[int],

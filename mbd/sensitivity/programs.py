@@ -133,10 +133,8 @@ class Programs:
     def __init__(self, mechanism: Mechanism, places: Sequence[int], values: Vector) -> None:
         self.mechanism, self.places = mechanism, tuple(places)
         self.equations, self.layout = mechanism.equations, mechanism.layout
-        key = f"columns of {len(self.places)} parameters"
-        self.columns: Columns = mechanism.named.setdefault(
-            key, Columns.of(self.equations, self.layout, len(self.places))
-        )
+        count = len(self.places)
+        self.columns = mechanism.kept((Columns, count), lambda: Columns.of(self.equations, self.layout, count))
         self.values = np.ascontiguousarray(values, dtype=float) if len(values) else np.zeros(1)
         self._block = np.zeros(self.layout.size)
         self._given: dict[str, list[Node]] = {}
@@ -182,23 +180,19 @@ class Programs:
 
     def sparse(self, name: str) -> Sparse:
         """A program, made when it is called first."""
-        mechanism = self.mechanism
-        key = f"{name} by {self.places}"
-        known: Sparse | None = mechanism.named.get(key)
-        if known is None:
-            symbol = f"derivative_{len(mechanism.common)}"
-            with mechanism.equations.tape.lock:
-                values = self._values(name)
-                columns = derivatives(self.equations, values, self.places)
-                found = [
-                    (i, j, column[i]) for i in range(len(values)) for j, column in enumerate(columns)
-                    if not column[i].is_zero
-                ]  # fmt: skip
-                mechanism.common.add({symbol: [*values, *(node for _, _, node in found)]})
-                lines, places = ([each[k] for each in found] for k in (0, 1))
-                known = Sparse(mechanism.common[symbol], np.array(lines, dtype=int), np.array(places, dtype=int))
-                mechanism.named[key] = known
-        return known
+        return self.mechanism.kept((Sparse, name, self.places), lambda: self._sparse(name))
+
+    def _sparse(self, name: str) -> Sparse:
+        common = self.mechanism.common
+        symbol = f"derivative_{len(common)}"
+        values = self._values(name)
+        columns = derivatives(self.equations, values, self.places)
+        found = [
+            (i, j, column[i]) for i in range(len(values)) for j, column in enumerate(columns) if not column[i].is_zero
+        ]
+        common.add({symbol: [*values, *(node for _, _, node in found)]})
+        lines, places = ([each[k] for each in found] for k in (0, 1))
+        return Sparse(common[symbol], np.array(lines, dtype=int), np.array(places, dtype=int))
 
     def fill(self, block: Matrix, at: State) -> None:
         """Write a state into a block, or states into blocks (N, block)."""

@@ -70,12 +70,12 @@ def parameter_faults(run: RunData, values: Mapping[str, float]) -> list[str]:
 
 def _in(mechanism: Mechanism, what: str, nodes: Sequence[Node]) -> frozenset[str]:
     """Names of the parameters in some expressions of a mechanism, which are looked through once."""
-    known: frozenset[str] | None = mechanism.named.get(f"parameters that enter {what}")
-    if known is None:
+
+    def found() -> frozenset[str]:
         places = {n.data[1] for n in live(nodes) if n.op == "input" and n.data[0] == "p"}
-        known = frozenset(p.name for k, p in enumerate(mechanism.equations.parameters) if k in places)
-        mechanism.named[f"parameters that enter {what}"] = known
-    return known
+        return frozenset(p.name for k, p in enumerate(mechanism.equations.parameters) if k in places)
+
+    return mechanism.kept((_in, what), found)
 
 
 def _no_longer_trivial(run: RunData, parameters: Vector) -> list[str]:

@@ -48,13 +48,12 @@ class Derivative:
         without: Sequence[str] = WITHOUT,
     ) -> None:
         symbol = f"tangent_{name}_by_{'_'.join(map(str, places))}"
-        known = mechanism.named.get(symbol)
-        if known is None:
-            with mechanism.equations.tape.lock:
-                nodes = outputs()
-                made = _made(mechanism, f"tangent_{len(mechanism.common)}", nodes, places, without)
-                known = mechanism.named[symbol] = *made, len(nodes)
-        function, lines, columns, count = known
+
+        def made() -> tuple[Any, Any, Any, int]:
+            nodes = outputs()
+            return *_made(mechanism, f"tangent_{len(mechanism.common)}", nodes, places, without), len(nodes)
+
+        function, lines, columns, count = mechanism.kept((Derivative, symbol), made)
         size = first + count
         ends = np.searchsorted(lines + first, np.arange(size), side="right")
         numbers = np.zeros(max(len(lines), 1))
@@ -142,11 +141,12 @@ def balance(mechanism: Mechanism) -> list[Node]:
 
 def balance_function(mechanism: Mechanism) -> Any:
     """The code of `balance`."""
-    if BALANCE not in mechanism.named:
-        with mechanism.equations.tape.lock:
-            mechanism.common.add({BALANCE: balance(mechanism)}, True)
-            mechanism.named[BALANCE] = mechanism.common[BALANCE]
-    return mechanism.named[BALANCE]
+
+    def made() -> Any:
+        mechanism.common.add({BALANCE: balance(mechanism)}, True)
+        return mechanism.common[BALANCE]
+
+    return mechanism.kept(balance_function, made)
 
 
 def derivatives_of_modes(mechanism: Mechanism, code: Any, stabilized: bool, places: Sequence[int]) -> list[Derivative]:

@@ -154,11 +154,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
 
 def _doubts(run: RunData) -> list[str]:
     """What looks like a mistake in the description, which is looked through once for a mechanism."""
-    named = run.mechanism.named
-    known: list[str] | None = named.get("doubts of the description")
-    if known is None:
-        known = named["doubts of the description"] = doubts(run.model)
-    return known
+    return run.mechanism.kept(doubts, lambda: doubts(run.model))
 
 
 def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]:

@@ -98,12 +98,9 @@ def first_reversed(mechanism: Mechanism, columns: ModelColumns) -> tuple[str, fl
     facings, record = mechanism.equations.facings, columns.record
     if not facings or not len(record.time):
         return None
-    known = mechanism.named.get("facings of rows")
-    if known is None:
-        with mechanism.equations.tape.lock:
-            known = mechanism.named["facings of rows"] = array_function([facing.cosine for facing in facings])
+    cosines = mechanism.kept(first_reversed, lambda: array_function([facing.cosine for facing in facings]))
     rows = columns.rows
-    found = known(columns.inputs(rows), record.parameters_at(rows.source))
+    found = cosines(columns.inputs(rows), record.parameters_at(rows.source))
     opposite = [
         (float(record.time[int(np.argmax(cosine < 0.0))]), facing.joint)
         for facing, cosine in zip(facings, found, strict=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.bodies.values import is_finite_number
 from mbd.compile.mechanism import rate_names
-from mbd.compile.python import scalar_function
+from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.constraints.expressions import evaluated, is_expression
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations, Guard
@@ -37,16 +37,16 @@ class Named(Mapping[str, float]):
     def __getitem__(self, name: str) -> float:
         run = self._run
         mechanism, v = run.mechanism, run.kernel
-        key = f"value of {name}"  # what else is kept there has names of its own
-        known = mechanism.named.get(key)
-        if known is None and name not in mechanism.equations.output_names():
-            given = {**run.model.parameters, **run.changed}.get(name)
-            if given is not None:
-                return float(given)
-        if known is None:
-            with mechanism.equations.tape.lock:
-                output = mechanism.equations.output(name)
-                known = mechanism.named[key] = scalar_function([output], mechanism.layout, "named")
+
+        def made() -> ScalarFunction | None:
+            equations = mechanism.equations
+            if name not in equations.output_names() and name in {**run.model.parameters, **run.changed}:
+                return None
+            return scalar_function([equations.output(name)], mechanism.layout, "named")
+
+        value = mechanism.kept((Named, name), made)
+        if value is None:
+            return float({**run.model.parameters, **run.changed}[name])
         layout, flags = mechanism.layout, v.closed[: v.n_contacts]
         block = mechanism.block(
             run.now, v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors], run.manager.penalties(flags)
@@ -54,7 +54,7 @@ class Named(Mapping[str, float]):
         block[layout.a : layout.lam] = v.rate[: v.n]
         block[layout.lam : layout.anchor] = v.lam[: v.n_rows]
         out = np.zeros(1)
-        known(block, v.params, out)
+        value(block, v.params, out)
         return float(out[0])
 
     def __iter__(self) -> Iterator[str]:

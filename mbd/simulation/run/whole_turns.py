@@ -40,11 +40,7 @@ class TurnCounter:
             "anchor": np.tile(v.anchors[: v.n_anchors], (len(rows), 1)),
         }  # fmt: skip
         inputs["anchor"][:, anchors] = self._turns
-        known = mechanism.named.get("turning")
-        if known is None:
-            with mechanism.equations.tape.lock:
-                known = mechanism.named["turning"] = function_of(wrapped)
-        found = known(inputs, v.params)
+        found = mechanism.kept(function_of, lambda: function_of(wrapped))(inputs, v.params)
         turns = np.array([counted(rows[:, 0], *found[2 * k : 2 * k + 2]) for k in range(len(wrapped))])
         v.anchors[anchors] = self._turns + turns[:, -1]
         if stored > self._row:
