@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.muscles import Muscle
+from mbd.forces.samples import Samples
 from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate
 from mbd.laboratory.inverse_dynamics import inverse_dynamics
@@ -37,20 +39,37 @@ class MuscleForces:
     ``found["left soleus.activation"]`` (R,), ``'left soleus.force'`` [N] of the tendon with its parts
     ``'….active_strength'`` (at a = 1) and ``'….passive_force'``, ``'left soleus.length'`` of the path and
     ``'left soleus.moment_arm.left ankle.angle'`` [m], −∂l/∂q; ``'left ankle.angle.reserve'`` [N m] is what the muscles
-    together cannot give. All other names are those of `InverseDynamics`, whose joint reactions know no muscles.
+    together cannot give. All other names are those of `InverseDynamics` but joint reactions, of which there are two:
+
+    - ``found.moments["left knee.reaction_force"]`` is what the joint transmits where a pure moment acts in the place of
+      muscles: the *resultant* joint force of inverse dynamics.
+    - ``found.with_muscles["left knee.reaction_force"]`` is what the joint transmits where muscles pull across it, the
+      *joint contact force*: often several times as large.
 
     Attributes
     ----------
     moments : the `InverseDynamics` that the muscles balance
+    with_muscles : the `InverseDynamics` of the same motion while the muscles pull, found when it is first asked for;
+        its moments are the reserves
     muscles : their names
     notes : what a reader must know, a sentence each
     """
 
     def __init__(
-        self, moments: InverseDynamics, muscles: tuple[str, ...], own: dict[str, Vector], notes: tuple[str, ...]
+        self,
+        moments: InverseDynamics,
+        muscles: tuple[str, ...],
+        own: dict[str, Vector],
+        notes: tuple[str, ...],
+        pulled: Callable[[], InverseDynamics],
     ) -> None:
         self.moments, self.muscles, self.notes = moments, muscles, notes
-        self._own = own
+        self._own, self._pulled = own, pulled
+
+    @cached_property
+    def with_muscles(self) -> InverseDynamics:
+        """Inverse dynamics of the motion while the muscles pull, whose joint reactions are contact forces."""
+        return self._pulled()
 
     @property
     def time(self) -> Vector:
@@ -61,12 +80,17 @@ class MuscleForces:
         """A named quantity at every frame."""
         if isinstance(name, str) and name in self._own:
             return self._own[name]
+        if isinstance(name, str) and ".reaction_" in name and name in self.moments:
+            raise UnknownNameError(
+                f"{name!r} is there twice: found.with_muscles[{name!r}] is the contact force of the joint, across "
+                f"which muscles pull, found.moments[{name!r}] the resultant of inverse dynamics without muscles"
+            )
         if name not in self.moments:
             raise UnknownNameError(nearest(str(name), (*self._own, *self.moments.names), "result", "There are"))
         return self.moments[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._own or name in self.moments
+        return name in self._own or (name in self.moments and ".reaction_" not in str(name))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -74,7 +98,7 @@ class MuscleForces:
     @property
     def names(self) -> tuple[str, ...]:
         """Every named scalar, those of muscles first."""
-        return (*self._own, *self.moments.names)
+        return (*self._own, *(name for name in self.moments.names if ".reaction_" not in name))
 
     def to_dataframe(self, names: Sequence[str] | None = None) -> Any:
         """A pandas table with `time` as index; by default of activations, forces and reserves."""
@@ -159,9 +183,16 @@ def muscle_forces(
             found[f"{muscle.name}.moment_arm.{names[j]}"] = arms[:, j, m]
     for k, j in enumerate(about):
         found[f"{names[j]}.reserve"] = reserves[:, k]
-    return MuscleForces(
-        moments, tuple(muscle.name for muscle in acting), found, _notes(moments, names, about, activation, reserves)
-    )
+
+    def pulled() -> InverseDynamics:
+        loaded = copy.copy(bare)
+        loaded.forces = [*bare.forces, *_rigid(acting, moments.time, activation)]
+        known = {name for muscle in loaded.forces for name in muscle.parameters()} | set(others)
+        values = {name: value for name, value in (parameters or {}).items() if name in known}
+        return inverse_dynamics(loaded, moments.run, joints, plates=plates, parameters=values)
+
+    remarks = _notes(moments, names, about, activation, reserves)
+    return MuscleForces(moments, tuple(muscle.name for muscle in acting), found, remarks, pulled)
 
 
 def _muscles(model: Any, given: Any) -> list[Muscle]:
@@ -178,6 +209,16 @@ def _muscles(model: Any, given: Any) -> list[Muscle]:
     return list(listed)
 
 
+def _rigid(muscles: list[Muscle], time: Vector | None = None, activation: Matrix | None = None) -> list[Muscle]:
+    """Muscles whose tendons do not give, with these activations (R, m), or fully active."""
+    without = {"tendon": "rigid", "activation_time": 0.0, "deactivation_time": 0.0, "arguments": ("t",)}
+    excitations: list[Any] = [1.0] * len(muscles)
+    if time is not None and activation is not None:
+        several = len(time) > 1
+        excitations = [Samples(time, column, "linear") if several else float(column[0]) for column in activation.T]
+    return [replace(each, excitation=e, **without) for each, e in zip(muscles, excitations, strict=True)]
+
+
 @dataclass(frozen=True, eq=False)
 class _Crossed:
     """What muscles can do: arms (R, n_v, m) [m], strength and passive force (R, m) [N], length (R, m) [m]."""
@@ -191,10 +232,7 @@ class _Crossed:
 
 def _crossed(bare: Any, muscles: list[Muscle], moments: InverseDynamics, changed: Mapping[str, float]) -> _Crossed:
     """Paths and curves at the frames, by the equations of the model with muscles whose tendons are rigid."""
-    rigid = [
-        replace(each, tendon="rigid", activation_time=0.0, deactivation_time=0.0, excitation=1.0, arguments=("t",))
-        for each in muscles
-    ]
+    rigid = _rigid(muscles)
     loaded = copy.copy(bare)
     loaded.forces = [*bare.forces, *rigid]
     own = {name for muscle in rigid for name in muscle.parameters()}

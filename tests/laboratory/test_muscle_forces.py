@@ -121,3 +121,33 @@ def test_parameters_of_muscles_may_differ_from_the_model():
     found, described = mbd.muscle_forces(arm(8.0), MOTION, parameters=given), mbd.muscle_forces(arm(4.0), MOTION)
     for name in names:
         np.testing.assert_allclose(found[f"{name}.force"], described[f"{name}.force"], rtol=1e-9, atol=1e-9)
+
+
+def test_a_held_forearm_presses_on_its_elbow_with_its_muscle():
+    """Level, with a vertical muscle 4 cm before the elbow: F = m g c / d, and the elbow is pressed by F − m g."""
+    model = mbd.Model("forearm")
+    forearm = mbd.Link("forearm", mass=2.0, length=0.35, center=0.16, inertia=0.02)
+    model.connect(mbd.Revolute("elbow", model.ground.origin, forearm.start))
+    model.apply(mbd.Muscle("biceps", (model.ground.point(0.04, 0.3), forearm.point(0.0, -0.04)), 900.0, 0.1, 0.2))
+    found = mbd.muscle_forces(model, {"time": [0.0], "elbow.angle": [np.pi / 2]}, reserve=1e-6)
+    weight = 2.0 * 9.81
+    assert found["biceps.force"][0] == pytest.approx(weight * 0.16 / 0.04, rel=1e-9)
+    assert found.moments["elbow.reaction_force"][0] == pytest.approx([0.0, weight, 0.0], abs=1e-12)
+    pressed = found.with_muscles["elbow.reaction_force"][0]
+    assert pressed == pytest.approx([0.0, weight - found["biceps.force"][0], 0.0], abs=1e-9)
+    with pytest.raises(mbd.UnknownNameError, match=r"is there twice: found\.with_muscles\['elbow.reaction_force'\]"):
+        found["elbow.reaction_force"]
+    assert not [name for name in found if "reaction" in name]
+
+
+def test_what_is_left_to_joints_while_muscles_pull_are_the_reserves():
+    found = mbd.muscle_forces(arm(0.4), MOTION)
+    size = np.abs(found["shoulder.moment"]).max()
+    for joint in "shoulder", "elbow":
+        left = found.with_muscles[f"{joint}.moment"]
+        assert left == pytest.approx(found[f"{joint}.angle.reserve"], abs=1e-9 * size)
+    # the biceps and the other muscles over the elbow press it; their forces balance on the forearm
+    a, b = (each["elbow.reaction_force"] for each in (found.moments, found.with_muscles))
+    over = sum(found[f"{name}.force"] for name in ("biceps", "triceps", "brachialis", "anconeus"))
+    assert np.all(np.linalg.norm(b - a, axis=1) <= over + 1e-9)
+    assert np.linalg.norm(b - a, axis=1).max() > 0.5 * over.max()
