@@ -71,12 +71,23 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[Fi
         yield figure
         if path is not None:
             named_file(path)
+            _lay_out(figure, look)
             kind = Path(path).suffix.removeprefix(".") or str(matplotlib.rcParams["savefig.format"])
             target = Path(path) if Path(path).suffix else Path(path).with_name(f"{Path(path).name}.{kind}")
             if kind == "svg":
                 write_whole(target, lambda partial: vector.save(figure, partial))
             else:
-                write_whole(target, lambda partial: figure.savefig(partial, format=kind))
+                fast = {"pil_kwargs": {"compress_level": 3}} if kind == "png" else {}
+                write_whole(target, lambda partial: figure.savefig(partial, format=kind, **fast))
+
+
+def _lay_out(figure: Figure, look: dict[str, Any]) -> None:
+    """Find the places of a figure's panels; `savefig` would draw the whole figure once more for that."""
+    figure.set_dpi(look["savefig.dpi"])
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+    figure.set_layout_engine(None)  # not "none", which `savefig` takes for an engine
 
 
 def histories(run: Trajectory, *names: str, path: str | Path | None = None, degrees: bool = True) -> Figure:
