@@ -57,3 +57,15 @@ def test_an_explicit_step_just_after_an_event_is_judged_as_it_is_where_friction_
     model, start, dt = block(1052)
     run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=part * dt, until=0.3)
     assert np.max(np.diff(run.energy.total)) < 1e-3 * run.energy.total[0]
+
+
+@pytest.mark.parametrize(("seed", "until"), [(1015, 0.8), (1018, 0.9), (1030, 0.5)])
+@pytest.mark.parametrize("part", [1.0, 0.9])
+def test_a_step_fails_at_no_length_where_a_corner_begins_to_slip_behind_a_sequence_of_impacts(seed, until, part):
+    """A whole step comes through, one of a hundredth fails, a far shorter one follows how friction turns."""
+    model, start, dt = block(seed)
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=part * dt, until=until)
+    other = mbd.simulate(model, start, mbd.RungeKutta853(), dt=part * dt, until=until)
+    assert np.max(np.diff(run.energy.total)) < 1e-3 * run.energy.total[0]
+    for c in "xyz":
+        assert abs(run[f"free.{c}"][-1] - other[f"free.{c}"][-1]) < 2e-3

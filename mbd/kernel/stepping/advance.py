@@ -447,6 +447,9 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             else:
                 break
             status = tried_step(K, h, K.time + h)
+            if K.strategy == 0 and is_shortened(K, status) and slides_at_first(K, SHORTER * h):
+                event = status
+                continue
             if status != 0:
                 return status
             if K.step_taken != h:
