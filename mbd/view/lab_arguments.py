@@ -51,7 +51,7 @@ def gait(parser: ArgumentParser) -> None:
     parser.add_argument("--strides", type=int, metavar="COUNT", help="strides of each side, the last ones")
     parser.add_argument("--mass", type=float, metavar="KG", help="of the body, by which loads are divided")
     parser.add_argument(
-        "--sides", nargs=2, default=("left", "right"), metavar=("SOUND", "OTHER"), help="words of both sides"
+        "--sides", nargs="+", metavar="WORD", help="words of both sides, the sound one first (default: left right)"
     )
     parser.add_argument("--symmetry", default="Robinson", metavar="NAME", help="Robinson (default), ratio or STA")
     parser.add_argument("--open", action="store_true", help="open the page in a browser")

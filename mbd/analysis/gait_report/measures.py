@@ -120,7 +120,7 @@ def _of_stride(
         ("stride length", "m"): stride.length,
         ("stride time", "s"): period,
         ("speed", "m/s"): stride.length / period,
-        ("cadence", "1/min"): 120.0 / period,
+        ("cadence", "1/min"): 60.0 * (1 + len(others)) / period,
         ("stance", "%"): stance,
         ("swing", "%"): 100.0 - stance,
         ("double support", "%"): sum(together) / period * 100.0,

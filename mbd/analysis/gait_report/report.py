@@ -11,7 +11,7 @@ import numpy as np
 from mbd.analysis.gait_report.band import NormativeBand
 from mbd.analysis.gait_report.curves import PERCENT, Curve, curves_of
 from mbd.analysis.gait_report.measures import BOTH, Measure, Spent, energy_of, measures_of
-from mbd.analysis.gait_report.strides import Side, sides_of
+from mbd.analysis.gait_report.strides import Side, sides_of, words_of
 from mbd.analysis.gait_report.symmetry import symmetry_of
 from mbd.bodies.values import names_of, number, printable
 from mbd.dataclass import dataclass
@@ -74,7 +74,7 @@ class GaitReport:
 
     def asymmetry(self, walk: Walk, measure: Measure) -> float:
         """The symmetry of a number by the definition chosen; NaN where a side has none, or where its parts cancel."""
-        if measure.cancels([side.name for side in walk.sides[:2]]):
+        if len(walk.sides) < 2 or measure.cancels([side.name for side in walk.sides[:2]]):
             return float("nan")
         first, second = (measure.mean[side.name] for side in walk.sides[:2])
         with np.errstate(all="ignore"):
@@ -90,9 +90,8 @@ class GaitReport:
         found = ["quantity"]
         for name, walk in own:
             lead = f"{name}: " if name else ""
-            found += [f"{lead}{side.name}" for side in walk.sides] + [
-                f"{lead}symmetry index ({self.symmetry}) [{unit}]"
-            ]
+            found += [f"{lead}{side.name}" for side in walk.sides]
+            found += [f"{lead}symmetry index ({self.symmetry}) [{unit}]"] * (len(walk.sides) > 1)
         return tuple(found)
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -103,7 +102,7 @@ class GaitReport:
             for walk in self.walks:
                 measure = next(each for each in walk.measures if each.quantity == first.quantity)
                 cells += [_text(measure.mean[side.name]) for side in walk.sides]
-                cells.append(self._asymmetry_text(walk, measure))
+                cells += [self._asymmetry_text(walk, measure)] * (len(walk.sides) > 1)
             found.append(tuple(cells))
         return found
 
@@ -174,7 +173,8 @@ class GaitReport:
             for m in walk.measures:
                 for side in walk.sides:
                     yield walk.name, m.quantity, m.unit, side.name, m.mean[side.name], m.spread[side.name]
-                yield walk.name, m.quantity, unit, self.symmetry, self.asymmetry(walk, m), float("nan")
+                if len(walk.sides) > 1:
+                    yield walk.name, m.quantity, unit, self.symmetry, self.asymmetry(walk, m), float("nan")
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the numbers; curves and energies go beside them, as ``NAME-curves.csv`` and ``NAME-energy.csv``."""
@@ -211,7 +211,7 @@ class GaitReport:
 
 
 def gait_report(
-    run: Any, *others: Any, names: Sequence[str] | None = None, sides: Sequence[str] = ("left", "right"),
+    run: Any, *others: Any, names: Sequence[str] | None = None, sides: Sequence[str] | None = None,
     symmetry: str = "Robinson", mass: float | None = None, strides: int | None = None,
     band: NormativeBand | None = None,
 ) -> GaitReport:  # fmt: skip
@@ -233,7 +233,8 @@ def gait_report(
         measured, so that it stands beside a simulation: the result of `mbd.inverse_dynamics` with plates, or a
         `Recording` with foot strikes among its events
     names : of the runs in tables, by default those of their models
-    sides : words of both sides, the sound one first where one is not
+    sides : words of both sides, the sound one first where one is not, or one word; by default 'left' and 'right'. A
+        machine whose feet have neither word, a hopper or a wheel, has one side 'all'; each strike ends a stride of it
     symmetry : 'Robinson' ``2 |x_s − x_p|/(|x_s| + |x_p|) · 100 %``, 'ratio' ``x_p/x_s`` or 'STA' ``(x_s −
         x_p)/(|x_s| + |x_p|)``, s the first side; a dash where braking and driving cancel
     mass : of the body, by which loads, moments and powers are divided [kg]; None: they are as they are
@@ -252,9 +253,9 @@ def gait_report(
     Traceback (most recent call last):
     mbd.errors.ModelError: gait_report takes runs of mbd.simulate, or gaits that have a run; got 3
     """
-    words = names_of(sides, "sides of gait_report")
-    if len(words) != 2 or len(set(words)) != 2:
-        raise ModelError(f"sides of gait_report are two words such as ('left', 'right'), got {sides!r}")
+    words = None if sides is None else names_of((sides,) if isinstance(sides, str) else sides, "sides of gait_report")
+    if words is not None and (len(words) not in (1, 2) or len(set(words)) != len(words)):
+        raise ModelError(f"sides of gait_report are two words such as ('left', 'right'), or one, got {sides!r}")
     symmetry_of(symmetry)
     size = None if mass is None else number(mass, "mass of gait_report")
     if size is not None and size <= 0.0:
@@ -305,11 +306,11 @@ def _titles(names: Sequence[str]) -> list[str]:
 
 
 def _walk(
-    run: Trajectory | Measured, title: str, words: Sequence[str], mass: float | None, strides: int | None
+    run: Trajectory | Measured, title: str, words: Sequence[str] | None, mass: float | None, strides: int | None
 ) -> Walk:
     if not isinstance(run, Trajectory):
-        return run.walk(title, words, mass, strides)
-    sides = sides_of(run, words, strides)
+        return run.walk(title, words or ("left", "right"), mass, strides)
+    sides = sides_of(run, words or words_of(run), strides)
     return Walk(
         title, tuple(sides), tuple(measures_of(run, sides, mass)), tuple(curves_of(run, sides, mass)),
         tuple(energy_of(run, sides)),

@@ -15,12 +15,15 @@ from mbd.errors import TrajectoryError
 if TYPE_CHECKING:
     from mbd.trajectory import Trajectory
 
-__all__ = ["Interval", "Side", "Stride", "base_name", "of_side", "sides_of", "strides_between"]
+__all__ = ["ALL", "Interval", "Side", "Stride", "base_name", "of_side", "sides_of", "strides_between", "words_of"]
 
 SHORT = {"left": "l", "right": "r"}
 """Letters that stand for the words of sides in names of other programs."""
 
 Interval = tuple[float, float]
+
+ALL = "all"
+"""The side of a machine whose names have no words of sides: every foot and every joint is of it."""
 
 JUST_STRUCK = 1e-6
 """Share of its largest force below which a foot of a force law has just struck [-]."""
@@ -64,7 +67,7 @@ def of_side(name: str, side: str) -> bool:
     (True, False, True)
     """
     words = name.replace(".", " ").split()
-    return side in words or any(_is_of(part, side) for word in words for part in _parts(word))
+    return side == ALL or side in words or any(_is_of(part, side) for word in words for part in _parts(word))
 
 
 def base_name(name: str, side: str) -> str:
@@ -89,8 +92,22 @@ def _is_of(part: str, side: str) -> bool:
     return part.lower() in (side, SHORT.get(side))
 
 
+def words_of(run: Trajectory) -> tuple[str, ...]:
+    """'left' and 'right' where a foot has one of these words, or there is none; `ALL` for a hopper or a wheel."""
+    usual, feet = ("left", "right"), _feet(run)
+    return usual if not feet or any(of_side(name, side) for name in feet for side in usual) else (ALL,)
+
+
+def _feet(run: Trajectory) -> list[str]:
+    """Names of the contacts that have a place on the ground."""
+    return [contact.name for contact in run.facts.contacts if contact.place and contact.unit == "m"]
+
+
 def sides_of(run: Trajectory, names: Sequence[str], most: int | None = None) -> list[Side]:
     """The sides of a run with their strides, or the last ones of them.
+
+    Of a single side each strike ends a stride: that of a contact after all others of the side have left, as of a wheel
+    whose spokes strike one after the other.
 
     A strike is a foot's first touch after one of the other side; where a foot touches more than once between two
     strikes, it leaves where its longest time in the air begins. A foot that stands alone at the start has just struck,
@@ -101,17 +118,22 @@ def sides_of(run: Trajectory, names: Sequence[str], most: int | None = None) -> 
     TrajectoryError
         where a side has no foot, or makes no whole stride.
     """
-    feet = [contact.name for contact in run.facts.contacts if contact.place and contact.unit == "m"]
+    feet = _feet(run)
     contacts = {side: tuple(name for name in feet if of_side(name, side)) for side in names}
     for side, own in contacts.items():
         if not own:
             known = ", ".join(map(repr, feet)) or "none"
+            wanted = (
+                "give sides=(…, …), the words of both sides, or of one alone"
+                if feet
+                else ("a report needs a foot, a contact of a point of a body with the ground")
+            )
             raise TrajectoryError(
                 f"no foot of the side '{side}': its contacts with the ground have the word in their names, and the run "
-                f"has {known}; give sides=(…, …), the words of both sides"
+                f"has {known}; {wanted}"
             )
     stances = {side: _stances(run, own) for side, own in contacts.items()}
-    strikes = _strikes(run, contacts, stances)
+    strikes = _strikes(run, contacts, stances) if len(names) > 1 else _strikes_alone(run, names[0], contacts[names[0]])
     found = [
         Side(side, own, stances[side], strides_between(side, stances[side], strikes)[-most if most else None :])
         for side, own in contacts.items()
@@ -161,6 +183,23 @@ def _strikes(
         own = next((event.name for event in rows if event.name in contacts[side]), contacts[side][0])
         strikes.append((time, side, np.asarray(run.at([time])[places[own]][0])))
     return strikes
+
+
+def _strikes_alone(run: Trajectory, side: str, contacts: Sequence[str]) -> list[tuple[float, str, Matrix]]:
+    """(time, side, place) of the strikes of a single side: of contacts that closed as all others had left."""
+    columns = [contact.name for contact in run.facts.contacts]
+    places = {contact.name: contact.place for contact in run.facts.contacts}
+    closed = {name for name in contacts if len(run) and run.record.closed[0, columns.index(name)]}
+    begins = [(float(run.time[0]), min(closed))] if len(closed) == 1 and not _pushes_at_start(run, contacts) else []
+    events = [event for event in run.events if event.name in contacts and event.kind in ("closed", "opened")]
+    for time in dict.fromkeys(event.time for event in events):
+        before, now = set(closed), [event for event in events if event.time == time]
+        for event in now:
+            (closed.add if event.kind == "closed" else closed.discard)(event.name)
+        new = [event.name for event in now if event.kind == "closed" and event.name in closed]
+        if new and not before & (closed - set(new)):
+            begins.append((time, new[0]))
+    return [(time, side, np.asarray(run.at([time])[places[name]][0])) for time, name in begins]
 
 
 def _pushes_at_start(run: Trajectory, contacts: Sequence[str]) -> bool:
