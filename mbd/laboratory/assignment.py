@@ -56,8 +56,18 @@ def assign_plates(
     if not isinstance(feet, list) or not feet or not all(isinstance(foot, Frame) for foot in feet):
         raise ModelError(f"assign_plates: feet are points such as [left.origin, right.origin], got {shown(feet)[:80]}")
     found: list[ForcePlate] = []
+    unloaded: list[str] = []
     for plate in recording.plates:
         spans = _loaded(plate, threshold)
+        broken = ~np.isfinite(plate.force).all(axis=1)
+        if broken.any():
+            doubt(
+                f"{plate.name} has no values in {broken.sum()} of {len(broken)} samples, the first at "
+                f"{plate.time[int(np.argmax(broken))]:.3g} s; it counts as unloaded there"
+            )
+        if not spans:
+            most = float(np.nanmax(plate.force[:, 1], initial=0.0))
+            unloaded.append(f"{plate.name} is never loaded above {threshold:g} N (largest {most:.3g} N); left out")
         owners: dict[int, list[tuple[float, float]]] = {}
         for first, last in spans:
             distance = _distances(motion, plate, feet, first, last)
@@ -72,13 +82,17 @@ def assign_plates(
             if other > 0.2:
                 doubt(
                     f"{title}: another foot than {feet[best].body.name!r} is nearer during {100 * other:.0f} % of it; "
-                    "two feet on one plate cannot be told apart"
+                    "two feet on one plate cannot be told apart, and all of it is given to the one"
                 )
             note(f"{title}: {feet[best].body.name!r}")
             owners.setdefault(best, []).append((first, last))
         for best, own in owners.items():
             name = f"{plate.name} {feet[best].body.name}"
             found.append(ForcePlate(name, feet[best], plate, during=own, threshold=threshold))
+    if len(unloaded) == len(recording.plates):
+        doubt(*unloaded, "no plate is loaded; forces are in newtons, and push the foot up")
+    for sentence in unloaded:
+        note(sentence)
     return tuple(found)
 
 

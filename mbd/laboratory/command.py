@@ -46,8 +46,15 @@ def measured(path: str, model: Any, feet: Any = (), joints: Sequence[str] | None
         if not beside:
             raise ModelError(f"{Path(path).name} has no force plates, and no .mot or .sto lies beside it")
         loads = read(beside[0])
+    for sentence in recording.notes:
+        print(f"recording: {sentence}")
     motion = inverse_kinematics(model, recording, cutoff=6.0)  # Hz, before rates are taken
-    return inverse_dynamics(model, motion, joints, plates=assign_plates(motion, loads, list(feet)))
+    print(motion)
+    plates = assign_plates(motion, loads, list(feet))
+    for plate in plates:
+        times = " and ".join(f"{a:.3g} to {b:.3g} s" for a, b in plate.during or ())
+        print(f"{plate.record.name}: {plate.foot.body.name!r} from {times}")
+    return inverse_dynamics(model, motion, joints, plates=plates)
 
 
 def is_model_file(name: str) -> bool:

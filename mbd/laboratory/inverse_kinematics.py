@@ -106,7 +106,11 @@ def inverse_kinematics(
     # the first frame, then all others
     first = _first(problem, recording)
     begin = _begin(model, mechanism, problem, recording, points, first, start, parameters, values)
-    found = nearest_postures(problem, recording.time, begin, first, values, mechanism)
+    try:
+        found = nearest_postures(problem, recording.time, begin, first, values, mechanism)
+    except ModelError as error:
+        hint = _in_other_units(problem, list(points), begin, first, float(recording.time[first]), values)
+        raise ModelError(f"{error}{hint}") from None
     result = InverseKinematics.of(
         mechanism, values, recording.time, found, problem, list(points), list(followed), cutoff, notes
     )
@@ -250,6 +254,27 @@ def _first(problem: Problem, recording: Recording) -> int:
     """The first frame with as many components as any."""
     seen = (problem.weight > 0.0).sum(axis=1)
     return int(np.argmax(seen)) if len(recording.time) else 0
+
+
+def _in_other_units(problem: Problem, names: Sequence[str], q: Vector, first: int, time: float, values: Vector) -> str:
+    """What distances between markers tell where no posture is near: other units of all or of one; often nothing."""
+    y, _ = problem.program.at_all(np.array([time]), q[np.newaxis], values)
+    count = 3 * len(names)
+    model, seen = y[0, :count].reshape(-1, 3), problem.measured[first, :count].reshape(-1, 3)
+    known = problem.weight[first, :count:3] > 0.0
+    if known.sum() < 3:
+        return ""
+    apart = [np.linalg.norm(each[known, np.newaxis] - each[known], axis=2) for each in (seen, model)]
+    ratios = np.median(apart[0], axis=1) / np.maximum(np.median(apart[1], axis=1), MIN_DISTANCE)
+    whole = float(np.median(ratios))
+    if not UNIT_RATIOS[0] < whole < UNIT_RATIOS[1]:
+        return f". Markers lie {whole:.3g} times as far from each other as in the model; are they in meters?"
+    own = [name for name, is_known in zip(names, known, strict=True) if is_known]
+    far = int(np.argmax(np.abs(np.log(np.maximum(ratios, 1e-9)))))
+    if not UNIT_RATIOS[0] < float(ratios[far]) < UNIT_RATIOS[1]:
+        farther = f"{ratios[far]:.3g} times as far from the others as in the model"
+        return f". Marker {own[far]!r} lies {farther}; is it in meters?"
+    return ""
 
 
 def _begin(

@@ -23,7 +23,7 @@ LOADED = 10.0
 """Force along the vertical below which a plate is taken to be unloaded by default [N]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PlateRecord:
     """What a force plate measured, in ground axes.
 
@@ -43,6 +43,11 @@ class PlateRecord:
     moment: Matrix
     corners: Matrix | None = None
     height: float = 0.0
+
+    def __repr__(self) -> str:
+        most = float(np.nanmax(self.force[:, 1])) if len(self.time) and np.isfinite(self.force[:, 1]).any() else 0.0
+        ends = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
+        return f"<PlateRecord {self.name!r}: {len(self.time)} samples{ends}, up to {most:.4g} N>"
 
     def center(self, threshold: float = LOADED) -> Matrix:
         """The center of pressure (A, 3) [m]: where on the surface the force has no moment but a vertical one.

@@ -135,6 +135,26 @@ def test_a_plate_that_no_foot_stands_on_is_doubted():
         assert mbd.assign_plates(moved, recording, [foot.origin for foot in feet]) == ()
 
 
+def test_plates_that_are_never_loaded_and_gaps_of_plates_are_told(recwarn):
+    """Forces in kilonewtons load no plate; a plate without values is not one without a load."""
+    model, feet, motion, time, plate = steps()
+    right, left = plate("plate 1", 0.72, 0.08, 0.5, 0.9), plate("plate 2", 0.12, -0.12, 0.1, 0.5)
+    moved = mbd.inverse_dynamics(model, motion).run
+    # one of several plates that nobody walked on is no fault
+    idle = mbd.PlateRecord("plate 3", time, 0.0 * left.force, 0.0 * left.moment)
+    assert len(mbd.assign_plates(moved, mbd.Recording(time, plates=(right, left, idle)), feet)) == 2
+    assert not recwarn.list
+    small = [mbd.PlateRecord(each.name, time, each.force / 1e3, each.moment / 1e3) for each in (right, left)]
+    with pytest.warns(mbd.MbdWarning, match=r"no plate is loaded; forces are in newtons|plate . is never loaded"):
+        assert mbd.assign_plates(moved, mbd.Recording(time, plates=tuple(small)), feet) == ()
+    force = right.force.copy()
+    force[-12:] = np.nan
+    broken = mbd.PlateRecord("plate 1", time, force, right.moment)
+    with pytest.warns(mbd.MbdWarning, match="plate 1 has no values in 12 of 101 samples, the first at 0.89 s"):
+        mbd.assign_plates(moved, mbd.Recording(time, plates=(broken, left)), feet)
+    assert len(repr(right)) < 100 and "101 samples from 0 to 1 s" in repr(right)
+
+
 def test_two_feet_on_one_plate_are_doubted():
     model, feet, motion, time, plate = steps()
     there = plate("plate 1", 0.4, 0.0, 0.1, 0.9)

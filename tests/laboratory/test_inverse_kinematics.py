@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -224,6 +225,22 @@ def test_markers_that_are_missing_on_either_side_are_told_and_other_units_refuse
     assert "the recording lacks markers of the model: 'FIB'" in found.notes
     with pytest.raises(mbd.ModelError, match=r"1e\+03 times as far from each other on a body .* in meters"):
         mbd.inverse_kinematics(model, mbd.Recording([0.0, 1.0], {name: 1e3 * place for name, place in seen.items()}))
+
+
+@pytest.mark.parametrize("all_of_them", [True, False])
+def test_other_units_are_told_where_no_posture_is_near(all_of_them):
+    """Markers at joints alone, of which no two lie on one body."""
+    model = mbd.Model("chain")
+    links = [mbd.Link(f"link {k}", mass=1.0, length=0.4, center=0.2, inertia=0.02) for k in range(3)]
+    hip = mbd.Planar("hip", model.ground.origin, links[0].start)
+    model.connect(hip, *(mbd.Revolute(f"joint {k}", a.end, b.start) for k, (a, b) in enumerate(pairwise(links))))
+    markers = {"HIP": links[0].start, **{f"M{k}": link.end for k, link in enumerate(links)}}
+    seen = {name: np.array([[0.1 * k, 0.9 - 0.39 * k, 0.0]] * 3) for k, name in enumerate(markers)}
+    for name in markers if all_of_them else ("M2",):
+        seen[name] = 1e3 * seen[name]
+    words = "Markers lie .* are they in meters" if all_of_them else "Marker 'M2' lies .* is it in meters"
+    with pytest.raises(mbd.ModelError, match=words):
+        mbd.inverse_kinematics(model, mbd.Recording(np.arange(3.0), seen), markers=markers)
 
 
 @pytest.mark.slow

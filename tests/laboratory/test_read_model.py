@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib import metadata
 
 import numpy as np
@@ -65,6 +66,30 @@ def test_a_robot_has_the_equations_of_an_independent_newton_euler(tmp_path):
     expected = inverse([*model.joints], masses, np.array([0.0, -9.81, 0.0]), *states)
     for owner, kind in (("shoulder", "moment"), ("rail", "force"), ("spin", "moment")):
         assert moments[f"{owner}.{kind}"][0] == pytest.approx(expected[owner][0], abs=1e-12)
+
+
+def test_turns_may_be_quaternions_as_in_version_1_2(tmp_path):
+    """Those of scipy, with the real part last: the same robot."""
+    from scipy.spatial.transform import Rotation
+
+    def turned(found):
+        angles = [float(part) for part in found[1].split()]
+        x, y, z, w = Rotation.from_euler("xyz", angles).as_quat()
+        return f'quat_xyzw="{x!r} {y!r} {z!r} {w!r}"'.replace("np.float64(", "").replace(")", "")
+
+    text = re.sub('rpy="([^"]*)"', turned, ROBOT)
+    assert "rpy" not in text
+    first, second = (mbd.read_model(written(tmp_path, each)) for each in (ROBOT, text))
+    for name in ("shoulder", "rail"):
+        a, b = (np.array(found.joints[name].parent.rotation or np.eye(3)) for found in (first, second))
+        assert a == pytest.approx(b, abs=1e-14)
+    for name, body in first.bodies.items():
+        if hasattr(body, "inertia"):
+            assert second.bodies[name].inertia == pytest.approx(body.inertia, abs=1e-14)
+    with pytest.raises(mbd.ModelError, match="has both rpy and quat_xyzw"):
+        mbd.read_model(written(tmp_path, ROBOT.replace('rpy="0.1', 'quat_xyzw="0 0 0 1" rpy="0.1')))
+    with pytest.raises(mbd.ModelError, match="quat_xyzw must have the length 1"):
+        mbd.read_model(written(tmp_path, ROBOT.replace('rpy="0.1 0.2 -0.3"', 'quat_xyzw="0 0 1 1"')))
 
 
 def test_what_the_file_says_is_in_the_model(tmp_path):

@@ -145,7 +145,7 @@ def _origin(element: Element) -> tuple[Any, Matrix]:
     origin = element.find("origin")
     if origin is None:
         return (0.0, 0.0, 0.0), np.eye(3)
-    place, (roll, pitch, yaw) = (origin.numbers(name, 3, (0.0, 0.0, 0.0)) for name in ("xyz", "rpy"))
+    place, (roll, pitch, yaw) = origin.numbers("xyz", 3, (0.0, 0.0, 0.0)), _turns(origin)
     turns = ((yaw, 2), (pitch, 1), (roll, 0))
     R = np.eye(3)
     for angle, axis in turns:
@@ -189,12 +189,29 @@ def _joint(each: Element, name: str, bodies: dict[str, Body], losses: bool, repo
     return Revolute(name, frame, child.origin, axis=axis, loss=loss)
 
 
+def _turns(origin: Element) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of an <origin>, or those of its quaternion, which the version 1.2 allows [rad]."""
+    if "quat_xyzw" not in origin.attributes:
+        roll, pitch, yaw = origin.numbers("rpy", 3, (0.0, 0.0, 0.0))
+        return roll, pitch, yaw
+    if "rpy" in origin.attributes:
+        raise origin.wrong("has both rpy and quat_xyzw; one turn is expected")
+    x, y, z, w = origin.numbers("quat_xyzw", 4)
+    size = x * x + y * y + z * z + w * w
+    if not 0.99 < size < 1.01:
+        raise origin.wrong(f"quat_xyzw must have the length 1, got {math.sqrt(size):.4g}")
+    x, y, z, w = (part / math.sqrt(size) for part in (x, y, z, w))
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
 def _placed(each: Element, parent: Body) -> Frame:
     """The frame of a joint on its parent."""
     origin = each.find("origin")
     if origin is None:
         return parent.origin
-    place, (roll, pitch, yaw) = (origin.numbers(name, 3, (0.0, 0.0, 0.0)) for name in ("xyz", "rpy"))
+    place, (roll, pitch, yaw) = origin.numbers("xyz", 3, (0.0, 0.0, 0.0)), _turns(origin)
     x, y, z = place
     frame = parent.point(x, y, z) if any(place) else parent.origin
     for angle, axis in ((yaw, (0.0, 0.0, 1.0)), (pitch, (0.0, 1.0, 0.0)), (roll, (1.0, 0.0, 0.0))):
