@@ -77,7 +77,7 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[Fi
             if kind == "svg":
                 write_whole(target, lambda partial: vector.save(figure, partial))
             else:
-                fast = {"pil_kwargs": {"compress_level": 3}} if kind == "png" else {}
+                fast: dict[str, Any] = {"pil_kwargs": {"compress_level": 3}} if kind == "png" else {}
                 write_whole(target, lambda partial: figure.savefig(partial, format=kind, **fast))
 
 
