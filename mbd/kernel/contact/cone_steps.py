@@ -23,8 +23,8 @@ from mbd.kernel.records import Frictions, Guards, Kernel
 from mbd.kernel.stepping.trial_step import try_step, turns
 
 __all__ = [
-    "LONGER", "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "shorter_turn", "slides_at_first", "slides_on",
-    "slides_until_event",
+    "LONGER", "SHORTER", "TURNS_AWAY", "across", "approached_end", "come_to_zero", "keeps_direction", "shorter_turn",
+    "slides_at_first", "slides_on", "slides_until_event",
 ]  # fmt: skip
 
 PART = 0.5

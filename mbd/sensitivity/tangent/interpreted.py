@@ -193,6 +193,7 @@ def interpreted(functions: Sequence[tree.Function], held: Collection[str]) -> Ca
     known: dict[str, Any] = {
         "Dual": Dual, "value_of": value_of, "as_real": as_real, "power": power, "root": root, "at_root": at_root,
         "seeded": seeded, "takes_part": takes_part, "np": np,
+        "seed_rate": lambda x: float(of(x)[-1]) if isinstance(x, Dual) else 0.0,
         "largest": lambda x: float(np.max(np.abs(of(x)))) if isinstance(x, Dual) else 0.0,
     }  # fmt: skip
     texts = [_Printed(function, held, plain).text() for function in functions for plain in (True, False)]
@@ -326,7 +327,7 @@ class _Printed:
         given = [self.value(argument) for argument in node.arguments]
         word = node.function.symbol.split(".")[1] if node.function.symbol.startswith("rules.") else ""
         if not self.plain:
-            if word in ("seeded", "at_root", "takes_part"):
+            if word in ("seeded", "at_root", "seed_rate", "takes_part"):
                 return f"{word}({', '.join(given)})"
             own = {"without_tangent": "value_of({})", "is_differentiated": "True", "largest_derivative": "largest({})"}
             if word in own:

@@ -72,6 +72,8 @@ class Charted:
 
     def along(self, q: Vector, of_q: Matrix) -> Matrix:
         """Derivatives along velocities (n_v, D)."""
+        if self.programs.mechanism.vector:
+            return of_q
         return np.asarray(np.linalg.lstsq(self.base(q), of_q, rcond=None)[0])
 
 

@@ -351,6 +351,8 @@ class TangentBody(Body):
             return Dual(str(operands[0]), f"<{lanes}>")
         if name.startswith("rules.at_root."):
             return self.at_root(*operands)
+        if name.startswith("rules.seed_rate."):
+            return self.last(operands[0])
         if name.startswith("rules.without_tangent."):
             return str(operands[0])
         if name.startswith("rules.takes_part."):
@@ -374,10 +376,14 @@ class TangentBody(Body):
 
     def at_root(self, place: str, value: str) -> str:
         """The place h at which a value is 0: ``h' = −g'/ġ``, with ġ in the last lane; there nothing is left of it."""
-        rate = self.emit(f"extractelement {VECTOR} {of(value)}, i64 {LANES - 1}")
+        rate = self.last(value)
         over = self.emit(f"fdiv double -1.0, {rate}")
         moved = self.scaled(over, of(value))
         return Dual(str(place), self.emit(f"insertelement {VECTOR} {moved}, double 0.0, i64 {LANES - 1}"))
+
+    def last(self, value: str) -> str:
+        """The derivative in the last lane."""
+        return self.emit(f"extractelement {VECTOR} {of(value)}, i64 {LANES - 1}")
 
     def takes_part(self, value: str) -> str:
         """Whether a value or one of its derivatives is not 0."""

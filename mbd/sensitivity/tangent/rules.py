@@ -11,7 +11,9 @@ from __future__ import annotations
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
-from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK
+from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, STICK
+from mbd.kernel.contact.cone_steps import across, keeps_direction
+from mbd.kernel.contact.cones import along
 from mbd.kernel.contact.islands import saddle_entry
 from mbd.kernel.events.guards import guard_value, watch
 from mbd.kernel.events.transitions import is_due
@@ -74,6 +76,11 @@ def seeded(h: float) -> float:
 def at_root(h: float, value: float) -> float:
     """The step size h at which a value is zero, with its derivatives ``−g'/ġ`` (see `printer`)."""
     return h
+
+
+def seed_rate(value: float) -> float:
+    """The derivative of a value in the last direction (see `printer`)."""
+    return 1.0
 
 
 def without_tangent(value: float) -> float:
@@ -187,6 +194,10 @@ def follow_event(K: Kernel) -> int:
         status = take_again(K, h)
         if status != 0:
             return status
+    if h > 0.0 and kind == STICK and keeps_direction(K, K.event_index):
+        status = follow_rest(K, h)
+        restore_candidate(K)
+        return status
     status = candidate_after(K, seeded(h))
     if status != 0:
         return status
@@ -194,6 +205,41 @@ def follow_event(K: Kernel) -> int:
     status = candidate_after(K, K.event_after)
     restore_candidate(K)
     return status
+
+
+def follow_rest(K: Kernel, h: float) -> int:
+    """The candidate at which a friction in a plane, with its direction e held, comes to rest: δh and the turn δθ of e.
+
+    Both velocities are zero there, that along e and that across it, ``a = 0`` and ``c = 0``:
+
+        a_h δh + a_θ δθ = −δa   c_h δh + c_θ δθ = −δc
+
+    Where several come to rest at one instant, the run has no derivative (`margins`).
+    """
+    f = K.event_index
+    status = candidate_after(K, seeded(h))
+    if status != 0:
+        return status
+    a = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
+    c = across(K, f)
+    turn(K, f, seeded(0.0))
+    status = candidate_after(K, h)
+    if status != 0:
+        return status
+    turned_a = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
+    turned_c = across(K, f)
+    turn(K, f, -seeded(0.0))
+    K.event_after = at_root(h, seed_rate(turned_c) * a - seed_rate(turned_a) * c)
+    turn(K, f, at_root(0.0, seed_rate(a) * turned_c - seed_rate(c) * turned_a))
+    return candidate_after(K, K.event_after)
+
+
+def turn(K: Kernel, f: int, angle: float) -> None:
+    """Turn the direction in which friction f and its partner slide."""
+    p = K.partner[f]
+    x = K.slip[f] - angle * K.slip[p]
+    K.slip[p] += angle * K.slip[f]
+    K.slip[f] = x
 
 
 def candidate_after(K: Kernel, h: float) -> int:

@@ -179,7 +179,7 @@ class TangentRun(Run):
 
     stepper_kind = TangentStepper
     stepper: TangentStepper
-    ends_exactly = True
+    ends_exactly = repeats = True
     rows_at_once = 256  # derivatives of more would not stay in the caches of processors
     every_row = False
     moved_with_jump: Callable[[], Matrix | None]

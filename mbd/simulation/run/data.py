@@ -104,6 +104,8 @@ class RunData:
     """Rows of results that the kernel may fill before it hands them over."""
     ends_exactly = False
     """Whether a last step of the grid that ends with the run, but for round-off, ends there exactly."""
+    repeats = False
+    """Whether the same run has been made before, so that its parameters need not be judged."""
 
     def __init__(
         self,

@@ -67,7 +67,7 @@ class Run(RunData):
         if not self.resumed:
             begin(self, start)
             self.carried = carry_on(self, start)
-            if self.changed:
+            if self.changed and not self.repeats:
                 check_rank(self, start, self.first_parameters)
         return self
 
