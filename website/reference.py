@@ -28,7 +28,7 @@ GROUPS = {
     "branch Branch PointCurve basin Basin",
     "Laboratory": "read Recording PlateRecord ForcePlate assign_plates scale read_model write_model ImportedModel "
     "ImportReport "
-    "inverse_kinematics InverseKinematics inverse_dynamics InverseDynamics "
+    "inverse_kinematics film InverseKinematics inverse_dynamics InverseDynamics "
     "muscle_forces MuscleForces margin_of_stability",
     "Errors and failures": "MbdError MbdWarning ModelError AssemblyError SimulationError CapabilityError "
     "GaitError MemoryLimitError TraceError TrajectoryError UnknownNameError Failure Replay replay",

@@ -153,7 +153,7 @@ def as_markdown() -> str:
     """The table as it stands in the documentation."""
     head, *body = _cells()
     lines = [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *body)]
-    return "\n".join([*lines, "", "Refused besides:", "", *(f"- {line}" for line in _others())])
+    return "\n".join([*lines, "", "Also refused:", "", *(f"- {line}" for line in _others())])
 
 
 def as_text() -> str:
