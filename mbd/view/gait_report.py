@@ -114,6 +114,9 @@ def _energies(axes: Any, report: GaitReport) -> None:
                 place + (number + 0.5) / count * 0.8 - 0.4, walk.spent().get((side, kind), 0.0), 0.8 / count,
                 color=_color(side, report), alpha=1.0 - 0.35 * number / max(1, count - 1) if count > 1 else 1.0,
             )  # fmt: skip
+    if not keys:  # of measured gaits, whose energies are not known
+        axes.set_visible(False)
+        return
     axes.set_yticks(range(len(keys)), [kind for _, kind in keys])
     axes.invert_yaxis()
     axes.axvline(0.0, color=tone(NEUTRAL), lw=0.6)

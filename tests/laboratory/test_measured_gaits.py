@@ -165,6 +165,7 @@ def test_the_command_reports_a_recording(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert code == 0, printed
     assert "walk: strides" in printed and "stride time [s]" in printed
+    assert "energy of a stride" not in printed  # which markers do not tell
     assert {file.name for file in (tmp_path / "out").iterdir()} >= {"gait.html"}
 
 

@@ -136,7 +136,8 @@ class GaitReport:
         yield ""
         if self.band is not None:
             yield f"band of normal gait: {self.band.source}"
-        yield from _columns([("energy of a stride [J]", *(walk.name for walk in self.walks)), *self.energy_rows()])
+        if energies := list(self.energy_rows()):
+            yield from _columns([("energy of a stride [J]", *(walk.name for walk in self.walks)), *energies])
 
     def _repr_html_(self) -> str:
         spent = ("energy of a stride [J]", *(walk.name for walk in self.walks))
