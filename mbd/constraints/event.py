@@ -33,7 +33,8 @@ class Event(Machine):
     reset : named values to set, {'hip.rate': 0.0}, or a function that makes them from named values; None for no change.
         A value may be a function of named values, or a sympy expression: ``{theta.q: -theta.q, phi.v: 0}``
     terminal : whether the run ends there
-    direction : −1 as the guard falls through zero, +1 as it rises, 0 both
+    direction : −1 as the guard falls through zero, +1 as it rises, 0 both. A value that jumps over zero, as the rate of
+        a knee in an impact or at a reset, has crossed it then
     on : name of what it happens with, in the place of a guard: a contact that closes ('left foot'), after its impact,
         or opens ('left foot opened'), another event, a mode that changes or enters a state ('gait: swing')
     """
@@ -62,6 +63,11 @@ class Event(Machine):
             object.__setattr__(self, "reset", named)
             names_of(self.reset, f"each key of the reset of Event '{self.name}'")
         for value in self.reset.values() if isinstance(self.reset, Mapping) else (self.reset,):
+            if isinstance(value, Measure):
+                raise ModelError(
+                    f"reset of Event '{self.name}' is given by a measure; give a number, or a function of the named "
+                    "values, such as {'hip.rate': lambda named: -0.5 * named['hip.rate']}"
+                )
             if callable(value) and not is_expression(value):
                 function_of(value, f"reset of Event '{self.name}'", "named")
         object.__setattr__(self, "terminal", flag(self.terminal, f"terminal of Event '{self.name}'"))

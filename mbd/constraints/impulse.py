@@ -54,7 +54,7 @@ class Impulse(Constraint):
     size : P [N s, or N m s about a joint]: a number (the parameter 'name.size'), a function, a sympy expression
     on : name of the contact whose closing it waits for
     direction : of the impulse at a frame, of any length; two components are x and y
-    order : 'before', 'with' or 'after'
+    order : 'before', 'with' or 'after'; a restitution acts on the velocity with the impulse, but for 'after'
     axes : the frame along whose axes the direction is, such as that of the trailing leg; None: those of the ground
     arguments : what a function is called with, as for `Applied`; values are those just before the impulse
 

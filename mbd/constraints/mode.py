@@ -42,7 +42,7 @@ class Transition:
     only_while : it happens only while this holds at its instant: a contact is closed ('right foot'), another mode is
         in a state ('other: stance'), or a measure is positive. Where it does not hold, the instant has passed: a timer
         begins again as the state is entered again
-    direction : of `when`: −1 as it falls through zero, +1 as it rises, 0 both
+    direction : of `when`: −1 as it falls through zero, +1 as it rises, 0 both; a jump over zero counts, as in an impact
     """
 
     source: str | Sequence[str]
