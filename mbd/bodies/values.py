@@ -73,6 +73,8 @@ def among(value: Any, known: Collection[Any]) -> bool:
 
 def is_number(value: Any) -> bool:
     """Whether a value is one real number that a float can hold, finite or not."""
+    if type(value) is float:
+        return True
     if not _is_numeric(value):
         return False
     try:

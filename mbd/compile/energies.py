@@ -13,6 +13,7 @@ from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations.equations import Equations
+from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
 __all__ = ["Energies"]
@@ -43,17 +44,23 @@ class Energies:
         with equations.tape.lock:
             return array_function([equations.kinetic, equations.potential])
 
+    @cached_property
+    def _kinds(self) -> frozenset[str]:
+        """The kinds of inputs that the energies depend on."""
+        nodes = live([self._equations.kinetic, self._equations.potential])
+        return frozenset(node.data[0] for node in nodes if node.op == "input")
+
     def __call__(self, inputs: Mapping[str, Any], parameters: Vector | Matrix) -> list[Vector]:
         self.calls += 1
         rows = len(inputs["t"])
         if self._machine is None or self.calls <= OFTEN or rows > FEW:
             return self._arrays(inputs, parameters)
         block, out = np.zeros((rows, self._layout.size)), np.empty((rows, 2))
-        for kind, values in inputs.items():
-            place, values = self._layout.place(kind, 0), np.asarray(values, dtype=float)
+        for kind in self._kinds & inputs.keys():
+            place, values = self._layout.place(kind, 0), np.asarray(inputs[kind], dtype=float)
             block[:, place : place + (values.shape[1] if values.ndim == 2 else 1)] = values.reshape(rows, -1)
-        given = np.asarray(parameters, dtype=float)
-        several = np.ascontiguousarray(np.broadcast_to(given, (rows, given.shape[-1])))
+        given = np.ascontiguousarray(parameters, dtype=float)
+        several = [given] * rows if given.ndim == 1 else given
         function = self._machine(NAME, [self._equations.kinetic, self._equations.potential])
         for k in range(rows):
             function(block[k], several[k], out[k])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,7 @@ def _twists(joint: Joint) -> Matrix:
     return np.array(found).reshape(len(found), 6)
 
 
+@lru_cache(maxsize=4096)  # gaits ask for the same names again and again
 def exchanged(name: str, sides: tuple[str, str]) -> str:
     """A name with the words of the two sides exchanged.
 

@@ -31,7 +31,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.results.columns import ModelColumns
 from mbd.results.energy import doubted_ledger, kinds_of_work
-from mbd.simulation.run.stored import record_of, whole_record
+from mbd.simulation.run.stored import record_of, rows_of, whole_record
 
 if TYPE_CHECKING:
     from mbd.results.ledger import Ledger
@@ -187,11 +187,12 @@ class EnergyWatch(EnergyFindings):
 
     def _energies(self, run: RunData, chosen: NDArray[np.intp]) -> tuple[Vector, Vector]:
         """T and V at stored rows [J]."""
-        record = record_of(run, run.table[chosen])
-        anchors = np.tile(run.kernel.anchors[: run.kernel.n_anchors], (len(chosen), 1))
-        inputs = ModelColumns.inputs(record.rows(anchors))
+        table, parameters = run.table[chosen], run.first_parameters
+        if run.parameter_changes:
+            parameters = record_of(run, table).parameters_at(chosen)
         self.rows += len(chosen)
-        kinetic, potential = run.mechanism.energies(inputs, record.parameters_at(chosen))
+        inputs = ModelColumns.inputs(rows_of(run, table, chosen))
+        kinetic, potential = run.mechanism.energies(inputs, parameters)
         return kinetic, potential
 
     def _overflow(self, run: RunData) -> None:

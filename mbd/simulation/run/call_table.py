@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from operator import is_, itemgetter
 from typing import Any
@@ -17,8 +18,8 @@ PLACES = {name: place for place, name in enumerate(TABLE.addresses)}
 ARRAYS = (*TABLE.real_arrays, *TABLE.integer_arrays)
 """Names of arrays, which stand side by side, as integers and reals do."""
 WHOLE = slice(0, len(TABLE.integers))
-REAL = slice(WHOLE.stop, WHOLE.stop + len(TABLE.reals))
-BOUND = slice(REAL.stop, REAL.stop + len(ARRAYS))
+INTEGERS, REALS = struct.Struct(f"={len(TABLE.integers)}q"), struct.Struct(f"={len(TABLE.reals)}d")
+BOUND = slice(WHOLE.stop + len(TABLE.reals), WHOLE.stop + len(TABLE.reals) + len(ARRAYS))
 UNKNOWN: tuple[Sequence[Any], NDArray[np.int64]] = (None,) * len(ARRAYS), np.zeros(len(ARRAYS), dtype=np.int64)
 """Of arrays that are not known."""
 _whole, _real, _arrays = itemgetter(*TABLE.integers), itemgetter(*TABLE.reals), itemgetter(*ARRAYS)
@@ -39,7 +40,7 @@ class CallTable:
         self, functions: Sequence[Any], kernel: Kernel, known: tuple[Sequence[Any], NDArray[np.int64]] = UNKNOWN
     ) -> None:
         self._words = np.zeros(len(PLACES), dtype=np.int64)
-        self._reals = self._words.view(np.float64)
+        self._bytes = memoryview(self._words).cast("B")  # into which `struct` writes in a third of numpy's time
         self._code = np.zeros(0, dtype=np.int64)
         self._bound, self._words[BOUND] = known
         self.address = self._words.ctypes.data
@@ -52,8 +53,11 @@ class CallTable:
     def fill(self, functions: Sequence[Any], kernel: Kernel) -> None:
         """Bring the table up to what the next call needs."""
         values = vars(kernel)
-        self._words[WHOLE] = _whole(values)
-        self._reals[REAL] = _real(values)
+        try:
+            INTEGERS.pack_into(self._bytes, 0, *_whole(values))
+        except struct.error:  # a real in the place of an integer
+            self._words[WHOLE] = _whole(values)
+        REALS.pack_into(self._bytes, INTEGERS.size, *_real(values))
         arrays = _arrays(values)
         if not all(map(is_, arrays, self._bound)):
             for place, (array, before) in enumerate(zip(arrays, self._bound, strict=True), BOUND.start):

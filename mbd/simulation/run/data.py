@@ -191,6 +191,8 @@ class RunData:
         """Take over the rows and events that the kernel has stored."""
         v = self.kernel
         count, logged = int(v.n_stored), int(v.n_logged)
+        if not count and not logged:
+            return
         if logged:
             width = v.event_width
             self.events += self.log.events(v.log[: logged * width].reshape(logged, width), self.stored)

@@ -48,15 +48,16 @@ def belongs(run: RunData, contact: str = "") -> tuple[str, ...]:
     contact : the strategy, by default the one that the run takes now
     """
     integrator, equations = run.stepper.integrator, run.mechanism.equations
-    kind = type(integrator)
-    words = [f"{kind.__module__}.{kind.__qualname__}", repr(integrator), f"compiled {run.stepper.compiled}"]
-    settings = run.settings if not contact else {**run.settings, "contact": contact}
-    words += [f"{name} {settings[name]!r}" for name in OPTIONS]
-    words.append(f"mbd {settings['versions']['mbd']}")
-    words += [f"{name} {len(getattr(run.kernel, name))}" for name in (*TABLE.kept_reals, *TABLE.kept_integers)]
-    words += [row.title for row in equations.rows] + run.manager.names
-    words += [guard.name for guard in run.manager.guards]
-    return (*words, *_controllers(run))
+    kind, settings = type(integrator), run.settings if not contact else {**run.settings, "contact": contact}
+    asked = tuple(f"{name} {settings[name]!r}" for name in OPTIONS)
+    known = run.stepper.words  # the rest follows from the stepper
+    if asked not in known:
+        words = [f"{kind.__module__}.{kind.__qualname__}", repr(integrator), f"compiled {run.stepper.compiled}"]
+        words += [*asked, f"mbd {settings['versions']['mbd']}"]
+        words += [f"{name} {len(getattr(run.kernel, name))}" for name in (*TABLE.kept_reals, *TABLE.kept_integers)]
+        words += [row.title for row in equations.rows] + run.manager.names
+        known[asked] = (*words, *(guard.name for guard in run.manager.guards))
+    return (*known[asked], *_controllers(run))
 
 
 def _controllers(run: RunData) -> tuple[str, ...]:

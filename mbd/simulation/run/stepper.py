@@ -97,6 +97,7 @@ class Stepper:
     ) -> None:
         self.mechanism, self.manager, self.integrator = mechanism, manager, integrator
         self.key: Any = None  # of runs that may have it after this one
+        self.words: dict[tuple[str, ...], tuple[str, ...]] = {}  # of memories, by what was asked (`run.memory`)
         self.compiled = is_compiled(mechanism, integrator)
         self.straight = self.compiled  # with straight-line code for factors, which machine code alone is worth
         self.judges_starts = self.compiled

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.results.balance import Balance
-from mbd.results.record import EventRecord, Record
+from mbd.results.record import EventRecord, Record, Rows
 from mbd.results.stored_states import StoredStates
 from mbd.simulation.run.data import RunData
 
-__all__ = ["ended_record", "record_of", "whole_record"]
+__all__ = ["ended_record", "record_of", "rows_of", "whole_record"]
 
 BLOCK = 4096
 """Rows that are read together."""
@@ -23,20 +23,32 @@ BLOCK = 4096
 
 def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
     """Rows that the kernel has stored, (R, width), as a record without a verdict."""
-    v, equations = run.kernel, run.mechanism.equations
+    equations = run.mechanism.equations
+    return Record(
+        equations=equations, parameters=run.first_parameters,
+        parameter_names=[parameter.name for parameter in equations.parameters], **_parts(run, table),
+        events=events, settings=run.settings, parameter_changes=run.parameter_changes, start=run.start,
+    )  # fmt: skip
+
+
+def rows_of(run: RunData, table: Matrix, source: NDArray[np.intp]) -> Rows:
+    """The same as states with the anchors of now, `source` being their numbers."""
+    anchors = np.tile(run.kernel.anchors[: run.kernel.n_anchors], (len(table), 1))
+    return Rows(**_parts(run, table), anchors=anchors, source=source)
+
+
+def _parts(run: RunData, table: Matrix) -> dict[str, Any]:
+    """Columns of the kernel's rows by their letters."""
+    v = run.kernel
     n_q, n_v, n, rows = v.n_q, v.n_v, v.n, v.n_rows
     at_v, at_a = 1 + n_q, 1 + n_q + n
     at_lam, at_closed = at_a + n, at_a + n + rows
     at_friction = at_closed + v.n_contacts
-    return Record(
-        equations=equations, parameters=run.first_parameters,
-        parameter_names=[parameter.name for parameter in equations.parameters], time=table[:, 0], q=table[:, 1:at_v],
-        v=table[:, at_v : at_v + n_v], z=table[:, at_v + n_v : at_a], a=table[:, at_a : at_a + n_v],
-        s=table[:, at_a + n_v : at_lam], lam=table[:, at_lam:at_closed],
-        closed=_bytes(table[:, at_closed:at_friction], np.uint8), phase=_bytes(table[:, at_friction:], np.int8),
-        events=events, settings=run.settings,
-        parameter_changes=run.parameter_changes, start=run.start,
-    )  # fmt: skip
+    return {
+        "time": table[:, 0], "q": table[:, 1:at_v], "v": table[:, at_v : at_v + n_v], "z": table[:, at_v + n_v : at_a],
+        "a": table[:, at_a : at_a + n_v], "s": table[:, at_a + n_v : at_lam], "lam": table[:, at_lam:at_closed],
+        "closed": _bytes(table[:, at_closed:at_friction], np.uint8), "phase": _bytes(table[:, at_friction:], np.int8),
+    }  # fmt: skip
 
 
 def _bytes(values: Matrix, kind: Any) -> NDArray[Any]:
