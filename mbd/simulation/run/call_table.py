@@ -40,7 +40,7 @@ class CallTable:
         self, functions: Sequence[Any], kernel: Kernel, known: tuple[Sequence[Any], NDArray[np.int64]] = UNKNOWN
     ) -> None:
         self._words = np.zeros(len(PLACES), dtype=np.int64)
-        self._bytes = memoryview(self._words).cast("B")  # into which `struct` writes in a third of numpy's time
+        self._bytes = self._words.data.cast("B")  # into which `struct` writes in a third of numpy's time
         self._code = np.zeros(0, dtype=np.int64)
         self._bound, self._words[BOUND] = known
         self.address = self._words.ctypes.data
