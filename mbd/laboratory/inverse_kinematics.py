@@ -126,8 +126,7 @@ def _pairs(
     """Points of the model by the markers of the recording."""
     if markers is None:
         known = {name.removesuffix(".x") for name in equations.output_names() if name.endswith(".x")}
-        called = {name: name if name in known else plain(name) for name in recording.markers}
-        found: dict[str, Any] = {name: point for name, point in called.items() if point in known}
+        found = _by_name(recording.markers, known, notes)
         rest = [name for name in recording.markers if name not in found]
         if not found:
             raise ModelError(
@@ -150,6 +149,29 @@ def _pairs(
         if name not in recording.markers:
             raise ModelError(f"markers: {nearest(str(name), recording.markers, 'marker', 'The recording has')}")
     return dict(markers)
+
+
+def _by_name(markers: Mapping[str, Any], known: set[str], notes: list[str]) -> dict[str, Any]:
+    """Points of the model by the markers that are called like them, or like them behind a subject: 'Anna:LASI'."""
+    found: dict[str, Any] = {}
+    subjects: set[str] = set()
+    for name in markers:
+        subject, _, rest = name.rpartition(":")
+        spellings = (name, plain(name), *((rest, plain(rest)) if subject else ()))
+        point = next((each for each in spellings if each in known), None)
+        if point is None:
+            continue
+        if subject and point not in spellings[:2]:
+            subjects.add(subject)
+        if point in found.values():
+            raise ModelError(
+                f"markers: two markers of the recording are {point!r} of the model, one of them {name!r}; give "
+                "{name: point}"
+            )
+        found[name] = point
+    if subjects:
+        notes.append(f"markers are those behind the subject {', '.join(map(repr, sorted(subjects)))}")
+    return found
 
 
 def _in_meters(model: Any, recording: Recording, points: Mapping[str, Any]) -> None:

@@ -11,7 +11,7 @@ from mbd.arrays import Vector
 from mbd.errors import TrajectoryError
 from mbd.laboratory.plates_by_column import plates_by_column
 from mbd.laboratory.recording import Recording
-from mbd.laboratory.text import Lines, numbers_of, read_lines
+from mbd.laboratory.text import Lines, numbers_of, read_lines, with_tabs
 from mbd.laboratory.units import split_unit
 
 __all__ = ["read_storage", "write_storage_text"]
@@ -35,7 +35,7 @@ def read_storage(path: Path) -> Recording:
     TrajectoryError
         for what is no such file, with the line.
     """
-    source = read_lines(path)
+    source = with_tabs(read_lines(path))
     header, first = _header(source)
     labels = _labels(source, first)
     notes: list[str] = []

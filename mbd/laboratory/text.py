@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 from mbd.free_memory import available
 
-__all__ = ["Lines", "numbers_of", "read_lines"]
+__all__ = ["Lines", "numbers_of", "read_lines", "with_tabs"]
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d{1,4})?$")
 GAPS = {"", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "-nan(ind)", "missing"}
@@ -64,6 +65,14 @@ def read_lines(path: Path) -> Lines:
     if "\0" in text:
         raise TrajectoryError(f"{path.name} is no text file: it holds zero bytes")
     return Lines(path, tuple(re.split(r"\r\n|\n|\r", text)))
+
+
+def with_tabs(source: Lines) -> Lines:
+    """A file with tabs between its cells, also where a spreadsheet has saved it with commas, which end lines too."""
+    first = source.lines[0].rstrip().lower() if source.lines else ""
+    if not first.endswith(",,") and not first.startswith("pathfiletype,"):
+        return source
+    return replace(source, lines=tuple(line.replace(",", "\t") for line in source.lines))
 
 
 def numbers_of(source: Lines, rows: Sequence[tuple[int, Sequence[str]]], width: int, comma: bool = False) -> Matrix:

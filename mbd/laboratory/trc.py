@@ -15,7 +15,7 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.errors import TrajectoryError
 from mbd.laboratory.recording import Recording
-from mbd.laboratory.text import Lines, numbers_of, read_lines
+from mbd.laboratory.text import Lines, numbers_of, read_lines, with_tabs
 from mbd.laboratory.units import factor_of, is_length
 
 __all__ = ["read_trc", "write_trc"]
@@ -32,7 +32,7 @@ def read_trc(path: Path) -> Recording:
     TrajectoryError
         for what is no such file, with the line.
     """
-    source = read_lines(path)
+    source = with_tabs(read_lines(path))
     lines = source.lines
     if not lines or "pathfiletype" not in lines[0].lower():
         raise source.wrong(0, "a marker file begins with 'PathFileType'")

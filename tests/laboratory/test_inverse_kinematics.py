@@ -227,6 +227,22 @@ def test_markers_that_are_missing_on_either_side_are_told_and_other_units_refuse
         mbd.inverse_kinematics(model, mbd.Recording([0.0, 1.0], {name: 1e3 * place for name, place in seen.items()}))
 
 
+def test_markers_behind_a_subject_and_with_dots_are_those_of_the_model():
+    """As Nexus and OpenSim name them: 'Anna:ANK', 'R.Heel'."""
+    model = mbd.Model("knee")
+    shank = mbd.Link("shank", mass=3.0, length=0.4, center=0.2, inertia=0.04)
+    for name, place in (("ANK", (0.0, -0.4)), ("R_Tibia", (0.05, -0.2))):
+        mbd.Marker(name, shank, place)
+    model.connect(mbd.Revolute("knee", model.ground.origin, shank.start))
+    seen = {"Anna:ANK": np.array([[0.0, -0.4, 0.0]] * 2), "Anna:R.Tibia": np.array([[0.05, -0.2, 0.0]] * 2)}
+    found = mbd.inverse_kinematics(model, mbd.Recording([0.0, 1.0], seen))
+    assert "markers are those behind the subject 'Anna'" in found.notes
+    assert found["knee.angle"] == pytest.approx([0.0, 0.0], abs=1e-9)
+    both = seen | {"Bert:ANK": seen["Anna:ANK"]}
+    with pytest.raises(mbd.ModelError, match="two markers of the recording are 'ANK' of the model"):
+        mbd.inverse_kinematics(model, mbd.Recording([0.0, 1.0], both))
+
+
 @pytest.mark.parametrize("all_of_them", [True, False])
 def test_other_units_are_told_where_no_posture_is_near(all_of_them):
     """Markers at joints alone, of which no two lie on one body."""

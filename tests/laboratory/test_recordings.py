@@ -59,6 +59,7 @@ TRC_VARIANTS = {
     "UTF-16": TRC.encode("utf-16"),
     "no times": TRC.replace("0.00\t", "\t").replace("0.01\t", "\t").replace("0.02\t", "\t"),
     "other counts in the header": TRC.replace("100\t100\t3\t2", "100\t100\t5\t3"),
+    "a spreadsheet's commas": "\n".join(f"{line}{',' * 3}" for line in TRC.replace("\t", ",").splitlines()),
     "millimeters": TRC.replace("\tmm\t", "\tMillimeters\t"),
     "exponents": TRC.replace("100\t200\t300", "1e2\t2.0E+2\t.3e3"),
 }  # fmt: skip
@@ -79,6 +80,7 @@ STO_VARIANTS = {
     "as it is": STO,
     "CRLF": STO.replace("\n", "\r\n"),
     "spaces": STO.replace("\t", "   "),
+    "a spreadsheet's commas": "\n".join(f"{line}{',' * 3}" for line in STO.replace("\t", ",").splitlines()),
     "radians": STO.replace("inDegrees=yes", "inDegrees=no").replace("\t90\t", f"\t{math.pi / 2}\t")
     .replace("\t45\t", f"\t{math.pi / 4}\t"),
     "comma decimals": STO.replace("0.1\t", "0,1\t").replace("0.2\t", "0,2\t").replace("1.5", "1,5")
