@@ -8,10 +8,12 @@ import gc
 import os
 import shlex
 import sys
+import textwrap
 import time
 import traceback
 import webbrowser
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -297,9 +299,10 @@ def info_command(arguments: argparse.Namespace) -> int:
     rows["backend"] = chosen.name + (f" ({chosen.note})" if chosen.note else "")
     rows["code cache"] = str(default_cache().directory or "off") if chosen.name == "llvm" else "off"
     rows["examples"] = f"{len(examples())} in {folder()}"
+    wrap = partial(textwrap.fill, width=100, break_long_words=False, break_on_hyphens=False)
     for name, value in rows.items():
-        print(f"{name:<14}{value}")
-    print(f"\n{as_text()}")
+        print(wrap(value, initial_indent=f"{name:<14}", subsequent_indent=" " * 14))
+    print("\n" + "\n".join(wrap(line, subsequent_indent="    ") for line in as_text().splitlines()))
     return 0
 
 
