@@ -73,6 +73,40 @@ def apart(path):
     return np.abs(terms.M - M).max() / np.abs(M).max(), np.abs(terms.f - h).max() / max(1.0, np.abs(h).max())
 
 
+def test_sites_are_markers_of_a_file_that_mujoco_saved(tmp_path):
+    """From a film of the sites of its own kinematics through to the moments of its own inverse dynamics."""
+    text = TEXT.replace('<joint name="shoulder"', '<site name="SHO" pos="0.02 0.03 -0.1"/><joint name="shoulder"')
+    text = text.replace('<joint name="elbow.r"', '<site name="FORE" pos="0 0.03 -0.1"/><joint name="elbow.r"')
+    text = text.replace('<joint name="turn"', '<site name="A" pos="0.1 0.05 0"/><site name="B" pos="0 0 0.2"/>'
+                        '<joint name="turn"')  # fmt: skip
+    text = text.replace('-9.81"/>', '-9.81"><flag constraint="disable"/></option>')
+    source = mujoco.MjModel.from_xml_string(text)
+    mujoco.mj_saveLastXML(str(tmp_path / "saved.xml"), source)
+    found = mbd.read_model(tmp_path / "saved.xml", stops=False)
+    assert "4 sites as markers" in str(found.report)
+    data, time = mujoco.MjData(source), np.arange(60) / 100.0
+    hand = int(source.jnt_qposadr[mujoco.mj_name2id(source, mujoco.mjtObj.mjOBJ_JOINT, "turn")])
+    speed = int(source.jnt_dofadr[mujoco.mj_name2id(source, mujoco.mjtObj.mjOBJ_JOINT, "turn")])
+    angle, moments, seen = 0.4 * np.sin(5.0 * time), [], {"A": [], "B": []}
+    for k in range(len(time)):
+        data.qpos[hand], data.qvel[speed] = angle[k], 2.0 * np.cos(5.0 * time[k])
+        data.qacc[:] = 0.0
+        data.qacc[speed] = -10.0 * np.sin(5.0 * time[k])
+        mujoco.mj_fwdPosition(source, data)
+        mujoco.mj_inverse(source, data)
+        moments.append(data.qfrc_inverse[speed])
+        for name, places in seen.items():
+            x, y, z = data.site(name).xpos
+            places.append((x, z, -y))
+    # of the hand alone, whose motion the sites on it tell
+    alone = mbd.Model("hand", gravity=found.model.gravity)
+    alone.connect(found.joints["turn"])
+    motion = mbd.inverse_kinematics(alone, mbd.Recording(time, {name: np.array(p) for name, p in seen.items()}))
+    assert motion["turn.angle"] == pytest.approx(angle, abs=1e-9)
+    given = mbd.inverse_dynamics(alone, motion)["turn.moment"]
+    assert given[6:-6] == pytest.approx(np.array(moments)[6:-6], abs=2e-4)
+
+
 def test_a_model_has_the_mass_matrix_and_bias_of_mujoco(tmp_path):
     path = tmp_path / "toy.xml"
     path.write_text(TEXT)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
+from tests.forces.test_wrapping import SURFACES, elbow
 
 INERTIA = (0.05, 0.04, 0.03, 0.002, -0.003, 0.001)
 
@@ -167,6 +168,21 @@ def test_stops_are_written_or_listed(suffix, tmp_path):
     assert "'near'" not in left and "'far'" not in left
     (cut,) = [line.split("'")[1] for line in report.left_out if "closes a loop" in line]
     assert f"'{cut} stop'" in left
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_surfaces_of_paths_come_back(surface, tmp_path):
+    model = elbow(SURFACES[surface])
+    report = mbd.write_model(model, tmp_path / "arm.osim")
+    assert "1 muscles" in str(report) and not report.left_out
+    again = mbd.read_model(tmp_path / "arm.osim")
+    again.model.apply(*again.muscles.values())
+    for turn, angle in (0.3, 1.1), (-0.2, 1.6), (0.1, -0.9):
+        lengths = [
+            mbd.assemble(each, {"turn.angle": turn, "elbow.angle": angle})["triceps.length"]
+            for each in (model, again.model)
+        ]
+        assert lengths[1] == pytest.approx(lengths[0], abs=1e-14)
 
 
 def test_the_activation_of_a_muscle_comes_back(tmp_path):

@@ -11,6 +11,7 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.bodies.base import Body, Frame
+from mbd.bodies.marker import Marker
 from mbd.bodies.rigid_body import RigidBody
 from mbd.constraints.base import Constraint
 from mbd.constraints.bilateral import Bilateral
@@ -26,6 +27,7 @@ from mbd.joints.prismatic import Prismatic
 from mbd.joints.revolute import Revolute
 from mbd.joints.spherical import Spherical
 from mbd.joints.weld import Weld
+from mbd.laboratory.models.osim_elements import plain, unlike
 from mbd.laboratory.models.report import ImportedModel, ImportReport
 from mbd.model import Model
 from mbd.results.tables import library
@@ -67,6 +69,7 @@ class _Reader:
         self.bodies, self.joints, self.held = dict[str, Body](), dict[str, Joint](), list[Constraint]()
         self.of_joint: dict[int, Joint] = {}
         self.rotors = list[str]()
+        self.sites = 0
 
     def read(self) -> ImportedModel:
         """Bodies and joints from the world outwards, then couplings and the report."""
@@ -75,6 +78,7 @@ class _Reader:
         for number in range(1, source.nbody):
             made.append(self._body(number, made))
         self.model.connect(*self.joints.values())
+        self.sites = self._sites(made)
         self.held += self._couplings()
         self.model.constrain(*self.held)
         self._summary()
@@ -183,6 +187,20 @@ class _Reader:
                 found["rest"] = float(source.qpos_spring[int(source.jnt_qposadr[k])]) - self._reference(k)
         return found
 
+    def _sites(self, made: list[Body | None]) -> int:
+        """Sites with names as points of their bodies, where markers stick; how many there are."""
+        taken, count = {*self.bodies, *self.joints, "ground"}, 0
+        for k in range(self.source.nsite):
+            given = self.mujoco.mj_id2name(self.source, self.mujoco.mjtObj.mjOBJ_SITE, k)
+            name, body = plain(given or ""), made[int(self.source.site_bodyid[k])]
+            if not name or body is None:
+                continue
+            called = unlike(name, taken, " site")
+            x, y, z = map(float, self.source.site_pos[k])
+            Marker(called, body, (x, y, z))
+            count += 1
+        return count
+
     def _couplings(self) -> list[Constraint]:
         """Equations between two hinges or slides as rows."""
         source, found = self.source, list[Constraint]()
@@ -208,6 +226,8 @@ class _Reader:
         counts = ", ".join(f"{kinds.count(kind)} {word}" for kind, word in words.items() if kind in kinds)
         title = f"{source.nbody - 1} bodies and {source.njnt} joints ({counts or 'none'}), z of the file is y"
         report.understood.append(title)
+        if self.sites:
+            report.understood.append(f"{self.sites} sites as markers")
         limited = int(np.sum(np.asarray(source.jnt_limited) != 0))
         if limited:
             text = f"soft limits of {limited} joints"
@@ -229,7 +249,8 @@ class _Reader:
         others = sum(int(kind) != EQUAL_JOINTS for kind in source.eq_type)
         rest = {
             "shapes (contacts)": source.ngeom, "actuators": source.nu, "tendons": source.ntendon,
-            "sensors": source.nsensor, "sites": source.nsite, "equations of other kinds": others,
+            "sensors": source.nsensor, "sites of the world or without a name": source.nsite - self.sites,
+            "equations of other kinds": others,
         }  # fmt: skip
         report.left_out += [f"{count} {word}" for word, count in rest.items() if count]
         if not self.losses and (np.any(source.dof_damping > 0.0) or np.any(source.jnt_stiffness > 0.0)):

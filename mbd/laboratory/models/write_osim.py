@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from mbd.bodies.marker import Marker
 from mbd.errors import ModelError
 from mbd.forces.muscles import Muscle
 from mbd.forces.muscles.paths import PointPath
+from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingSurface
 from mbd.joints.cylindrical import Cylindrical
 from mbd.joints.free import Free
 from mbd.joints.planar import Planar
@@ -31,6 +32,8 @@ __all__ = ["osim_of"]
 
 KINDS = {"de groote": "DeGrooteFregly2016Muscle", "millard": "Millard2012EquilibriumMuscle"}
 """Names of muscles by their curves."""
+LONG = 1.0
+"""Length of a cylinder, which has no ends here [m]."""
 PLAIN = {ord(mark): "_" for mark in ' ./\\:*?"<>|'}
 """What OpenSim does not allow in names becomes an underscore."""
 
@@ -49,6 +52,14 @@ def osim_of(model: Any) -> tuple[str, ImportReport]:
     ranges, stopped = _ranges(model, tree)
     names = _names(model)
     bodies, joints = list[str](), list[str]()
+    muscles, rest = [], list[str]()
+    surfaces: dict[str, list[str]] = {}
+    for force in model.forces:
+        simple = isinstance(force, Muscle) and isinstance(force.path, PointPath)
+        if simple and all(isinstance(point, Frame | WrappingSurface) for point in force.path.points):
+            muscles.append(_muscle(force, names, values, surfaces))
+        else:
+            rest.append(f"{type(force).__name__} {force.name!r}")
     for each in tree:
         body = each.child.body
         found = inertial_of(body, values, report)
@@ -56,17 +67,11 @@ def osim_of(model: Any) -> tuple[str, ImportReport]:
         tensor = _text((J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]))
         bodies.append(
             f"<Body name={quoteattr(names[body.name])}><mass>{_text(found.mass)}</mass>"
-            f"<mass_center>{_text(found.center)}</mass_center><inertia>{tensor}</inertia></Body>"
+            f"<mass_center>{_text(found.center)}</mass_center><inertia>{tensor}</inertia>"
+            f"{_surfaces(surfaces, body.name)}</Body>"
         )
         joints.append(_joint(each, names, values, ranges.get(each.joint.name)))
     markers = [_marker(frame, names, values) for frame in model.markers if isinstance(frame, Marker)]
-    muscles, rest = [], list[str]()
-    for force in model.forces:
-        simple = isinstance(force, Muscle) and isinstance(force.path, PointPath)
-        if simple and all(isinstance(point, Frame) for point in force.path.points):
-            muscles.append(_muscle(force, names, values))
-        else:
-            rest.append(f"{type(force).__name__} {force.name!r}")
     report.understood.append(
         f"{len(bodies)} bodies, {len(joints)} joints, {len(markers)} markers, {len(muscles)} muscles"
     )
@@ -85,6 +90,7 @@ def osim_of(model: Any) -> tuple[str, ImportReport]:
 <Model name={quoteattr(_plain(model.name))}>
 <gravity>{_text(gravity if len(gravity) == 3 else (*gravity, 0.0))}</gravity>
 <length_units>meters</length_units><force_units>N</force_units>
+<Ground name="ground">{_surfaces(surfaces, model.ground.name)}</Ground>
 <BodySet name="bodyset"><objects>
 {_lines(bodies)}</objects></BodySet>
 <JointSet name="jointset"><objects>
@@ -194,12 +200,46 @@ def _marker(frame: Marker, names: dict[str, str], values: dict[str, float]) -> s
     )
 
 
-def _muscle(muscle: Muscle, names: dict[str, str], values: dict[str, float]) -> str:
+def _surfaces(known: dict[str, list[str]], body: str) -> str:
+    """The surfaces of a body."""
+    own = "".join(known.get(body, ()))
+    return f"<WrapObjectSet><objects>{own}</objects></WrapObjectSet>" if own else ""
+
+
+def _surface(surface: WrappingSurface, name: str, radius: float, values: dict[str, float]) -> str:
+    """A sphere, or a cylinder about z whose side is x."""
+    place, R = place_of(surface.frame, values)
+    side, more = "all", ""
+    if isinstance(surface, WrappingCylinder):
+        more = f"<length>{_text(LONG)}</length>"
+        if surface.side is not None:
+            x, y, _ = surface.side
+            side, R = "x", R @ np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])
+    tag = "WrapCylinder" if isinstance(surface, WrappingCylinder) else "WrapSphere"
+    return (
+        f"<{tag} name={quoteattr(name)}><active>true</active><xyz_body_rotation>{_text(_angles(R))}</xyz_body_rotation>"
+        f"<translation>{_text(place)}</translation><quadrant>{side}</quadrant><radius>{_text(radius)}</radius>{more}"
+        f"</{tag}>"
+    )
+
+
+def _muscle(muscle: Muscle, names: dict[str, str], values: dict[str, float], surfaces: dict[str, list[str]]) -> str:
+    """A muscle, whose surfaces are added to those of their bodies."""
+
     def number(field: str) -> str:
         return _text(values.get(f"{muscle.name}.{field}", getattr(muscle, field)))
 
-    points = []
+    points, around = list[str](), list[str]()
     for k, frame in enumerate(muscle.path.points, 1):
+        if isinstance(frame, WrappingSurface):
+            name, own = f"{_plain(muscle.name)}_surface_{k}", f"{muscle.name} point {k}.radius"
+            written = _surface(frame, name, values.get(own, frame.radius), values)
+            surfaces.setdefault(frame.frame.body.name, []).append(written)
+            around.append(
+                f'<PathWrap name="{name}"><wrap_object>{escape(name)}</wrap_object><method>hybrid</method>'
+                f"<range>{len(points)} {len(points) + 1}</range></PathWrap>"
+            )
+            continue
         place, _ = place_of(frame, values)
         body = names[frame.body.name]
         path = "/ground" if body == "ground" else f"/bodyset/{body}"
@@ -229,7 +269,8 @@ def _muscle(muscle: Muscle, names: dict[str, str], values: dict[str, float]) -> 
         f"<pennation_angle_at_optimal>{number('pennation')}</pennation_angle_at_optimal>"
         f"<max_contraction_velocity>{number('max_velocity')}</max_contraction_velocity>"
         f"<fiber_damping>{number('damping')}</fiber_damping>{times}{flags}{active}"
-        f"<GeometryPath><PathPointSet><objects>{''.join(points)}</objects></PathPointSet></GeometryPath></{tag}>"
+        f"<GeometryPath><PathPointSet><objects>{''.join(points)}</objects></PathPointSet>"
+        f"<PathWrapSet><objects>{''.join(around)}</objects></PathWrapSet></GeometryPath></{tag}>"
     )
 
 
