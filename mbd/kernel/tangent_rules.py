@@ -5,7 +5,7 @@ The tangent pass (`mbd.sensitivity.tangent`) translates the kernel with other fu
 
 from __future__ import annotations
 
-from mbd.kernel.records import DependentRows, Kernel, Reals, Steps
+from mbd.kernel.records import Equations, Kernel, Reals, Steps
 
 __all__ = [
     "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
@@ -59,12 +59,12 @@ def follow_rates(K: Kernel, t: float) -> int:
     return 0
 
 
-def follow_factors(K: DependentRows, m: int) -> bool:
+def follow_factors(K: Equations, m: int) -> bool:
     """Factors of [M Bᵀ; B 0] from K.acc, which have no derivatives; false where a pivot is missing."""
     return False
 
 
-def follow_solution(K: DependentRows, m: int) -> None:
+def follow_solution(K: Equations, m: int) -> None:
     """K.rhs ← A⁻¹ K.rhs with these factors, and the derivatives of both."""
 
 

@@ -13,8 +13,8 @@ from mbd.kernel.algebra import linear
 from mbd.kernel.build import object_of
 from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.derivative import final_state_derivative
-from mbd.sensitivity.tangent.build import own_rules
 from mbd.sensitivity.tangent.printer import LANES, tangent_text
+from mbd.sensitivity.tangent.rules import own_rules
 from mbd.sensitivity.tangent.run import TangentRun
 from mbd.testing.mechanisms import random_scene
 from tests.gait.test_gaits_with_modes import walker as walker_with_modes
@@ -103,7 +103,7 @@ def test_entries_that_are_zero_have_derivatives_in_every_elimination(way):
     known = {name: getattr(linear, name) for name in ("solve_definite", "factor", "solve", "eliminate")}
     source = Source("given", functions_of(SOLVERS), known)
     kinds = ["kernel", "reals", "reals", "integers", "reals", "int"]
-    found = translate(source, "entry", kinds, instead={"mbd.kernel.tangent_rules": own_rules()})
+    found = translate(source, "entry", kinds, instead=own_rules())
     machine = Machine()
     address = machine.load(object_of(tangent_text(found, "given_solver", ()), 0), ["given_solver"])[0]
     run = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64, *[ctypes.c_void_p] * 4)(address)

@@ -349,14 +349,14 @@ def return_straight(K: Equations) -> bool:
     return bool(K.spare[0] == 1.0)
 
 
-def factor_returns(K: DependentRows, m: int) -> bool:
+def factor_returns(K: Equations, m: int) -> bool:
     """Factors of [M Bᵀ; B 0] from K.acc in K.kkt; false where a pivot is missing."""
     if is_differentiated():
         return follow_factors(K, m)
     return bool(factor_saddle(K, m, True, LOSS_AT_ONCE))
 
 
-def solve_returns(K: DependentRows, m: int) -> None:
+def solve_returns(K: Equations, m: int) -> None:
     """K.rhs ← [M Bᵀ; B 0]⁻¹ K.rhs."""
     if is_differentiated():
         follow_solution(K, m)

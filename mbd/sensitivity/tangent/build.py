@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import inspect
 import sys
 from collections.abc import Callable
 from functools import lru_cache
@@ -15,12 +14,13 @@ from mbd.compile.llvm import LEVEL
 from mbd.kernel import build
 from mbd.kernel.schemes import contract
 from mbd.kernel.translation.translate import Source, functions_of, translate
-from mbd.sensitivity.tangent import rules
+from mbd.sensitivity.tangent import printer
 from mbd.sensitivity.tangent.interpreted import Table, interpreted
 from mbd.sensitivity.tangent.printer import tangent_text
+from mbd.sensitivity.tangent.rules import FILES, own_rules
 from mbd.trees.tree import Function
 
-__all__ = ["entry", "keep_optimized", "own_rules", "plain_entry"]
+__all__ = ["entry", "keep_optimized", "plain_entry"]
 
 ENTRY = "mbd_tangent_kernel"
 HELD = (
@@ -75,8 +75,8 @@ _machines: list[Any] = []
 def _tag(level: int) -> str:
     """What the kernel of a level of optimization is called in the cache; all levels give the same bits."""
     digest = hashlib.sha256(build.source_digest().encode())
-    for name in ("build", "printer", "rules"):
-        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
+    for file in (Path(__file__), Path(printer.__file__), *FILES):
+        digest.update(file.read_bytes())
     return f"tangent kernel {level} {digest.hexdigest()}"
 
 
@@ -90,11 +90,6 @@ def keep_optimized() -> None:
     from mbd.kernel.first_build import keep
 
     keep(_tag(LEVEL), lambda: build.object_of(text(), level=LEVEL))
-
-
-def own_rules() -> Source:
-    """`rules`, which take the place of `mbd.kernel.tangent_rules`."""
-    return Source("rules", functions_of(inspect.getsource(rules)), vars(rules))
 
 
 def text() -> str:
@@ -118,5 +113,5 @@ def _trees() -> list[Function]:
 
     dispatched, names = contract.dispatch()
     own = Source("hooks", functions_of(dispatched), {**names, "advance": advance})
-    instead = {"mbd.kernel.hooks": own, "mbd.kernel.tangent_rules": own_rules()}
+    instead = {"mbd.kernel.hooks": own, **own_rules()}
     return translate(own, "advance", ["kernel"], build.APART, instead)

@@ -20,7 +20,7 @@ from mbd.sensitivity.tangent.programs import (
     derivatives_of_modes,
     derivatives_of_programs,
 )
-from mbd.sensitivity.tangent.rules import every_row_place
+from mbd.sensitivity.tangent.words import every_row_place
 from mbd.simulation.run.call_table import BOUND, PLACES
 from mbd.simulation.run.run import Run
 from mbd.simulation.run.stepper import Stepper
@@ -74,7 +74,7 @@ class TangentStepper(Stepper):
             for length, own in zip(plan.lengths, plan.places, strict=True)
         ]
         self._cleared = [room[part] for room, own in zip(self.rooms, plan.places, strict=True) for part in _read(own)]
-        self.functions.append(balance_function(self.mechanism))  # see `rules.BALANCE`
+        self.functions.append(balance_function(self.mechanism))  # see `follow_accelerations.BALANCE`
         self._shelved = {name: (K_array, room) for name, K_array, room in self._on_shelves()}
         self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._programs: list[Any] = []
@@ -97,7 +97,7 @@ class TangentStepper(Stepper):
 
     def _lengths(self, given: dict[str, int]) -> dict[str, int]:
         K, size = self.kernel, self.mechanism.layout.size
-        unknowns = K.n + 2 * K.n_rows  # of `rules.follow_newton`
+        unknowns = K.n + 2 * K.n_rows  # of `follow_newmark.follow_newton`
         starts = 2 * size + 10 * (K.n + K.n_rows + K.n_v + 1) + K.n_q + K.n_watched + K.n_frictions
         own = {"kkt": unknowns * unknowns, "rhs": unknowns, "pivots": unknowns}
         more = {name: max(length, given.get(name, 0)) for name, length in own.items()}
@@ -146,7 +146,7 @@ class TangentStepper(Stepper):
             self._of_modes[key] = derivatives_of_modes(self.mechanism, code, self.stabilized, self.places or ())
         tangent, residual, turned = self._of_modes[key]
         self._programs += [tangent, residual, *others * [turned], turned]  # others run without derivatives only
-        self.functions.append(code.residual)  # see `rules.turned_program`
+        self.functions.append(code.residual)  # see `follow_newmark.turned_program`
         self._n_of_modes += 1
 
     def _advance_compiled(self) -> int:

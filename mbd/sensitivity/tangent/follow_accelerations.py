@@ -1,0 +1,122 @@
+"""Accelerations at a state with their derivatives, and what explicit steps make of them."""
+
+from __future__ import annotations
+
+from mbd.kernel.algebra.linear import factor, solve
+from mbd.kernel.contact.islands import saddle_entry
+from mbd.kernel.hooks import call
+from mbd.kernel.records import Kernel
+from mbd.kernel.stepping.restart import consistent, evaluate, fill_block
+from mbd.sensitivity.tangent.words import derivative_of, solve_plain, without_tangent
+
+__all__ = ["follow_factors", "follow_move", "follow_rates", "follow_solution"]
+
+BALANCE = 9
+"""The function behind those of `mbd.kernel.codes`: M v̇ + f + R λ and B v̇ + γ of all rows."""
+
+
+def prepare_rates(K: Kernel, t: float, m: int) -> int:
+    """Factors of ``[M R; B 0]`` at (q1, y1), with (v̇, λ) in K.rhs; 0, or that it is singular."""
+    n = K.n
+    size = n + m
+    evaluate(K, t, K.q1, K.y1)
+    for i in range(size):
+        for j in range(size):
+            K.kkt[i * size + j] = saddle_entry(K, i, j, False)
+    K.order_start = 0
+    if factor(K.kkt, size, K.pivots) != 0:
+        return 1
+    for i in range(n):
+        K.rhs[i] = -K.acc[K.acc_f + i]
+    for k in range(m):
+        K.rhs[n + k] = -K.acc[K.acc_bias + K.rows[k]]
+    solve(K.kkt, size, K.pivots, K.rhs)
+    return 0
+
+
+def follow_rates(K: Kernel, t: float) -> int:
+    """Consistent rates of (q1, y1) in K.jump, multipliers in K.impulse: `consistent` where friction follows λ, else
+
+    ``[M R; B 0] (δv̇, δλ) = −δ(M v̇ + f + R λ, B v̇ + γ)`` with v̇ and λ held.
+    """
+    n = K.n
+    m = K.n_active
+    if K.n_frictions > 0 or K.loaded > 0 or K.rubs == 1 or K.n_dropped > 0 or prepare_rates(K, t, m) != 0:
+        return consistent(K, t, K.q1, K.y1)
+    fill_block(K, t, K.q1, K.y1)
+    K.block[K.o_lam : K.o_lam + K.n_rows] = 0.0
+    K.impulse[: K.n_rows] = 0.0
+    for i in range(n):
+        K.jump[i] = without_tangent(K.rhs[i])
+        K.block[K.o_a + i] = K.jump[i]
+    for k in range(m):
+        K.impulse[K.rows[k]] = without_tangent(K.rhs[n + k])
+        K.block[K.o_lam + K.rows[k]] = K.impulse[K.rows[k]]
+    call(K, BALANCE, K.out)
+    for i in range(n):
+        K.rhs[i] = -derivative_of(K.out[i])
+    for k in range(m):
+        K.rhs[n + k] = -derivative_of(K.out[n + K.rows[k]])
+    solve_plain(K.kkt, n + m, K.pivots, K.rhs)
+    for i in range(n):
+        K.jump[i] += K.rhs[i]
+    for k in range(m):
+        K.impulse[K.rows[k]] += K.rhs[n + k]
+    return 0
+
+
+def follow_move(K: Kernel, h: float, weights: int, count: int) -> None:
+    """h times the weighted slopes of the first stages into K.spare, as `schemes.runge_kutta.explicit_move` has it."""
+    width = K.n_v + K.n
+    for i in range(width):
+        total = 0.0
+        for j in range(count):
+            if K.tableau[weights + j] != 0.0:
+                total += K.tableau[weights + j] * K.stages[j * width + i]
+        K.spare[i] = h * total
+
+
+def follow_factors(K: Kernel, m: int) -> bool:
+    """LU factors of ``A = [M Bᵀ; B 0]`` from K.acc, which have no derivatives; false where a pivot is missing."""
+    n = K.n
+    size = n + m
+    K.order_start = 0
+    for i in range(n):
+        K.kkt[i * size : i * size + n] = K.acc[i * n : i * n + n]
+    for k in range(m):
+        row = K.acc_B + K.rows[k] * n
+        o = (n + k) * size
+        K.kkt[o : o + size] = 0.0
+        for i in range(n):
+            K.kkt[o + i] = K.acc[row + i]
+            K.kkt[i * size + n + k] = K.acc[row + i]
+    return bool(factor(K.kkt, size, K.pivots) == 0)
+
+
+def solve_by_value(K: Kernel, size: int) -> None:
+    """K.work ← A⁻¹ K.work with the factors in K.kkt."""
+    solve(K.kkt, size, K.pivots, K.work)
+
+
+def follow_solution(K: Kernel, m: int) -> None:
+    """``A u = b → A δu = δb − δA u`` of b in K.rhs, with the factors of `follow_factors` and A from K.acc."""
+    n = K.n
+    size = n + m
+    for i in range(size):
+        K.work[i] = without_tangent(K.rhs[i])
+    solve_by_value(K, size)
+    for i in range(n):
+        total = derivative_of(K.rhs[i])
+        for j in range(n):
+            total -= derivative_of(K.acc[i * n + j]) * without_tangent(K.work[j])
+        for k in range(m):
+            total -= derivative_of(K.acc[K.acc_B + K.rows[k] * n + i]) * without_tangent(K.work[n + k])
+        K.rhs[i] = total
+    for k in range(m):
+        total = derivative_of(K.rhs[n + k])
+        for j in range(n):
+            total -= derivative_of(K.acc[K.acc_B + K.rows[k] * n + j]) * without_tangent(K.work[j])
+        K.rhs[n + k] = total
+    solve_plain(K.kkt, size, K.pivots, K.rhs)
+    for i in range(size):
+        K.rhs[i] += without_tangent(K.work[i])

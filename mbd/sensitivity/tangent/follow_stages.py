@@ -1,0 +1,135 @@
+"""A step of several implicit stages, which are known, with its derivatives."""
+
+from __future__ import annotations
+
+from mbd.kernel.algebra.redundancy import sharing
+from mbd.kernel.records import Kernel
+from mbd.kernel.schemes.radau_end import complete
+from mbd.kernel.schemes.stage_layout import CHANGES, HELD, MU_REAL, STAGE_BEND, STAGE_RATES, STAGE_SHIFT, stage_place
+from mbd.kernel.schemes.stage_masses import exchange_masses
+from mbd.kernel.schemes.stage_matrices import factor_stages, matrices
+from mbd.kernel.schemes.stages import (
+    correct_positions_of_stages,
+    correct_rates,
+    evaluate_stages,
+    hold_block,
+    load_stage,
+    predict_stages,
+)
+from mbd.sensitivity.tangent.words import (
+    FOLLOWED,
+    MAX_CORRECTIONS,
+    NOT_FOLLOWED,
+    STALLED,
+    derivative_of,
+    largest_derivative,
+    metric_place,
+    moved,
+    without_tangent,
+)
+
+__all__ = ["follow_stages"]
+
+
+def n_stage_numbers(K: Kernel) -> int:
+    """How many numbers the unknowns of all stages are."""
+    return int(3 * (K.n + K.n_rows + K.n_v))
+
+
+def keep_stages(K: Kernel) -> None:
+    """The values of the stages behind the candidate in K.starts."""
+    carry_stages(K, True)
+
+
+def restore_stages(K: Kernel) -> None:
+    """The values that stages had."""
+    carry_stages(K, False)
+
+
+def carry_stages(K: Kernel, out: bool) -> None:
+    """The values of the stages there or back, and where coordinates do not add what bends them."""
+    place = metric_place(K)
+    for part in range(2 if K.vector == 0 else 1):
+        o = stage_place(K, STAGE_RATES if part == 0 else STAGE_BEND)
+        count = n_stage_numbers(K) if part == 0 else 3 * K.n_v
+        for i in range(count):
+            if out:
+                K.starts[place + i] = K.stages[o + i]
+            else:
+                K.stages[o + i] = K.starts[place + i]
+        place += count
+
+
+def prepare_stages(K: Kernel, m: int, h: float, t1: float) -> int:
+    """Newton's matrices at the middle stage, factored, their rows behind the stages; 0, or that one is singular."""
+    load_stage(K, 1, h, t1)
+    matrices(K, m, h)
+    o = metric_place(K) + n_stage_numbers(K) + 3 * K.n_v
+    for k in range(m):
+        for j in range(K.n_v):
+            K.starts[o + k * K.n_v + j] = K.kkt[(K.n + k) * (K.n + m) + j]
+    return 0 if factor_stages(K, K.n + m) else 1
+
+
+def follow_held(K: Kernel, m: int) -> None:
+    """The derivatives of H U_i, with H held, for the first correction of positions (see `stage_matrices.keep_held`)."""
+    o_U = stage_place(K, STAGE_SHIFT)
+    o_H = stage_place(K, HELD)
+    o_Z = metric_place(K) + n_stage_numbers(K) + 3 * K.n_v
+    for i in range(3):
+        for k in range(m):
+            total = 0.0
+            for j in range(K.n_v):
+                total += without_tangent(K.starts[o_Z + k * K.n_v + j]) * derivative_of(K.stages[o_U + i * K.n_v + j])
+            K.stages[o_H + i * m + k] = without_tangent(K.stages[o_H + i * m + k]) + total
+
+
+def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
+    """The derivatives of the stages that are there, from those of their prediction.
+
+    The matrices are those of the middle stage, as in the step itself: corrections are taken until they are round-off.
+    """
+    if sharing(K):
+        return NOT_FOLLOWED
+    n = K.n
+    c = without_tangent(K.stages[MU_REAL] * h)
+    keep_stages(K)
+    hold_block(K)
+    predict_stages(K, h, m)
+    # values of the solution, derivatives of the prediction
+    place = metric_place(K)
+    o = stage_place(K, STAGE_RATES)
+    for i in range(n_stage_numbers(K)):
+        K.stages[o + i] = moved(K.stages[o + i], K.starts[place + i])
+    if K.vector == 0:
+        o_E = stage_place(K, STAGE_BEND)
+        for i in range(3 * K.n_v):
+            K.stages[o_E + i] = without_tangent(K.starts[place + n_stage_numbers(K) + i])
+    if prepare_stages(K, m, h, t1) != 0:
+        return NOT_FOLLOWED
+    size = n + m
+    for i in range(size * size):
+        K.kkt[i] = without_tangent(K.kkt[i])
+    o_D = stage_place(K, CHANGES)
+    before = 1e300
+    for iteration in range(MAX_CORRECTIONS):
+        evaluate_stages(K, h, t1, m, 1.0, c, c * c, False)
+        if K.vector == 0 and m == 0:
+            exchange_masses(K, h, t1)
+        if m > 0:
+            if iteration == 0:
+                follow_held(K, m)
+            correct_positions_of_stages(K, m, h, iteration == 0)
+        correct_rates(K, m, h)
+        change = 0.0
+        largest = 0.0
+        for i in range(3):
+            for j in range(n):
+                change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
+                largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
+        if change <= FOLLOWED * largest or change > STALLED * before:
+            break
+        before = change
+    status = complete(K, h, t1, m, False, False)
+    restore_stages(K)
+    return status

@@ -1,0 +1,116 @@
+"""Words of the rules that the printer knows (`printer`), what follows from them, and where K.starts holds what.
+
+Numbers in K.starts: inputs of the last of Newton's matrices | W | the block of the solution | what is noted of a step
+(2), and of the run (1) | the candidate | columns of K₀⁻¹ or stages.
+"""
+
+from __future__ import annotations
+
+from mbd.kernel.records import Integers, Kernel, Reals
+
+__all__ = [
+    "FOLLOWED", "MAX_CORRECTIONS", "NOT_FOLLOWED", "STALLED", "at_root", "derivative_of", "every_row_place",
+    "is_differentiated", "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
+    "solution_place", "solve_plain", "step_place", "takes_part", "without_tangent",
+]  # fmt: skip
+
+NOT_FOLLOWED = -3
+"""Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
+FOLLOWED = 1e-12
+"""Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
+STALLED = 0.9
+"""Part of the last correction of derivatives above which the next one is round-off [-]."""
+MAX_CORRECTIONS = 12
+"""Corrections of derivatives with matrices that are not quite those of the solution [-]."""
+
+
+def is_differentiated() -> bool:
+    """Whether this code carries derivatives (see `printer`)."""
+    return False
+
+
+def seeded(h: float) -> float:
+    """A step size that is differentiated by, in the last direction (see `printer`)."""
+    return h
+
+
+def at_root(h: float, value: float) -> float:
+    """The step size h at which a value is zero, with its derivatives ``−g'/ġ`` (see `printer`)."""
+    return h
+
+
+def seed_rate(value: float) -> float:
+    """The derivative of a value in the last direction (see `printer`)."""
+    return 1.0
+
+
+def without_tangent(value: float) -> float:
+    """The value alone (see `printer`)."""
+    return value
+
+
+def largest_derivative(value: float) -> float:
+    """The largest size of the derivatives of a value (see `printer`)."""
+    return 0.0
+
+
+def takes_part(value: float) -> bool:
+    """Whether a value or one of its derivatives is not 0: a matrix passes through entries of 0 (see `printer`)."""
+    return value != 0.0
+
+
+def moved(value: float, goal: float) -> float:
+    """A value brought to another one, with the derivatives that it has."""
+    return value + (without_tangent(goal) - without_tangent(value))
+
+
+def derivative_of(value: float) -> float:
+    """0 with the derivatives of a value."""
+    return value - without_tangent(value)
+
+
+def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
+    """b ← A⁻¹ b with the factors of `mbd.kernel.algebra.linear.factor`, which have no derivatives here."""
+    for k in range(n):
+        p = pivots[k]
+        if p != k:
+            swap = b[k]
+            b[k] = b[p]
+            b[p] = swap
+    for i in range(1, n):  # by rows: a sum of vectors stays in registers
+        total = b[i]
+        for k in range(i):
+            total -= plain_A[i * n + k] * b[k]
+        b[i] = total
+    for c in range(n):
+        i = n - 1 - c
+        total = b[i]
+        for k in range(i + 1, n):
+            total -= plain_A[i * n + k] * b[k]
+        b[i] = total * plain_A[i * n + i]
+
+
+def n_inputs(K: Kernel) -> int:
+    """How many numbers the inputs of Newton's matrix are."""
+    return int(K.o_slip + K.n_frictions + K.n_v)
+
+
+def solution_place(K: Kernel) -> int:
+    """Where the block of the solution begins in K.starts."""
+    return int(n_inputs(K) + K.n + K.n_rows + K.n_v)
+
+
+def step_place(K: Kernel) -> int:
+    """Where what is noted of a step begins in K.starts."""
+    return int(solution_place(K) + n_inputs(K))
+
+
+def every_row_place(K: Kernel) -> int:
+    """Where K.starts says whether all rows are stored with their derivatives."""
+    return int(step_place(K) + 2)
+
+
+def metric_place(K: Kernel) -> int:
+    """Where columns of K₀⁻¹, or stages, begin in K.starts."""
+    kept = K.n_q + 3 * K.n + K.n_rows + K.n_v + K.n_watched + K.n_frictions
+    return int(every_row_place(K) + 1 + kept)
