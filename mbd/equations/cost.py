@@ -101,8 +101,7 @@ def _sliding(equations: Equations, friction: int) -> int:
     """Operations of one Newton iteration with one friction sliding, its contact closed."""
     contact = equations.frictions[friction].contact
     rows = [] if contact < 0 else [k for k in equations.contacts[contact].rows if equations.rows[k].friction < 0]
-    partner = equations.frictions[friction].partner
-    sliding = [friction] if partner < 0 else sorted((friction, partner))
+    sliding = equations.frictions[friction].group or (friction,)
     return operations(newton(equations, [*equations.bilateral, *rows], (), False, sliding))
 
 

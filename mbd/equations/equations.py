@@ -157,8 +157,9 @@ class Friction:
     limit : at rest, of multipliers and parameters, homogeneous of degree one in the multipliers but for a constant
     sliding : limit at the velocity of its slide, `limit` itself where that changes nothing; see `limit_at_speed`
     struck : limit at the velocity before an impact, in whichever direction; `limit` where velocity changes nothing
-    partner : number of the other direction of a contact in space, −1 if this one is alone; both together obey
-        ``‖λ_T‖ ≤ limit``, and ``λ_T = limit γ/‖γ‖`` while they slide (see `mbd.equations.cones`)
+    group : numbers, which follow each other, of those that slide together, itself among them: both directions of a
+        contact in space, three of a ball joint; () of one alone. Together they obey ``‖λ_T‖ ≤ limit``, and
+        ``λ_T = limit γ/‖γ‖`` while they slide (see `mbd.equations.cones`)
     """
 
     name: str
@@ -169,7 +170,7 @@ class Friction:
     limit: Node
     sliding: Node
     struck: Node
-    partner: int = -1
+    group: tuple[int, ...] = ()
 
     @property
     def falls(self) -> bool:

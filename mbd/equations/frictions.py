@@ -77,8 +77,8 @@ def _slide(
         if word.sliding is not None:
             sliding = scope.tape.lift(word.sliding(push, speed))
             struck = scope.tape.lift(word.sliding(push, _size(scope, views)))
-        partner = -1 if len(tangents) == 1 else first + 1 - place
-        _add(found, scope, name, row, found.rows[row].contact, views[place], limit, sliding, struck, partner)
+        group = () if len(tangents) == 1 else (first, first + 1)
+        _add(found, scope, name, row, found.rows[row].contact, views[place], limit, sliding, struck, group)
     _add_loss(found, scope, dynamics, name, range(first, len(found.frictions)))
 
 
@@ -100,7 +100,10 @@ def dry_friction(
 
 
 def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint: Joint) -> None:
-    """Set-valued losses of a joint: a row on each of its rates, held while ``|λ| ≤ limit``."""
+    """Set-valued losses of a joint: a row on each rate, held while ``|λ| ≤ limit``; those of a ball joint together."""
+    if joint.is_isotropic:
+        _dry_ball(found, scope, dynamics, joint)
+        return
     rates: Sequence[Scalar] | None = None
     for place, owner, loss in joint.losses():
         load = _pin_load(found, scope, joint) if loss.needs_reaction else 0.0
@@ -110,11 +113,32 @@ def dry_joint(found: Laws, scope: DerivationScope, dynamics: Generalized, joint:
         rates = scope.joint(joint.name).rates if rates is None else rates
         view = scope.tape.lift(rates[place])
         name = joint.name if len(joint.freedoms) == 1 else f"{joint.name}.{joint.freedoms[place].name}"
-        unit = joint.freedoms[place].unit
-        found.rows.append(Row(name, "dry", scope.tape.zero, scope.real(view), unit=unit, kind="velocity"))
-        found.viewed.append(view)
+        _add_row(found, scope, name, view, joint.freedoms[place].unit)
         sliding = partial(loss.sliding, load, scope=scope, owner=owner)
         dry_friction(found, scope, dynamics, name, len(found.rows) - 1, -1, scope.tape.lift(limit), sliding)
+
+
+def _dry_ball(found: Laws, scope: DerivationScope, dynamics: Generalized, joint: Joint) -> None:
+    """The set-valued part of the one loss of a joint against its ω, ``‖λ‖ ≤ limit``, sliding ``λ = limit ω/‖ω‖``."""
+    _, owner, loss = joint.losses()[0]
+    load = _pin_load(found, scope, joint) if loss.needs_reaction else 0.0
+    limit = scope.tape.lift(loss.dry(load, scope, owner))
+    if limit.is_zero:
+        return
+    views = [scope.tape.lift(rate) for rate in scope.joint(joint.name).rates]
+    first = len(found.frictions)
+    moving = scope.tape.lift(loss.sliding(load, _size(scope, views), scope, owner))
+    group = tuple(range(first, first + len(views)))
+    for view, label in zip(views, joint.freedoms, strict=True):
+        _add_row(found, scope, f"{joint.name}.{label.name}", view, label.unit)
+        _add(found, scope, joint.name, len(found.rows) - 1, -1, view, limit, moving, moving, group)
+    _add_loss(found, scope, dynamics, joint.name, group)
+
+
+def _add_row(found: Laws, scope: DerivationScope, name: str, view: Node, unit: str) -> None:
+    """A row that holds a rate of a joint while its friction sticks."""
+    found.rows.append(Row(name, "dry", scope.tape.zero, scope.real(view), unit=unit, kind="velocity"))
+    found.viewed.append(view)
 
 
 def _speed(scope: DerivationScope, views: Sequence[Node], first: int) -> Node:
@@ -153,12 +177,12 @@ def _add(
     limit: Node,
     sliding: Node,
     struck: Node,
-    partner: int = -1,
+    group: tuple[int, ...] = (),
 ) -> None:
     """A direction of dry friction, and its row marked as held by it."""
     rate = scope.real(view)
     found.rows[row] = replace(found.rows[row], friction=len(found.frictions))
-    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit, sliding, struck, partner))
+    found.frictions.append(Friction(name, row, contact, rate, scope.change(view), limit, sliding, struck, group))
     found.sliding.append(view)
 
 

@@ -250,8 +250,8 @@ def _amplitudes(equations: Equations) -> dict[int, float]:
 
 def _cosines(equations: Equations) -> dict[int, float]:
     """Of velocities over their own sizes, 1 however small both are beside the terms that they are made of."""
-    pairs = [k for k, friction in enumerate(equations.frictions) if friction.partner >= 0]
-    return {cosine(equations, k).index: 1.0 for k in pairs}
+    grouped = [k for k, friction in enumerate(equations.frictions) if friction.group]
+    return {cosine(equations, k).index: 1.0 for k in grouped}
 
 
 def is_judged(equations: Equations) -> bool:

@@ -176,7 +176,7 @@ class Joint(Parameterized, ABC):
     def frictions(self) -> dict[str, Any]:
         """Its loss without each friction that truly sticks: {'left knee friction': Viscous(0.1)}."""
         found: dict[str, Any] = {}
-        alone = len(self.freedoms) == 1
+        alone = len(self.freedoms) == 1 or self.is_isotropic
         each = {self.freedoms[place].name: loss for place, _, loss in self.losses()}
         for label, loss in each.items():
             if loss.smooth is loss or loss.smooth == loss:
@@ -186,6 +186,11 @@ class Joint(Parameterized, ABC):
             plain = alone and not isinstance(self.loss, Mapping)
             found[f"{self.name}{'' if alone else f'.{label}'} friction"] = loss.smooth if plain else kept
         return found
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether one loss acts against its whole velocity, whatever its direction."""
+        return False
 
     def resistance(self, rates: Sequence[Scalar], scope: Scope) -> list[Scalar]:
         """Generalized force ∂D/∂v of its losses for each velocity, positive on the left-hand side [N m or N]."""

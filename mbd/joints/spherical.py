@@ -9,10 +9,9 @@ from mbd.bodies.algebra import IDENTITY, ZERO, dot
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
 from mbd.dataclass import dataclass
-from mbd.errors import ModelError
 from mbd.joints import quaternions
 from mbd.joints.base import Joint, JointLoss, Label
-from mbd.joints.losses.base import Loss, LossSum
+from mbd.joints.losses.base import Loss
 from mbd.joints.losses.isotropic import isotropic
 from mbd.joints.parts import place_rows
 from mbd.scope import Rotation, Scope, Triple
@@ -34,8 +33,9 @@ class Spherical(Joint):
     Parameters
     ----------
     name, parent, child : its name and its two frames
-    loss : friction torque against the angular velocity, ``F(‖ω‖) ω/‖ω‖`` [N m], smooth in it; or by label, about one
-        axis of the child, which may stick: {'angular_velocity.x': Coulomb(0.1)}
+    loss : friction torque against the angular velocity, ``F(‖ω‖) ω/‖ω‖`` [N m]; `mbd.Coulomb(T)` and others that truly
+        stick hold the joint while the torque that this takes is ``‖T‖ ≤ T_max``, about whatever axis; or by label,
+        about single axes of the child: {'angular_velocity.x': Coulomb(0.1)}
     stiffness : k of an isotropic spring [N m/rad], ``V = ½ k θ²`` with θ the angle of the rotation, 0 ≤ θ ≤ π; give the
         child's frame a rotation for a spring that rests elsewhere, and use `mbd.Potential` of
         '<name>.rotation_vector.x', … for one that is not isotropic
@@ -54,14 +54,6 @@ class Spherical(Joint):
 
     def __post_init__(self) -> None:
         self.validate()
-        parts = self.loss.losses if isinstance(self.loss, LossSum) else (self.loss,)
-        sticking = [part for part in parts if isinstance(part, Loss) and part.smooth is not part]
-        if sticking:
-            raise ModelError(
-                f"loss of '{self.name}': {sticking[0]!r} truly sticks, which a ball joint can about single axes only; "
-                "use mbd.Coulomb(T, smoothing=ε), which acts against the whole angular velocity, or name the axes of "
-                "the child on which it sticks by itself, such as loss={'angular_velocity.x': mbd.Coulomb(0.1)}"
-            )
 
     @property
     def labels(self) -> tuple[Label, ...]:
@@ -73,6 +65,11 @@ class Spherical(Joint):
         if isinstance(self.loss, Loss):
             return isotropic(self.loss, rates, scope, f"{self.name} loss")
         return super().resistance(rates, scope)
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether it has one loss."""
+        return isinstance(self.loss, Loss)
 
     @property
     def velocity_labels(self) -> tuple[Label, ...]:

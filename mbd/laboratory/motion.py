@@ -427,7 +427,12 @@ def _sliding(equations: Equations, record: Record) -> Record:
         "slip": np.zeros_like(phase),
     }  # fmt: skip
     found = array_function(nodes)(inputs, record.parameters_at(np.arange(len(record.time), dtype=np.intp)))
-    for k, rate, limit in zip(always, found[: len(always)], found[len(always) :], strict=True):
-        phase[:, k] = np.sign(rate)
-        lam[:, equations.frictions[k].row] = np.sign(rate) * limit
+    rates, limits = (dict(zip(always, part, strict=True)) for part in (found[: len(always)], found[len(always) :]))
+    for k in always:
+        group = equations.frictions[k].group
+        size = np.linalg.norm([rates[each] for each in group or (k,)], axis=0)
+        moves = size > 0.0
+        phase[:, k] = moves if group else np.sign(rates[k])
+        way = np.divide(rates[k], size, out=np.zeros_like(rates[k]), where=moves)
+        lam[:, equations.frictions[k].row] = way * limits[k]
     return replace(record, phase=phase, lam=lam)

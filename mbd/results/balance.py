@@ -146,17 +146,16 @@ class Balance:
         found.inertia[mine], found.load[mine], found.unique[mine] = M, f, not held.depend
 
     def _way(self, rows: Rows, number: int, rates: Matrix) -> Vector:
-        """Sign with which a friction slides, or cosine of its direction to that of both, (k,)."""
+        """Sign with which a friction slides, or cosine of its direction to that of its group, (k,)."""
         own = self.equations.frictions[number]
-        if own.partner < 0:
+        if not own.group:
             return np.asarray(rows.phase[:, number], dtype=float)
-        other = self.equations.frictions[own.partner]
-        x, y = rates[:, own.row], rates[:, other.row]
-        pull, beside = rows.lam[:, own.row], rows.lam[:, other.row]
-        resting = np.hypot(x, y) < REST_SPEED  # γ has no direction yet
-        x, y = np.where(resting, pull, x), np.where(resting, beside, y)
-        size = np.hypot(x, y)
-        return np.divide(x, size, out=np.zeros_like(x), where=size > 0.0)
+        every = [self.equations.frictions[each].row for each in own.group]
+        resting = np.linalg.norm(rates[:, every], axis=1) < REST_SPEED  # γ has no direction yet
+        ways = np.where(resting[:, None], rows.lam[:, every], rates[:, every])
+        size = np.linalg.norm(ways, axis=1)
+        way: Vector = np.divide(ways[:, own.group.index(number)], size, out=np.zeros_like(size), where=size > 0.0)
+        return way
 
     def _shares(self, held: Held, limits: Matrix) -> Matrix:
         """W of the rows that hold (k, every): 1, or the limit of the friction that holds one over the largest."""

@@ -53,7 +53,7 @@ class _Contact:
 class _Friction:
     contact: int
     row: int
-    partner: int = -1
+    group: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ def write_expressions(equations: Any, nodes: Mapping[str, Node], arrays: Arrays)
         "rows": [[row.contact, row.friction] for row in equations.rows],
         "contacts": [list(contact.anchors) for contact in equations.contacts],
         "frictions": [[friction.contact, friction.row] for friction in equations.frictions],
-        "partners": [friction.partner for friction in equations.frictions],
+        "partners": [_after(friction.group, k) for k, friction in enumerate(equations.frictions)],
         "adds": equations.compose is None, "charts": [place[node.index] for node in moving],
         "wrapped": [[turn.anchor, place[turn.angle.index], place[turn.rate.index]] for turn in equations.wrapped],
     }  # fmt: skip
@@ -169,6 +169,7 @@ def arrays_of_expressions(words: Any, members: Members) -> set[str]:
     _indices(words["frictions"], frictions, ((-1, contacts), (0, rows)), what)
     partners = of_kind(words.get("partners", []), list, what)  # older files have none
     expect(len(partners) in (0, frictions) and all(-1 <= of_kind(k, int, what) < frictions for k in partners), what)
+    expect(all(k < 0 or partners.count(k) == 1 for k in partners), what)
     expect(len(of_kind(words["contacts"], list, what)) == contacts, what)
     for held in words["contacts"]:
         for place in of_kind(held, list, what):
@@ -185,6 +186,20 @@ def arrays_of_expressions(words: Any, members: Members) -> set[str]:
         head = members.head(name)
         expect(head.kind == "f" and len(head.shape) == 2 and head.shape[0] > 0 and head.shape[1] == 5, f"{name!r}")
     return {*MEMBERS, *tables}
+
+
+def _after(group: Sequence[int], k: int) -> int:
+    """The next of those that slide together with friction k, of the last the first; −1 for one alone."""
+    return group[(group.index(k) + 1) % len(group)] if group else -1
+
+
+def _group(partners: Sequence[int], k: int) -> tuple[int, ...]:
+    """Those that slide together with friction k, itself among them."""
+    found, other = [k], partners[k]
+    while other >= 0 and other not in found:
+        found.append(other)
+        other = partners[other]
+    return tuple(sorted(found)) if len(found) > 1 else ()
 
 
 def _indices(value: Any, count: int, bounds: Sequence[tuple[int, int]], what: str) -> None:
@@ -220,7 +235,7 @@ def read_expressions(words: Mapping[str, Any], arrays: Mapping[str, Any], parame
     return Expressions(
         tape, sizes["q"], sizes["v"], sizes["z"], tuple(_Row(*row) for row in rows),
         tuple(_Contact(tuple(held)) for held in contacts),
-        tuple(_Friction(one[0], one[1], partner) for one, partner in zip(frictions, partners, strict=True)),
+        tuple(_Friction(one[0], one[1], _group(partners, k)) for k, one in enumerate(frictions)),
         {_present(name): nodes[k] for name, k in zip(words["names"], outputs, strict=True)},
         tuple(nodes[k] for k in terms),
         words["adds"], (),

@@ -129,9 +129,10 @@ class Facts:
             ),
             tuple((body, tuple(frames)) for body, frames in figure if body != "ground"),
             tuple(
-                (friction.name, "N m" if equations.rows[friction.row].unit == "rad" else "N")
+                (name, "N m" if equations.rows[friction.row].unit == "rad" else "N")
                 for friction in equations.frictions
                 if friction.contact < 0
+                for name in dict.fromkeys((friction.name, equations.rows[friction.row].owner))
             ),
             _own_velocities(equations),
             equations.markers,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from mbd.dataclass import dataclass
-from mbd.equations.cones import NO_SLIP
+from mbd.equations.cones import NO_SLIP, slip_square
 from mbd.tape.derivatives import gradient, jvp, live, substitute
 
 if TYPE_CHECKING:
@@ -118,10 +118,9 @@ def moving_share(equations: Equations) -> Node:
 def _slides(equations: Equations, k: int) -> Node:
     """1 while friction k slides, 0 while it sticks or is off."""
     own = equations.tape.input("slip", k)
-    if equations.frictions[k].partner < 0:
+    if not equations.frictions[k].group:
         return abs(own)
-    other = equations.tape.input("slip", equations.frictions[k].partner)
-    square = own * own + other * other
+    square = slip_square(equations, k)
     return square / (square + NO_SLIP)
 
 

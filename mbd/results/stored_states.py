@@ -88,13 +88,14 @@ class StoredStates:
             there = np.where(early > 0.0, np.minimum(rows.time, beside[rows.source]), beside[rows.source])
             time = np.where(own, there, np.where(ends, beside[after], rows.time))
             inputs = {**inputs, "t": time}
-        if all(friction.partner < 0 for friction in self.equations.frictions):
+        if not any(friction.group for friction in self.equations.frictions):
             return inputs
         slips = inputs["slip"].astype(float)
         for number, friction in enumerate(self.equations.frictions):
-            if friction.partner >= 0:
+            if friction.group:
                 pull = rows.lam[:, friction.row]
-                size = np.hypot(pull, rows.lam[:, self.equations.frictions[friction.partner].row])
+                every = [self.equations.frictions[each].row for each in friction.group]
+                size = np.linalg.norm(rows.lam[:, every], axis=1)
                 cosine = np.divide(pull, size, out=np.ones_like(pull), where=size > 0.0)
                 slips[:, number] *= ONSET * np.where(np.abs(cosine) < LEAST, LEAST, cosine)
         return {**inputs, "slip": slips}

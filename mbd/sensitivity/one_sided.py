@@ -86,17 +86,17 @@ class _Watched:
         """Names of the frictions that slide although they are at rest, in directions that change their velocity."""
         first = 2 * len(self.equations.contacts) + len(self.equations.guards)
         for f, friction in enumerate(self.equations.frictions):
-            both = [f] if friction.partner < 0 else [f, friction.partner]
-            places = [first + each for each in both]
+            group = friction.group or (f,)
+            places = [first + each for each in group]
             rest = all(abs(self.values[k]) <= ROUND_OFF * self.speeds[k] for k in places)
-            if rest and any(self.mode.slip[each] != 0.0 for each in both) and any(self.moves[k] for k in places):
+            if rest and any(self.mode.slip[each] != 0.0 for each in group) and any(self.moves[k] for k in places):
                 yield friction.name
 
     def stopping(self, within: float) -> Iterator[str]:
         """Names of the frictions whose sliding ends within so short a time."""
         first = 2 * len(self.equations.contacts) + len(self.equations.guards)
         for f, friction in enumerate(self.equations.frictions):
-            if friction.partner < 0 and self.mode.slip[f] and self._crosses(first + f, -int(self.mode.slip[f]), within):
+            if not friction.group and self.mode.slip[f] and self._crosses(first + f, -int(self.mode.slip[f]), within):
                 yield friction.name
 
 

@@ -129,7 +129,7 @@ def with_sliding(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -
     Z = motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
     first = 2 * len(equations.contacts) + len(equations.guards) + len(equations.frictions)
     for f, friction in enumerate(equations.frictions):
-        if mode.slip[f] != 0.0 and friction.partner >= 0:
+        if mode.slip[f] != 0.0 and friction.group:
             lam[friction.row], of_lam[friction.row] = force_in_plane(programs, f, values, slopes @ Z)
         elif mode.slip[f] != 0.0:
             lam[friction.row] = mode.slip[f] * values[first + f]
@@ -142,8 +142,8 @@ def force_in_plane(programs: Programs, f: int, values: Vector, slopes: Matrix) -
     equations = programs.equations
     n_c, n_g, n_f = len(equations.contacts), len(equations.guards), len(equations.frictions)
     speeds, limit = 2 * n_c + n_g, 2 * n_c + n_g + n_f + f
-    own, other = speeds + f, speeds + equations.frictions[f].partner
-    size = float(np.hypot(values[own], values[other])) or 1.0
+    own, every = speeds + f, [speeds + each for each in equations.frictions[f].group]
+    size = float(np.linalg.norm(values[every])) or 1.0
     cosine = float(values[own]) / size
-    turned = (slopes[own] - cosine * (values[own] * slopes[own] + values[other] * slopes[other]) / size) / size
+    turned = (slopes[own] - cosine * (values[every] @ slopes[every]) / size) / size
     return float(values[limit]) * cosine, np.asarray(cosine * slopes[limit] + values[limit] * turned)

@@ -259,7 +259,7 @@ def _choices(programs: Programs, law: Law) -> Iterator[Choice]:
 def _check_frictions(programs: Programs, acting: Collection[int]) -> None:
     """Frictions of contacts in the plane, and of joints under no load of the impact."""
     for each in programs.equations.frictions:
-        if each.contact in acting and each.partner >= 0:
+        if each.contact in acting and each.group:
             raise Unknown(f"friction in space, of {each.name!r}, is not differentiated in its phases")
         if each.contact < 0 and any(node.op == "input" and node.data[0] == "lam" for node in live([each.limit])):
             raise Unknown(f"friction that follows the load of a joint, of {each.name!r}, is not differentiated in it")

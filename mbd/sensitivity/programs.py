@@ -242,8 +242,8 @@ class Programs:
 
 
 def paired(equations: Equations) -> list[int]:
-    """Numbers of the frictions that slide two and two, in a plane in space."""
-    return [k for k, friction in enumerate(equations.frictions) if friction.partner >= 0]
+    """Numbers of the frictions that slide together with others, in a plane or in space."""
+    return [k for k, friction in enumerate(equations.frictions) if friction.group]
 
 
 def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[int]) -> list[list[Node]]:

@@ -56,13 +56,3 @@ def test_at_rest_it_is_none_and_losses_by_label_keep_their_axis():
     run = mbd.simulate(model, start, mbd.HHT(), dt=1e-3, until=0.05)
     rate = run["hip.angular_velocity.y"]
     np.testing.assert_allclose(run["hip loss.angular_velocity.y.torque"], -0.3 * np.abs(rate) * rate, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "loss", [mbd.Coulomb(0.4), mbd.Viscous(0.1) + mbd.Stribeck(0.4, 0.3, 0.1), mbd.PinFriction(0.3, 0.02)]
-)
-def test_friction_that_truly_sticks_names_its_axes(loss):
-    with pytest.raises(mbd.ModelError, match="'hip': .* truly sticks, .* smoothing=ε.*loss={'angular_velocity.x'"):
-        ball(loss, Rotation.identity())
-    model, start = ball({"angular_velocity.x": mbd.Coulomb(0.4)}, Rotation.identity())
-    assert mbd.simulate(model, start, mbd.HHT(), dt=1e-2, until=0.05)["hip.angular_velocity.x.friction"].any()

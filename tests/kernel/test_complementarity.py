@@ -50,7 +50,7 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         friction_row=friction_row, friction_contact=np.arange(max(contacts, 1)), row_contact=row_contact,
         row_normal=is_normal, row_friction=row_friction, rows=np.zeros(rows, dtype=int),
         dropped=np.zeros(rows, dtype=int), state=np.zeros(32, dtype=int), counts=np.zeros(24, dtype=int),
-        partner=np.full(max(frictions, 1), -1),
+        leader=np.arange(max(frictions, 1)), group_size=np.ones(max(frictions, 1), dtype=int),
         detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip
 

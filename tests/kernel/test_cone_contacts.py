@@ -56,7 +56,7 @@ class Problem:
         values["cone_work"] = np.zeros(cone_places(max(rows, 1)))
         values["kkt"], values["scale"] = np.zeros(size * size), np.ones(most * most)
         K = Kernel(**values)
-        K.partner[:] = -1
+        K.leader[:], K.group_size[:] = np.arange(len(K.leader)), 1
         K.row_contact[:rows], K.row_normal[:rows], K.row_friction[:rows] = contact, normal, friction
         K.normal[:contacts] = self.places
         for f, (row, c, _) in enumerate(self.who):

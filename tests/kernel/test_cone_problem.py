@@ -122,6 +122,30 @@ def test_held_contacts_may_pull_and_other_frictions_have_limits_of_their_own():
     assert np.allclose(z, [-2.0, 0.0, 0.7, 1.0, -9.0, 0.0, 0.0], atol=1e-13)
 
 
+@given(seed=seeds, dofs=st.integers(2, 8))
+def test_friction_about_three_axes_lies_in_a_ball_whatever_its_axes(seed, dofs):
+    """Three unknowns beside a contact, ‖z‖ ≤ 0.7, and z = −0.7 w/‖w‖ where they slide; turned axes turn z."""
+    rng = np.random.default_rng(seed)
+    H, v = np.vstack([contacts(rng, 1, dofs), rng.normal(size=(3, dofs))]), rng.normal(size=dofs)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    words = (
+        [PUSH, 0, 0, STEADY, STEADY, STEADY],
+        [-1, 2, 1, 4, 5, 3],
+        [0.0] * 3 + [0.7] * 3,
+        [0.0, 0.2, 0.2] + [0.0] * 3,
+    )
+    ends = []
+    for axes in (np.eye(3), turn):
+        own = np.vstack([H[:3], axes @ H[3:]])
+        status, residual, z = solved(compiled(), own @ own.T, own @ v, *words)
+        assert status == 0 and residual <= CONE_TOLERANCE
+        w = (own @ own.T @ z + own @ v)[3:]
+        assert np.linalg.norm(z[3:]) < 0.7 * (1.0 + 1e-8)
+        assert np.linalg.norm(w) * 0.7 + w @ z[3:] < 1e-7 * (1.0 + np.linalg.norm(v))
+        ends.append(own.T @ z)
+    assert np.allclose(*ends, atol=1e-6 * (1.0 + np.linalg.norm(v)))
+
+
 def planar(normal, tangent, mu):
     """Rows, owner, twin, limit and slope of contacts with friction along one direction."""
     count = len(mu)

@@ -27,11 +27,11 @@ def broken_laws(run):
     values = [np.broadcast_to(value, run.time.shape) for value in columns.evaluate(nodes, columns.rows)]
     rates, rest, sliding = values[0::3], values[1::3], values[2::3]
     for f, friction in enumerate(frictions):
-        p = friction.partner
-        if 0 <= p < f:
+        group = friction.group or (f,)
+        if group[0] != f:
             continue
-        force = np.stack([lam[:, frictions[k].row] for k in ((f, p) if p >= 0 else (f,))])
-        slip = np.stack([rates[k] for k in ((f, p) if p >= 0 else (f,))])
+        force = np.stack([lam[:, frictions[k].row] for k in group])
+        slip = np.stack([rates[k] for k in group])
         pull, speed = np.linalg.norm(force, axis=0), np.linalg.norm(slip, axis=0)
         most = np.maximum(rest[f], sliding[f])
         found += [("cone", i, pull[i] / most[i]) for i in np.flatnonzero(pull > most + 1e-6 * size)]

@@ -202,3 +202,16 @@ def test_the_plain_twin_a_cut_run_and_a_file_tell_the_same(tmp_path):
     for name in ("foot.friction.forward", "foot.friction.sideways", "foot friction.power"):
         assert np.array_equal(kept[name], whole[name])
     assert kept.energy["foot friction"][-1] == whole.energy["foot friction"][-1]
+
+
+@pytest.mark.parametrize("speed", [(1.0, 2.0), (3.0, -1.0), (1.0, 1.0)])
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.Newmark(), mbd.RadauIIA(), mbd.RungeKutta4()], ids=str)
+def test_a_block_may_stop_at_the_end_of_a_step(scheme, speed):
+    """‖γ‖ = 3 m/s falls by 3 m/s² to round-off of either sign at 1 s, where a step of 0.01 s ends."""
+    model = mbd.Model("block", gravity=(0.0, -10.0, 0.0))
+    mass = mbd.PointMass("block", mass=1.0)
+    model.connect(mbd.Translation("slide", model.ground.origin, mass.origin, axes="xyz"))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(mass.origin), friction=0.3))
+    run = slid(model, 3.0 * np.array(speed) / np.hypot(*speed), scheme, until=1.5)
+    assert [event.kind for event in run.events] == ["stuck"] and run.events[0].time == pytest.approx(1.0, abs=1e-9)
+    assert np.hypot(*place(run)) == pytest.approx(1.5, abs=1e-9) and not run.stats["notes"]

@@ -24,7 +24,7 @@ from mbd.kernel.contact.branches import is_on, solve_directed
 from mbd.kernel.contact.cone_contacts import keep_branches, solve_cones
 from mbd.kernel.contact.cone_directions import misses, turn_directions
 from mbd.kernel.contact.cone_problem import CONE_TOLERANCE
-from mbd.kernel.contact.cones import aim, follows
+from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, DependentRows, Motion
 from mbd.kernel.stepping.restart import active_rows, refresh_scales
 
@@ -44,7 +44,7 @@ def complementarity(K: Balance, level: int) -> int:
     """Choose K.active of contacts with K.free = 1 and K.sticks, K.slip of frictions with K.loose = 1 or 2, and solve.
 
     Others keep theirs. With K.free = 2 a contact chooses K.parting: its normal row is off, its tangents stay. With
-    K.loose = 2 a friction slides unless that is clearly wrong. Two that slide together choose as one.
+    K.loose = 2 a friction slides unless that is clearly wrong. Those that slide together choose as one.
     level 0: accelerations, force and bias are those of K.acc; 1: velocities, bias and impulses K.given are in place.
     """
     measure_free(K, level)
@@ -98,12 +98,7 @@ def stick_where_held(K: Balance) -> int:
     keep_branches(K, True)
     for f in range(K.n_frictions):
         if K.loose[f] == 1 and K.sticks[f] == 0 and is_on(K, f) and not follows(K, f) and is_held_still(K, f):
-            p = K.partner[f]
-            K.sticks[f] = 1
-            K.slip[f] = 0.0
-            if p >= 0:
-                K.sticks[p] = 1
-                K.slip[p] = 0.0
+            set_sticking(K, f, 1)
             found = True
     if not found:
         return 0
@@ -114,13 +109,12 @@ def stick_where_held(K: Balance) -> int:
 
 
 def is_held_still(K: ContactForces, f: int) -> bool:
-    """Whether the acceleration along a friction, and its partner, is round-off of its terms."""
-    row = K.friction_row[f]
-    still = departure(K, row, 1.0, ROUND_OFF) <= 0.0 and departure(K, row, -1.0, ROUND_OFF) <= 0.0
-    if still and K.partner[f] >= 0:
-        row = K.friction_row[K.partner[f]]
-        still = departure(K, row, 1.0, ROUND_OFF) <= 0.0 and departure(K, row, -1.0, ROUND_OFF) <= 0.0
-    return bool(still)
+    """Whether the acceleration along the group of a friction is round-off of its terms."""
+    for g in range(f, f + K.group_size[f]):
+        row = K.friction_row[g]
+        if departure(K, row, 1.0, ROUND_OFF) > 0.0 or departure(K, row, -1.0, ROUND_OFF) > 0.0:
+            return False
+    return True
 
 
 def is_contradicted(K: ContactForces) -> bool:
@@ -173,21 +167,23 @@ def contact_fault(K: ContactForces, c: int, largest: float) -> float:
 def friction_fault(K: ContactForces, f: int, largest: float) -> float:
     """How badly friction f breaks its law; ≤ 0 if it does not."""
     row = K.friction_row[f]
-    if K.partner[f] >= 0:
-        return cone_fault(K, f, largest)
+    if K.group_size[f] > 1:
+        return group_fault(K, f, largest)
     if K.sticks[f] == 1:
         return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - ROUND_OFF * largest)
     return departure(K, row, K.slip[f], SURE if K.loose[f] == 2 else ROUND_OFF)  # it slides against its own friction
 
 
-def cone_fault(K: ContactForces, f: int, largest: float) -> float:
-    """How badly two frictions that slide together break their law; the second of them never does."""
+def group_fault(K: ContactForces, f: int, largest: float) -> float:
+    """How badly frictions that slide together break their law; all but the first of them never do."""
     if follows(K, f):
         return -1.0
     if K.sticks[f] == 1:
-        x = K.impulse[K.friction_row[f]] + K.past[K.friction_row[f]]
-        y = K.impulse[K.friction_row[K.partner[f]]] + K.past[K.friction_row[K.partner[f]]]
-        return float(sqrt(x * x + y * y) - K.limit[f] - ROUND_OFF * largest)
+        square = 0.0
+        for g in range(f, f + K.group_size[f]):
+            pull = K.impulse[K.friction_row[g]] + K.past[K.friction_row[g]]
+            square += pull * pull
+        return float(sqrt(square) - K.limit[f] - ROUND_OFF * largest)
     return misses(K, f, SURE if K.loose[f] == 2 else ROUND_OFF)
 
 
@@ -202,14 +198,11 @@ def give_way(K: DependentRows) -> int:
         f = K.row_friction[K.rows[k]]
         if f >= 0 and K.loose[f] > 0 and (chosen < 0 or K.n + k == K.failure_index):
             chosen = f
-    if chosen >= 0 and K.partner[chosen] >= 0:
-        K.sticks[chosen] = K.sticks[K.partner[chosen]] = 0
-        aim(K, chosen, -K.lean[chosen], -K.lean[K.partner[chosen]])
-        return 1
     if chosen >= 0:
-        K.sticks[chosen] = 0
-        K.lean[chosen] = 1.0 if K.lean[chosen] < 0.0 else -1.0
-        K.slip[chosen] = K.lean[chosen]
+        for g in range(K.leader[chosen], K.leader[chosen] + K.group_size[chosen]):
+            K.sticks[g] = 0
+            K.slip[g] = -K.lean[g]
+        aim(K, chosen)
         return 1
     for c in range(K.n_contacts):
         if K.free[c] == 1 and K.active[c] == 1:
@@ -236,22 +229,12 @@ def toggle(K: Contacts, c: int) -> None:
 
 def turn(K: ContactForces, f: int) -> None:
     """The other branch of a friction: from sticking to sliding as its multiplier pulls, and back."""
-    p = K.partner[f]
-    if p >= 0:
-        K.sticks[f] = K.sticks[p] = 1 - K.sticks[f]
-        K.slip[f] = K.slip[p] = 0.0
-        if K.sticks[f] == 0:
-            own = K.friction_row[f]
-            other = K.friction_row[p]
-            aim(K, f, K.impulse[own] + K.past[own], K.impulse[other] + K.past[other])
-    elif K.sticks[f] == 1:
-        K.sticks[f] = 0
-        row = K.friction_row[f]
-        K.slip[f] = 1.0 if K.impulse[row] + K.past[row] > 0.0 else -1.0
-        K.lean[f] = K.slip[f]
-    else:
-        K.sticks[f] = 1
-        K.slip[f] = 0.0
+    slides = K.sticks[f] == 1
+    set_sticking(K, f, 0 if slides else 1)
+    if slides:
+        for g in range(f, f + K.group_size[f]):
+            K.slip[g] = K.impulse[K.friction_row[g]] + K.past[K.friction_row[g]]
+        aim(K, f)
 
 
 def change_all(K: ContactForces) -> int:

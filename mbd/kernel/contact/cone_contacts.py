@@ -4,7 +4,7 @@ Everything that may not choose is held, and with one solution of the held KKT ma
 
 ``w = B (v + K⁻¹ …) = G z + shift``,  z = −λ
 
-of normals, pairs of tangents, friction along one direction and of joints, and tangents that stick as long as their
+of normals, frictions that slide together, friction along one direction, and tangents that stick as long as their
 contact pushes (see `kernel.contact.cone_problem`). Of a non-smooth step z is the impulse of the whole step, that of its
 smooth part included, so that what was closed may push less than it did there, but never pull.
 """
@@ -15,7 +15,7 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.redundancy import find_dependence, shared, sharing
 from mbd.kernel.algebra.saddle import solve_at
 from mbd.kernel.contact.cone_problem import CONE_TOLERANCE, EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
-from mbd.kernel.contact.cones import aim
+from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, ContactForces, Frictions
 from mbd.kernel.stepping.restart import (
     active_rows,
@@ -109,9 +109,10 @@ def gather_unknowns(K: ContactForces) -> int:
             count += 1
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
-        if f >= 0 and K.loose[f] > 0 and K.partner[f] >= 0:
+        if f >= 0 and K.loose[f] > 0 and K.group_size[f] > 1:
+            after = f + 1 if f + 1 < K.leader[f] + K.group_size[f] else K.leader[f]
             for v in range(count):
-                if K.cone_rows[v] == K.friction_row[K.partner[f]]:
+                if K.cone_rows[v] == K.friction_row[after]:
                     K.cone_twin[u] = v
     return count
 
@@ -271,29 +272,26 @@ def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
 
 
 def take_friction(K: ContactForces, u: int, f: int, small: float, o_w: int, count: int) -> None:
-    """Whether friction f, which is unknown u, sticks; else which way it slides, with its partner."""
-    v = K.cone_twin[u]
-    if 0 <= v < u:
+    """Whether friction f, which is unknown u, sticks; else which way it slides, with its group."""
+    if follows(K, f):
         return
-    rho = K.cone_work[o_w + count + u]
-    own = K.cone_work[o_w + u]
-    other = K.cone_work[o_w + v] if v >= 0 else 0.0
-    p = K.partner[f]
+    speed = abs(K.cone_work[o_w + u])
+    v = K.cone_twin[u]
+    while v >= 0 and v != u:
+        speed += abs(K.cone_work[o_w + v])
+        v = K.cone_twin[v]
     c = K.friction_contact[f]
     on = c < 0 or K.active[c] == 1
-    slides = on and rho * (abs(own) + abs(other)) > small
-    K.sticks[f] = 0 if slides else 1  # that of a contact that parts begins stuck if it closes after all
-    K.slip[f] = 0.0
-    K.limit[f] = cone_limit(count, K.cone_found, K.cone_owner, K.cone_limit, K.cone_mu, K.cone_work, u)
-    if p >= 0:
-        K.sticks[p] = K.sticks[f]
-        K.slip[p] = 0.0
-        K.limit[p] = K.limit[f]
+    slides = on and K.cone_work[o_w + count + u] * speed > small
+    limit = cone_limit(count, K.cone_found, K.cone_owner, K.cone_limit, K.cone_mu, K.cone_work, u)
+    set_sticking(K, f, 0 if slides else 1)  # that of a contact that parts begins stuck if it closes after all
+    for g in range(f, f + K.group_size[f]):
+        K.limit[g] = limit
         if slides:
-            aim(K, f, own, other)
-    elif slides:
-        K.slip[f] = 1.0 if own > 0.0 else -1.0
-        K.lean[f] = K.slip[f]
+            K.slip[g] = K.cone_work[o_w + u]
+            u = K.cone_twin[u]
+    if slides:
+        aim(K, f)
 
 
 def all_hold(K: Balance, t1: float) -> bool:

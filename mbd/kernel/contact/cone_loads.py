@@ -16,8 +16,8 @@ from __future__ import annotations
 from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.redundancy import largest_limit, share, sharing
 from mbd.kernel.algebra.roots import sqrt
-from mbd.kernel.contact.cones import follows
-from mbd.kernel.contact.discs import disc_length, minimize_within_discs
+from mbd.kernel.contact.cones import follows, friction_size
+from mbd.kernel.contact.discs import DISC_LINES, disc_length, minimize_within_discs
 from mbd.kernel.records import Balance, Complementarity, ContactForces, ContactRows, Frictions, Reals
 from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 
@@ -62,11 +62,8 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
 def exceeds(K: Frictions, lam: Reals) -> bool:
     """Whether a friction that sticks is beyond its limit."""
     for f in range(K.n_frictions):
-        if K.sticks[f] == 1 and not follows(K, f):
-            x = lam[K.friction_row[f]]
-            y = lam[K.friction_row[K.partner[f]]] if K.partner[f] >= 0 else 0.0
-            if sqrt(x * x + y * y) > (1.0 - BEYOND) * K.limit[f]:
-                return True
+        if K.sticks[f] == 1 and friction_size(K, f, lam) > (1.0 - BEYOND) * K.limit[f]:
+            return True
     return False
 
 
@@ -165,25 +162,26 @@ def find_discs(K: ContactForces, lam: Reals, spans: int, scale: float) -> int:
     for f in range(K.n_frictions):
         if K.sticks[f] == 0 or follows(K, f):
             continue
-        row = K.friction_row[f]
-        other = K.friction_row[K.partner[f]] if K.partner[f] >= 0 else -1
         c = K.friction_contact[f]
         push = K.normal[c] if c >= 0 else -1
-        touched = is_free(K, row, spans) or (other >= 0 and is_free(K, other, spans))
-        if not (touched or (push >= 0 and is_free(K, push, spans))):
+        touched = push >= 0 and is_free(K, push, spans)
+        for g in range(f, f + K.group_size[f]):
+            touched = touched or is_free(K, K.friction_row[g], spans)
+        if not touched:
             continue
-        fill_line(K, 3 * discs, row, 1.0, lam[row] / scale, spans)
-        fill_line(K, 3 * discs + 1, other, 1.0, lam[other] / scale if other >= 0 else 0.0, spans)
+        for k in range(DISC_LINES - 1):
+            row = K.friction_row[f + k] if k < K.group_size[f] else -1
+            fill_line(K, DISC_LINES * discs + k, row, 1.0, lam[row] / scale if row >= 0 else 0.0, spans)
         limit = max(K.limit[f] / scale, LEAST_LIMIT)
-        fill_line(K, 3 * discs + 2, push, -K.rise[f], limit, spans)
+        fill_line(K, DISC_LINES * discs + 3, push, -K.rise[f], limit, spans)
         K.disc_weight[discs] = max(limit, LEAST_WEIGHT)
         discs += 1
     for c in range(K.n_contacts):
         push = K.normal[c]
         if K.kind[c] == 0 and K.opens[c] == 0 and push >= 0 and is_free(K, push, spans):
-            fill_line(K, 3 * discs, -1, 0.0, 0.0, spans)
-            fill_line(K, 3 * discs + 1, -1, 0.0, 0.0, spans)
-            fill_line(K, 3 * discs + 2, push, -1.0, max(-lam[push] / scale, LEAST_LIMIT), spans)
+            for k in range(DISC_LINES - 1):
+                fill_line(K, DISC_LINES * discs + k, -1, 0.0, 0.0, spans)
+            fill_line(K, DISC_LINES * discs + 3, push, -1.0, max(-lam[push] / scale, LEAST_LIMIT), spans)
             K.disc_weight[discs] = 1.0
             discs += 1
     return discs
@@ -229,12 +227,12 @@ def find_brink(K: Complementarity, spans: int, discs: int) -> float:
     K.disc_cost[spans] = 1.0
     far = 0.0
     for i in range(discs):
-        K.disc_map[(3 * i + 2) * width + spans] = K.disc_weight[i]
-        far = max(far, (disc_length(K, i, spans) - K.disc_at[3 * i + 2]) / K.disc_weight[i])
+        K.disc_map[(DISC_LINES * i + 3) * width + spans] = K.disc_weight[i]
+        far = max(far, (disc_length(K, i, spans) - K.disc_at[DISC_LINES * i + 3]) / K.disc_weight[i])
     K.disc_y[spans] = far + 1.0
     minimize_within_discs(K, spans + 1, discs)
     for i in range(discs):
-        K.disc_map[(3 * i + 2) * width + spans] = 0.0
+        K.disc_map[(DISC_LINES * i + 3) * width + spans] = 0.0
     return float(K.disc_y[spans])
 
 

@@ -56,7 +56,7 @@ def cone_solve(
     G : (n n) row-major; shift : (n)
     z : (n) a start, then the solution; among all that were met the one with the least ‖F‖
     owner : (n) of a tangent the number of its normal; else PUSH, EQUAL or STEADY
-    twin : (n) of a tangent the other one of its contact, −1 for none
+    twin : (n) of an unknown that slides with others the next of them, of the last the first; −1 for one alone
     limit, slope : (n) of tangents; slope < 0: no limit while the contact pushes
     work : of `cone_places(n)` places, ‖F‖ then in the first; pivots : (n)
     """
@@ -123,7 +123,7 @@ def cone_size(n: int, z: Reals, size: float) -> float:
 
 
 def cone_metric(G: Reals, n: int, shift: Reals, twin: Integers, work: Reals) -> float:
-    """ρ of each unknown, equal for both tangents of a contact; returns the largest ρ |shift|, or more than 1e300."""
+    """ρ of each unknown, equal for all that slide together; returns the largest ρ |shift|, or more than 1e300."""
     o_rho = n * n + 2 * n
     total = 0.0
     largest = 0.0
@@ -139,7 +139,13 @@ def cone_metric(G: Reals, n: int, shift: Reals, twin: Integers, work: Reals) -> 
     for u in range(n):
         slack = G[u * n + u]
         if twin[u] >= 0:
-            slack = 0.5 * (slack + G[twin[u] * n + twin[u]])
+            v = twin[u]
+            count = 1
+            while v != u:
+                slack += G[v * n + v]
+                count += 1
+                v = twin[v]
+            slack /= count
         work[o_rho + u] = 1.0 / slack if slack > CONE_RIGID * largest else 0.0
         size = max(size, abs(work[o_rho + u] * shift[u]))
     return size
@@ -185,13 +191,26 @@ def cone_faults(
         elif slope[u] < 0.0:
             work[o_F + u] = step if cone_sticks(n, z, owner, work, u) else z[u]
         else:
-            other = z[twin[u]] - work[o_rho + twin[u]] * work[o_w + twin[u]] if twin[u] >= 0 else 0.0
             y = z[u] - step
-            far = sqrt(y * y + other * other)
+            far = cone_length(n, z, twin, work, u, 1.0)
             most = cone_limit(n, z, owner, limit, slope, work, u)
             work[o_F + u] = step if far <= most else z[u] - most * (y / far)
         worst = max(worst, abs(work[o_F + u]))
     return worst
+
+
+def cone_length(n: int, z: Reals, twin: Integers, work: Reals, u: int, share: float) -> float:
+    """‖z − ρ w‖ of all that slide together with u, with this share of ρ; w is in `work`."""
+    o_w = n * n + n
+    o_rho = o_w + n
+    y = z[u] - share * work[o_rho + u] * work[o_w + u]
+    square = y * y
+    v = twin[u]
+    while v >= 0 and v != u:
+        other = z[v] - share * work[o_rho + v] * work[o_w + v]
+        square += other * other
+        v = twin[v]
+    return sqrt(square)
 
 
 def cone_sweep(
@@ -211,15 +230,16 @@ def cone_project(
     G: Reals, n: int, z: Reals, owner: Integers, twin: Integers, limit: Reals, slope: Reals, work: Reals, share: float,
     u: int,
 ) -> None:  # fmt: skip
-    """One unknown, or both tangents of a contact with the first of them, onto its law; w follows."""
+    """One unknown, or with the first of several that slide together all of them, onto its law; w follows."""
     o_w = n * n + n
     o_rho = o_w + n
     v = twin[u]
-    if 0 <= v < u:
-        return
+    while v >= 0 and v != u:
+        if v < u:
+            return
+        v = twin[v]
     step = share if owner[u] >= 0 else 1.0
     y = z[u] - step * work[o_rho + u] * work[o_w + u]
-    other = z[v] - step * work[o_rho + v] * work[o_w + v] if v >= 0 else 0.0
     part = 1.0
     if work[o_rho + u] == 0.0:
         part = 0.0
@@ -229,21 +249,20 @@ def cone_project(
         part = 1.0 if cone_sticks(n, z, owner, work, u) else 0.0
     elif owner[u] != EQUAL:
         most = cone_limit(n, z, owner, limit, slope, work, u)
-        far = sqrt(y * y + other * other)
+        far = cone_length(n, z, twin, work, u, step)
         part = 1.0 if far <= most else most / far
-    change = part * y - z[u]
-    z[u] += change
-    further = 0.0
-    if v >= 0:
-        further = part * other - z[v]
-        z[v] += further
-    for i in range(n):
-        work[o_w + i] += G[i * n + u] * change
-        if v >= 0:
-            work[o_w + i] += G[i * n + v] * further
-    work[o_w + u] += work[n * (n + 6) + 2] * change
-    if v >= 0:
-        work[o_w + v] += work[n * (n + 6) + 2] * further
+    o_change = n * n  # of F, which is found again after the sweeps
+    v = u
+    while v >= 0:
+        work[o_change + v] = part * (z[v] - step * work[o_rho + v] * work[o_w + v]) - z[v]
+        z[v] += work[o_change + v]
+        v = twin[v] if twin[v] != u else -1
+    v = u
+    while v >= 0:
+        for i in range(n):
+            work[o_w + i] += G[i * n + v] * work[o_change + v]
+        work[o_w + v] += work[n * (n + 6) + 2] * work[o_change + v]
+        v = twin[v] if twin[v] != u else -1
 
 
 def cone_slopes(
@@ -254,10 +273,8 @@ def cone_slopes(
     o_rho = o_w + n
     for u in range(n):
         rho = work[o_rho + u]
-        v = twin[u]
         y = z[u] - rho * work[o_w + u]
-        other = z[v] - work[o_rho + v] * work[o_w + v] if v >= 0 else 0.0
-        far = sqrt(y * y + other * other)
+        far = cone_length(n, z, twin, work, u, 1.0)
         most = cone_limit(n, z, owner, limit, slope, work, u) if owner[u] != PUSH and owner[u] != EQUAL else 0.0
         held = owner[u] == EQUAL or (owner[u] == PUSH and y > 0.0)
         if owner[u] >= 0 and slope[u] < 0.0:
@@ -275,13 +292,14 @@ def cone_slopes(
             cosine = y / far
             if owner[u] >= 0 and z[owner[u]] > 0.0:
                 work[u * n + owner[u]] -= cosine * work[n * (n + 6)] * slope[u]
-            if v >= 0:
-                own = most / far * (1.0 - cosine * cosine)
-                cross = -(most / far) * cosine * (other / far)
+            v = u if twin[u] >= 0 else -1
+            while v >= 0:
+                other = z[v] - work[o_rho + v] * work[o_w + v]
+                part = most / far * ((1.0 if v == u else 0.0) - cosine * (other / far))
                 for j in range(n):
-                    work[u * n + j] += own * rho * G[u * n + j] + cross * work[o_rho + v] * G[v * n + j]
-                work[u * n + u] += own * (rho * soft - 1.0)
-                work[u * n + v] += cross * (work[o_rho + v] * soft - 1.0)
+                    work[u * n + j] += part * work[o_rho + v] * G[v * n + j]
+                work[u * n + v] += part * (work[o_rho + v] * soft - 1.0)
+                v = twin[v] if twin[v] != u else -1
 
 
 def cone_newton(

@@ -1,4 +1,4 @@
-"""Steps near the end of sliding in a plane, where the direction of γ turns fast and then is none.
+"""Steps near the end of sliding in a plane or in space, where the direction of γ turns fast and then is none.
 
 Far from rest λ_T follows γ within a step. No step can go through ‖γ‖ = 0 like that: beyond it nothing slides on. So
 
@@ -15,11 +15,23 @@ from __future__ import annotations
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import STICK
 from mbd.kernel.contact.cone_turns import STABLE, estimated_turn_rate
-from mbd.kernel.contact.cones import HELD, ONSET, aim, along, speed_of_both
+from mbd.kernel.contact.cones import (
+    HELD,
+    NO_DIRECTION,
+    ONSET,
+    across,
+    aim,
+    along,
+    away,
+    leads_group,
+    product_of,
+    set_hold,
+    speed_of,
+)
 from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.events.guards import judge
 from mbd.kernel.events.locate import locate
-from mbd.kernel.records import Frictions, Guards, Kernel
+from mbd.kernel.records import Frictions, Guards, Kernel, Switching
 from mbd.kernel.stepping.trial_step import try_step, turns
 
 __all__ = [
@@ -37,7 +49,7 @@ LONGER = 3.0
 """Each of the steps that follow over the one before [-]."""
 BRIEFEST = 1e-7
 """Part of dt below which no such step is tried [-]."""
-BRIEFEST_TURN = 1e-5
+BRIEFEST_TURN = 1e-7
 """Part of dt below which no step is shortened for it [-]."""
 SURELY = 0.8
 """Part of a step within which γ reaches zero if a direction is held in it [-]."""
@@ -52,41 +64,40 @@ FARTHEST = 0.25
 TURNS_AWAY = -2
 """Of `come_to_zero`: what seemed to come to rest slides on."""
 TOGETHER = 0.02
-"""Part of its speed before the step at which another pair rests at the same instant [-]."""
+"""Part of its speed before the step at which another group rests at the same instant [-]."""
 NOTHING = 1e-200
 """What is added to a speed that may be zero [m/s]."""
 AT_REST = 1e-10
 """Speed across the direction that is held that counts as none, over ‖γ̇‖ dt [-]."""
 
 
-def approached_end(K: Guards, t1: float) -> float:
+def approached_end(K: Switching, t1: float) -> float:
     """Where the step that was to end at t1 ends; K.hold tells which directions are held in it."""
     end = t1
     rest = 0.0  # time until all that is held is at rest, if it is known
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0:
-            p = K.partner[f]
-            x = K.guards0[K.at_slip + f]
-            y = K.guards0[K.at_slip + p]
-            ax = K.guards0[K.at_slip_rate + f]
-            ay = K.guards0[K.at_slip_rate + p]
-            speed = sqrt(x * x + y * y)
-            change = sqrt(ax * ax + ay * ay)
+        if leads_group(K, f) and K.slip[f] != 0.0:
+            speed = speed_of(K, f, K.guards0, K.at_slip)
+            change = speed_of(K, f, K.guards0, K.at_slip_rate)
+            fall = -product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate)
             h = t1 - K.time
-            if K.hold[f] == ONSET and (speed <= STILL or x * ax + y * ay > 0.0):
+            if K.hold[f] == ONSET and (speed <= STILL or fall < 0.0):
                 continue
-            K.hold[f] = K.hold[p] = 0.0
+            set_hold(K, f, 0.0)
+            if speed < NO_DIRECTION:  # it came to rest at the end of the last step: held, it is found to
+                set_hold(K, f, HELD)
+                continue
             if not change * FAR * h > speed:
                 continue
-            fall = -(x * ax + y * ay)
-            across = abs(x * ay - y * ax)
-            straight = fall > 0.0 and (across <= STRAIGHT * speed * change or PART * speed <= SHORTEST * change * K.dt)
+            turns_at = turning_of(K, f)
+            slow = PART * speed <= SHORTEST * change * K.dt
+            straight = fall > 0.0 and (turns_at <= STRAIGHT * speed * change or slow)
             ends = fall > 0.0 and speed * speed < SURELY * h * fall
-            line = across <= LINE * speed * change
+            line = turns_at <= LINE * speed * change
             if straight and (ends or line or h < SHORTEST * K.dt):
-                K.hold[f] = K.hold[p] = HELD
+                set_hold(K, f, HELD)
                 rest = max(rest, speed * speed / fall)
-            elif fall > 0.0 or across * h > PART * speed * speed:
+            elif fall > 0.0 or turns_at * h > PART * speed * speed:
                 end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
     if 0.0 < LONGER * K.begun_step < FAR * rest and not turns(K):  # what is held needs a step in which it comes to rest
         K.begun_step = 0.0
@@ -104,6 +115,17 @@ def approached_end(K: Guards, t1: float) -> float:
     return end
 
 
+def turning_of(K: Guards, f: int) -> float:
+    """‖γ × γ̇‖ of the group of f at the accepted state."""
+    square = 0.0
+    for g in range(f, f + K.group_size[f]):
+        for k in range(g + 1, f + K.group_size[f]):
+            turned = K.guards0[K.at_slip + g] * K.guards0[K.at_slip_rate + k]
+            turned -= K.guards0[K.at_slip + k] * K.guards0[K.at_slip_rate + g]
+            square += turned * turned
+    return sqrt(square)
+
+
 def slides_at_first(K: Frictions, h: float) -> bool:
     """Whether something slides whose direction may turn too fast for a step of dt: one of h may follow it."""
     return not (K.adaptive == 1 or h < BRIEFEST * K.dt) and turns(K)
@@ -113,13 +135,10 @@ def slides_on(K: Guards) -> bool:
     """Whether a candidate with a held direction has not come to rest: it is taken again, and the direction let go."""
     found = False
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD:
-            p = K.partner[f]
-            x = K.guards1[K.at_slip + f]
-            y = K.guards1[K.at_slip + p]
-            forward = K.slip[f] * x + K.slip[p] * y
-            if forward > 0.0 and abs(K.slip[f] * y - K.slip[p] * x) > LINE * forward:
-                K.hold[f] = K.hold[p] = 0.0
+        if keeps_direction(K, f):
+            forward = along(K, f, K.guards1, K.at_slip)
+            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > LINE * forward:
+                set_hold(K, f, 0.0)
                 found = True
     return found
 
@@ -132,10 +151,9 @@ def slides_until_event(K: Guards) -> bool:
     found = False
     for f in range(K.n_frictions):
         if keeps_direction(K, f) and may_follow(K, f):
-            p = K.partner[f]
-            forward = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + p])
-            if forward > 0.0 and abs(across(K, f)) > LINE * forward:
-                K.hold[f] = K.hold[p] = 0.0
+            forward = along(K, f, K.guards1, K.at_slip)
+            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > LINE * forward:
+                set_hold(K, f, 0.0)
                 found = True
     return found
 
@@ -144,10 +162,10 @@ def shorter_turn(K: Guards, h: float) -> float:
     """A step of at most h in which directions that are not held turn by no more than they may."""
     least = h
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
-            change = speed_of_both(K, f, K.guards0, K.at_slip_rate)
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            change = speed_of(K, f, K.guards0, K.at_slip_rate)
             if change > 0.0:
-                least = min(least, PART * speed_of_both(K, f, K.guards0, K.at_slip) / change)
+                least = min(least, PART * speed_of(K, f, K.guards0, K.at_slip) / change)
     return max(least, SHORTEST * K.dt)
 
 
@@ -156,37 +174,38 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
 
     Feet of one body come to rest together: all directions turn by ω times what is left across them over γ before the
     step, with ω by Aitken's relaxation, which is the secant method for one (Irons & Tuck 1969). `TURNS_AWAY` where no
-    directions near those of γ lead to zero, and steps can still follow how they turn, and where another pair that is
+    directions near those of γ lead to zero, and steps can still follow how they turn, and where another group that is
     held slides on: it is not held in a shorter step.
     """
     given_up = TURNS_AWAY if may_follow(K, K.event_index) else 0
     relaxation = 1.0
-    whole = 0.0
     for turn in range(8):  # corrections of a direction that is held
         f = K.event_index
         product = 0.0
         square = 0.0
         largest = 0.0
         for g in range(K.n_frictions):
-            if keeps_direction(K, g):
-                speed = speed_of_both(K, g, K.guards0, K.at_slip)
-                left = across(K, g)
-                largest = max(largest, abs(left) / (AT_REST * speed + 1e-13))
-                change = left / (speed + NOTHING) - K.across[g]
+            if K.group_size[g] > 1 and K.slip[g] != 0.0 and K.hold[g] == HELD:
+                speed = speed_of(K, g, K.guards0, K.at_slip)
+                largest = max(largest, away(K, g, K.guards1, K.at_slip) / (AT_REST * speed + 1e-13))
+                left = across(K, g, K.guards1, K.at_slip) / (speed + NOTHING)
+                change = left - K.across[g]
                 product += K.across[g] * change
                 square += change * change
-                K.across[g] = left / (speed + NOTHING)
+                K.across[g] = left
         if largest <= 1.0:
             break
         if turn > 0 and square > 0.0:
             relaxation *= -product / square
-        angle = relaxation * K.across[f]
-        whole += angle
-        if not abs(angle) < 0.5 or (given_up != 0 and not abs(whole) < FARTHEST):
+        angle = relaxation * speed_of(K, f, K.across, 0)
+        small = abs(angle) < 0.5
+        if small:
+            turn_directions(K, relaxation)
+            small = given_up == 0 or away(K, f, K.guards0, K.at_slip) < FARTHEST * speed_of(K, f, K.guards0, K.at_slip)
+        if not small:
             if given_up != 0:
-                K.hold[f] = K.hold[K.partner[f]] = 0.0
+                set_hold(K, f, 0.0)
             return given_up
-        turn_directions(K, relaxation)
         status = try_step(K, h, t1)
         if status != 0:
             return status
@@ -202,38 +221,34 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
 
 
 def may_follow(K: Guards, f: int) -> bool:
-    """Whether steps can still be short enough to follow how γ of f and its partner turns."""
-    speed = speed_of_both(K, f, K.guards0, K.at_slip)
-    return bool(PART * speed > SHORTEST * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate))
+    """Whether steps can still be short enough to follow how γ of the group of f turns."""
+    speed = speed_of(K, f, K.guards0, K.at_slip)
+    return bool(PART * speed > SHORTEST * K.dt * speed_of(K, f, K.guards0, K.at_slip_rate))
 
 
 def keeps_direction(K: Frictions, f: int) -> bool:
-    """Whether f stands for a pair that slides in a direction that is held."""
-    return bool(K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] == HELD)
-
-
-def across(K: Guards, f: int) -> float:
-    """γ of the candidate across the direction in which f and its partner slide."""
-    p = K.partner[f]
-    return float(K.slip[f] * K.guards1[K.at_slip + p] - K.slip[p] * K.guards1[K.at_slip + f])
+    """Whether f stands for a group that slides in a direction that is held."""
+    return bool(leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] == HELD)
 
 
 def turn_directions(K: Frictions, relaxation: float) -> None:
     """Turn all that are held towards what is left across them."""
     for f in range(K.n_frictions):
         if keeps_direction(K, f):
-            p = K.partner[f]
-            angle = min(max(relaxation * K.across[f], -FARTHEST), FARTHEST)
-            aim(K, f, K.slip[f] - angle * K.slip[p], K.slip[p] + angle * K.slip[f])
+            angle = abs(relaxation) * speed_of(K, f, K.across, 0)
+            part = relaxation * (FARTHEST / angle if angle > FARTHEST else 1.0)
+            for g in range(f, f + K.group_size[f]):
+                K.slip[g] += part * K.across[g]
+            aim(K, f)
 
 
 def another_slides_on(K: Guards, event: int) -> bool:
-    """Whether a pair that is held slides on where another one has come to rest; it is held no longer then."""
+    """Whether a group that is held slides on where another one has come to rest; it is held no longer then."""
     found = False
     for f in range(K.n_frictions):
         if keeps_direction(K, f) and f != event and may_follow(K, f):
-            left = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
-            if left > TOGETHER * speed_of_both(K, f, K.guards0, K.at_slip):
-                K.hold[f] = K.hold[K.partner[f]] = 0.0
+            left = along(K, f, K.guards1, K.at_slip)
+            if left > TOGETHER * speed_of(K, f, K.guards0, K.at_slip):
+                set_hold(K, f, 0.0)
                 found = True
     return found

@@ -1,11 +1,13 @@
-"""How fast friction of contacts in space turns the direction in which they slide."""
+"""How fast friction in a plane or in space turns the direction in which it slides."""
 
 from __future__ import annotations
 
-from mbd.kernel.contact.cone_directions import mass_of
-from mbd.kernel.contact.cones import HELD, speed_of_both
+from mbd.kernel.algebra.linear import factor, solve
+from mbd.kernel.algebra.roots import sqrt
+from mbd.kernel.contact.cone_directions import MOST_MEMBERS, fill_tangents
+from mbd.kernel.contact.cones import HELD, leads_group, product_of, speed_of
 from mbd.kernel.contact.contact_modes import STILL
-from mbd.kernel.records import Guards
+from mbd.kernel.records import Switching
 from mbd.kernel.stepping.restart import evaluate
 
 __all__ = ["STABLE", "estimated_turn_rate"]
@@ -13,30 +15,66 @@ __all__ = ["STABLE", "estimated_turn_rate"]
 STABLE = 2.0
 """Step times the estimated rate at which friction turns directions that explicit schemes take [-].
 
-Beyond 2.785 that of order 4 lets what is across the direction grow from round-off until γ has turned away; at the onset
-true rates were found up to 1.24 times those of `estimated_turn_rate`, so that steps stay below 2.48.
+Beyond 2.785 that of order 4 lets what is across the direction grow from round-off until γ has turned away.
 """
+SOON = 100.0
+"""Steps before it comes to rest from which on a motion that slows down is looked at [-]."""
 
 
-def estimated_turn_rate(K: Guards) -> float:
-    """Estimated rate [1/s] at which friction turns γ that it does not point along, Σ limit/(m (‖γ‖ + s)).
+def estimated_turn_rate(K: Switching) -> float:
+    """Estimated rate [1/s] at which friction turns γ that it does not point along, Σ limit λ/(‖γ‖ + s).
 
-    It is no bound: m is that of the diagonal of M alone, and pushes follow the direction. It is large where γ is small,
-    just after sliding has begun: an explicit scheme must follow it.
+    λ is the largest eigenvalue of B M⁻¹ Bᵀ across the direction, which rows that hold make smaller; that pushes follow
+    the direction is left out. The rate is large where γ is small, just after sliding has begun and before it ends: an
+    explicit scheme must follow it.
     """
     rate = 0.0
+    known = False
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
-            p = K.partner[f]
-            gain = K.guards0[K.at_slip + f] * K.guards0[K.at_slip_rate + f]
-            gain += K.guards0[K.at_slip + p] * K.guards0[K.at_slip_rate + p]
-            speed = speed_of_both(K, f, K.guards0, K.at_slip)
-            if gain < 0.0 and speed > STILL:  # it comes to rest: `approached_end` sees to that
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            gain = product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate)
+            speed = speed_of(K, f, K.guards0, K.at_slip)
+            change = speed_of(K, f, K.guards0, K.at_slip_rate)
+            if gain < 0.0 and speed > STILL and speed > SOON * change * K.dt:  # it slows down, and is still fast
                 continue
-            if rate == 0.0:
+            if not known:
                 evaluate(K, K.time, K.q, K.y)
+                for i in range(K.n * K.n):
+                    K.kkt[i] = K.acc[i]
+                known = factor(K.kkt, K.n, K.pivots) == 0
             speed += 4.0 * K.hold[f]
-            mass = mass_of(K, f)
-            if speed > 0.0 and mass > 0.0:
-                rate += K.guards0[K.at_limit + f] / (mass * speed)
+            if known and speed > 0.0:
+                rate += K.guards0[K.at_limit + f] * largest_ease(K, f) / speed
     return rate
+
+
+def largest_ease(K: Switching, f: int) -> float:
+    """The largest eigenvalue of B M⁻¹ Bᵀ across the direction of the group of f; M is factored in K.kkt."""
+    count = fill_tangents(K, f, 0)
+    first = ease_between(K, f, 0, 0)
+    if count == 1:
+        return first
+    second = ease_between(K, f, 1, 1)
+    mixed = ease_between(K, f, 0, 1)
+    half = 0.5 * (first - second)
+    return 0.5 * (first + second) + sqrt(half * half + mixed * mixed)
+
+
+def ease_between(K: Switching, f: int, i: int, j: int) -> float:
+    """t_i B M⁻¹ Bᵀ t_j of the tangents i and j of the group of f."""
+    for k in range(K.n):
+        K.rhs[k] = row_along(K, f, j, k)
+    solve(K.kkt, K.n, K.pivots, K.rhs)
+    value = 0.0
+    for k in range(K.n):
+        value += row_along(K, f, i, k) * K.rhs[k]
+    return value
+
+
+def row_along(K: Switching, f: int, i: int, column: int) -> float:
+    """Entry `column` of t_i B."""
+    value = 0.0
+    for g in range(K.group_size[f]):
+        row = K.friction_row[f + g]
+        value += K.cone_across[MOST_MEMBERS * i + g] * K.acc[K.acc_B + row * K.n + column]
+    return value

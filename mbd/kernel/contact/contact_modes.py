@@ -16,7 +16,7 @@ from mbd.kernel.codes import (
     UNKNOWN,
 )
 from mbd.kernel.contact.complementarity import complementarity
-from mbd.kernel.contact.cones import aim, follows, hold_directions
+from mbd.kernel.contact.cones import aim, follows, hold_directions, set_loose, set_sticking
 from mbd.kernel.contact.impact_solve import strikes
 from mbd.kernel.contact.islands import find_islands
 from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Sizes, Switching
@@ -113,7 +113,7 @@ def resolve_contact_modes(K: Switching) -> int:
         if c >= 0 and K.closed[c] == 0:
             K.sticks[f] = 0
             K.slip[f] = 0.0
-        if follows(K, f):  # the first of two tells of both
+        if follows(K, f):  # the first of a group tells of all
             continue
         now = frictional_state(K, f)
         if now != K.was[f] and K.was[f] != UNKNOWN:
@@ -129,7 +129,7 @@ def frictional_state(K: Frictions, f: int) -> int:
     """0 off, 2 sticking, ±1 sliding; 1 in space."""
     if K.sticks[f] == 1:
         return 2
-    if K.partner[f] >= 0:
+    if K.group_size[f] > 1:
         return 1 if K.slip[f] != 0.0 else 0
     return int(K.slip[f])
 
@@ -149,9 +149,9 @@ def find_slips(K: Guards) -> None:
     evaluate(K, K.time, K.q, K.y)
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
-        if K.partner[f] >= 0:
-            if K.partner[f] > f:
-                find_slip_of_both(K, f)
+        if K.group_size[f] > 1:
+            if not follows(K, f):
+                find_slip_of_group(K, f)
             continue
         found = K.loose[f]
         K.loose[f] = 0
@@ -179,32 +179,32 @@ def find_slips(K: Guards) -> None:
             K.slip[f] = 1.0 if gamma > 0.0 else -1.0
 
 
-def find_slip_of_both(K: Guards, f: int) -> None:
-    """The same of a contact that slides in a plane, friction f and its partner: K.slip is the direction of γ."""
-    p = K.partner[f]
+def find_slip_of_group(K: Guards, f: int) -> None:
+    """The same of frictions that slide together, the first of which is f: K.slip is the direction of γ."""
     c = K.friction_contact[f]
     found = K.loose[f]
-    K.loose[f] = K.loose[p] = 0
-    if K.closed[c] == 0 and K.touched[c] == 0:
-        K.sticks[f] = K.sticks[p] = 0
-        K.slip[f] = K.slip[p] = 0.0
+    set_loose(K, f, 0)
+    if c >= 0 and K.closed[c] == 0 and K.touched[c] == 0:
+        set_sticking(K, f, 0)
         return
-    x = row_speed(K, K.friction_row[f])
-    y = row_speed(K, K.friction_row[p])
-    speed = sqrt(x * x + y * y)
     if found == 3:  # along its pull
-        K.loose[f] = K.loose[p] = 2 if K.strategy == 0 else 0
+        set_loose(K, f, 2 if K.strategy == 0 else 0)
         return
-    o_size = K.n + K.n_rows
-    small = max(1.0, 1e-2 * max(K.scale[o_size + K.friction_row[f]], K.scale[o_size + K.friction_row[p]]))
-    if speed <= (CLOSE_TO_STILL if found == 2 else STILL) * small:
-        K.loose[f] = K.loose[p] = 1
+    square = 0.0
+    small = 1.0
+    for g in range(f, f + K.group_size[f]):
+        gamma = row_speed(K, K.friction_row[g])
+        square += gamma * gamma
+        small = max(small, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[g]])
+    if sqrt(square) <= (CLOSE_TO_STILL if found == 2 else STILL) * small:
+        set_loose(K, f, 1)
         if K.slip[f] == 0.0 or K.event_kind != SLIP or found == 2:
-            K.sticks[f] = K.sticks[p] = 1
-            K.slip[f] = K.slip[p] = 0.0
+            set_sticking(K, f, 1)
     else:
-        K.sticks[f] = K.sticks[p] = 0
-        aim(K, f, x, y)
+        set_sticking(K, f, 0)
+        for g in range(f, f + K.group_size[f]):
+            K.slip[g] = row_speed(K, K.friction_row[g])
+        aim(K, f)
 
 
 def find_painleve_contacts(K: Balance) -> int:

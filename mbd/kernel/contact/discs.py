@@ -1,6 +1,6 @@
 """A convex quadratic function over discs, by an interior-point method: how several frictions may share a load.
 
-``min ½ yᵀ Q y + cᵀ y``  with  ``‖t_i‖ ≤ ℓ_i``,  t_i (two numbers) and ℓ_i affine in y
+``min ½ yᵀ Q y + cᵀ y``  with  ``‖t_i‖ ≤ ℓ_i``,  t_i (three numbers, in a plane the last 0) and ℓ_i affine in y
 
 in the smooth form ``g_i = ‖t_i‖²/ℓ_i − ℓ_i ≤ 0``, which is convex; multipliers κ_i ≥ 0. Newton's method on the
 conditions of optimality with κ_i (−g_i) = τ, τ → 0 (Boyd & Vandenberghe 2004, Convex Optimization,
@@ -13,8 +13,10 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import Complementarity
 
-__all__ = ["disc_length", "disc_slack", "minimize_within_discs"]
+__all__ = ["DISC_LINES", "disc_length", "disc_slack", "minimize_within_discs"]
 
+DISC_LINES = 4
+"""Numbers of a disc: three t_i and ℓ_i [-]."""
 FALL = 0.1
 """Part of the present gap that the next step aims at [-]."""
 NO_GAP = 1e-15
@@ -24,7 +26,7 @@ NEARLY = 0.99
 
 
 def disc_value(K: Complementarity, row: int, unknowns: int) -> float:
-    """Number `row` of K.disc_map y + K.disc_at: two t_i and ℓ_i of each disc."""
+    """Number `row` of K.disc_map y + K.disc_at: three t_i and ℓ_i of each disc."""
     value = K.disc_at[row]
     for j in range(unknowns):
         value += K.disc_map[row * K.n_disc_unknowns + j] * K.disc_y[j]
@@ -33,15 +35,16 @@ def disc_value(K: Complementarity, row: int, unknowns: int) -> float:
 
 def disc_length(K: Complementarity, i: int, unknowns: int) -> float:
     """‖t_i‖."""
-    x = disc_value(K, 3 * i, unknowns)
-    y = disc_value(K, 3 * i + 1, unknowns)
-    return sqrt(x * x + y * y)
+    x = disc_value(K, DISC_LINES * i, unknowns)
+    y = disc_value(K, DISC_LINES * i + 1, unknowns)
+    z = disc_value(K, DISC_LINES * i + 2, unknowns)
+    return sqrt(x * x + y * y + z * z)
 
 
 def disc_slack(K: Complementarity, i: int, unknowns: int) -> float:
     """−g_i; negative as well where ℓ_i is."""
     length = disc_length(K, i, unknowns)
-    limit = disc_value(K, 3 * i + 2, unknowns)
+    limit = disc_value(K, DISC_LINES * i + 3, unknowns)
     if not limit > 0.0:
         return -1.0
     return float((limit - length) * (limit + length) / limit)
@@ -50,28 +53,32 @@ def disc_slack(K: Complementarity, i: int, unknowns: int) -> float:
 def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
     """g_i′ into K.disc_slope, and what κ_i g_i″ and κ_i/s_i g_i′ g_i′ᵀ bring into the matrix K.disc_kkt."""
     width = K.n_disc_unknowns
-    limit = disc_value(K, 3 * i + 2, unknowns)
-    x = disc_value(K, 3 * i, unknowns) / limit
-    y = disc_value(K, 3 * i + 1, unknowns) / limit
-    o = 3 * i * width
+    limit = disc_value(K, DISC_LINES * i + 3, unknowns)
+    x = disc_value(K, DISC_LINES * i, unknowns) / limit
+    y = disc_value(K, DISC_LINES * i + 1, unknowns) / limit
+    z = disc_value(K, DISC_LINES * i + 2, unknowns) / limit
+    o = DISC_LINES * i * width
+    o_l = o + 3 * width
     for j in range(unknowns):
         K.disc_slope[i * width + j] = (
-            2.0 * (x * K.disc_map[o + j] + y * K.disc_map[o + width + j])
-            - (x * x + y * y + 1.0) * K.disc_map[o + 2 * width + j]
+            2.0 * (x * K.disc_map[o + j] + y * K.disc_map[o + width + j] + z * K.disc_map[o + 2 * width + j])
+            - (x * x + y * y + z * z + 1.0) * K.disc_map[o_l + j]
         )
     steep = K.disc_force[i] / K.disc_left[i]
     bend = 2.0 * K.disc_force[i] / limit
     for j in range(unknowns):
-        first = K.disc_map[o + j] - x * K.disc_map[o + 2 * width + j]
-        second = K.disc_map[o + width + j] - y * K.disc_map[o + 2 * width + j]
+        first = K.disc_map[o + j] - x * K.disc_map[o_l + j]
+        second = K.disc_map[o + width + j] - y * K.disc_map[o_l + j]
+        third = K.disc_map[o + 2 * width + j] - z * K.disc_map[o_l + j]
         slope = K.disc_slope[i * width + j]
-        if first == 0.0 and second == 0.0 and slope == 0.0:
+        if first == 0.0 and second == 0.0 and third == 0.0 and slope == 0.0:
             continue
         for k in range(unknowns):
             K.disc_kkt[j * unknowns + k] += (
                 steep * slope * K.disc_slope[i * width + k]
-                + bend * first * (K.disc_map[o + k] - x * K.disc_map[o + 2 * width + k])
-                + bend * second * (K.disc_map[o + width + k] - y * K.disc_map[o + 2 * width + k])
+                + bend * first * (K.disc_map[o + k] - x * K.disc_map[o_l + k])
+                + bend * second * (K.disc_map[o + width + k] - y * K.disc_map[o_l + k])
+                + bend * third * (K.disc_map[o + 2 * width + k] - z * K.disc_map[o_l + k])
             )
 
 

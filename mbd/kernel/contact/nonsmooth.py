@@ -16,8 +16,9 @@ from __future__ import annotations
 
 from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.contact.complementarity import complementarity
+from mbd.kernel.contact.cones import follows
 from mbd.kernel.contact.contact_modes import NO_IMPULSE, STILL, log_event
-from mbd.kernel.contact.nonsmooth_cones import hold_together, release_both, turned_in_plane
+from mbd.kernel.contact.nonsmooth_cones import hold_together, release, turned_in_plane
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.events.switching import close_by_impact, mark_touching
 from mbd.kernel.records import Balance, ContactForces, ContactRows, Contacts, Guards, Reals, Switching
@@ -58,17 +59,8 @@ def must_release(K: Switching, t1: float) -> int:
             K.sticks[f] = 0
             K.slip[f] = 0.0
             continue
-        if K.partner[f] >= 0:
-            count += release_both(K, f, PULL * force) if K.partner[f] > f else 0
-            continue
-        pull = K.lam1[K.friction_row[f]]
-        if K.n_repeats == 0:
-            K.let_go[f] = 0
-        if K.sticks[f] == 1 and abs(pull) - K.guards1[K.at_limit + f] > PULL * force:
-            K.sticks[f] = 0
-            K.slip[f] = 1.0 if pull > 0.0 else -1.0
-            K.let_go[f] = 1
-            count += 1
+        if not follows(K, f):
+            count += release(K, f, PULL * force)
     if count > 0:
         for f in range(K.n_frictions):
             if K.let_go[f] == 1 and K.slip[f] != 0.0:
@@ -105,8 +97,8 @@ def closes_below_surface(K: Guards) -> bool:
                 K.closing[c] = 1
                 found = True
     for f in range(K.n_frictions):
-        if K.partner[f] >= 0:
-            found = found or (K.slip[f] != 0.0 and K.partner[f] > f and turned_in_plane(K, f))
+        if K.group_size[f] > 1:
+            found = found or (K.slip[f] != 0.0 and not follows(K, f) and turned_in_plane(K, f))
         elif K.slip[f] != 0.0:
             turned = -K.slip[f] * K.guards1[K.at_slip + f]
             if turned > STILL:

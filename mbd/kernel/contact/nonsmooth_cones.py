@@ -8,16 +8,15 @@ first order, for all contacts together.
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import PULL
 from mbd.kernel.contact.cone_contacts import all_hold
 from mbd.kernel.contact.cone_turns import STABLE, estimated_turn_rate
-from mbd.kernel.contact.cones import HELD, aim, along, pull_of_both
+from mbd.kernel.contact.cones import HELD, aim_as_pulled, along, away, friction_size, leads_group, set_hold, speed_of
 from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate, evaluate_loaded, largest_force, limit_of
 
-__all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release_both", "turned_in_plane"]
+__all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release", "turned_in_plane"]
 
 FAR = 2.0
 """Times of a step in which γ must neither reach zero nor turn by a radian if its direction is to follow it [-]."""
@@ -25,17 +24,12 @@ TURNED = 1e-6
 """Sine of the angle by which γ may leave the direction that a step holds [-]."""
 
 
-def hold_for_step(K: Guards, h: float) -> None:
+def hold_for_step(K: Switching, h: float) -> None:
     """Which directions a step of size h holds; all of them where an explicit scheme would be unstable."""
     for f in range(K.n_frictions):
-        p = K.partner[f]
-        if p > f and K.slip[f] != 0.0:
-            x = K.guards0[K.at_slip + f]
-            y = K.guards0[K.at_slip + p]
-            ax = K.guards0[K.at_slip_rate + f]
-            ay = K.guards0[K.at_slip_rate + p]
-            held = FAR * h * sqrt(ax * ax + ay * ay) > sqrt(x * x + y * y)
-            K.hold[f] = K.hold[p] = HELD if held else 0.0
+        if leads_group(K, f) and K.slip[f] != 0.0:
+            change = speed_of(K, f, K.guards0, K.at_slip_rate)
+            set_hold(K, f, HELD if FAR * h * change > speed_of(K, f, K.guards0, K.at_slip) else 0.0)
     if K.explicit == 1 and h * estimated_turn_rate(K) > STABLE:
         hold_all(K)
 
@@ -47,33 +41,31 @@ def hold_all(K: Frictions) -> bool:
     """
     found = False
     for f in range(K.n_frictions):
-        if K.partner[f] >= 0 and K.slip[f] != 0.0 and K.hold[f] != HELD:
+        if K.group_size[f] > 1 and K.slip[f] != 0.0 and K.hold[f] != HELD:
             K.hold[f] = HELD
             found = True
     return found
 
 
 def turned_in_plane(K: Guards, f: int) -> bool:
-    """Whether friction f and its partner end a step in another direction than they held, beyond zero, or at rest."""
-    p = K.partner[f]
-    x = K.guards1[K.at_slip + f]
-    y = K.guards1[K.at_slip + p]
-    forward = along(K, f, x, y)
+    """Whether the group of f ends a step in another direction than it held, beyond zero, or at rest."""
+    forward = along(K, f, K.guards1, K.at_slip)
     if K.hold[f] != HELD:
         return forward < -STILL
-    return bool(forward <= STILL or abs(K.slip[f] * y - K.slip[p] * x) > TURNED * forward)
+    return bool(forward <= STILL or away(K, f, K.guards1, K.at_slip) > TURNED * forward)
 
 
-def release_both(K: Switching, f: int, least: float) -> int:
-    """1 if friction f and its partner stick beyond their limit at the candidate: they slide as they were pulled."""
-    p = K.partner[f]
-    if K.n_repeats == 0:
-        K.let_go[f] = K.let_go[p] = 0
-    if K.sticks[f] == 0 or pull_of_both(K, f, K.lam1) - K.guards1[K.at_limit + f] <= least:
+def release(K: Switching, f: int, least: float) -> int:
+    """1 if the group of f sticks beyond its limit at the candidate: it slides as it was pulled."""
+    slips = K.sticks[f] == 1 and friction_size(K, f, K.lam1) - K.guards1[K.at_limit + f] > least
+    for g in range(f, f + K.group_size[f]):
+        if slips or K.n_repeats == 0:
+            K.let_go[g] = 1 if slips else 0
+        if slips:
+            K.sticks[g] = 0
+    if not slips:
         return 0
-    K.sticks[f] = K.sticks[p] = 0
-    K.let_go[f] = K.let_go[p] = 1
-    aim(K, f, K.lam1[K.friction_row[f]], K.lam1[K.friction_row[p]])
+    aim_as_pulled(K, f, K.lam1)
     return 1
 
 
@@ -107,6 +99,6 @@ def is_within(K: Frictions, lam: Reals, least: float) -> bool:
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and lam[K.normal[c]] > least:
             within = False
     for f in range(K.n_frictions):
-        if K.sticks[f] == 1 and pull_of_both(K, f, lam) - K.limit[f] > least:
+        if K.sticks[f] == 1 and friction_size(K, f, lam) - K.limit[f] > least:
             within = False
     return within

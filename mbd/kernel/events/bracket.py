@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, OPEN_FORCE, OPEN_GAP, OPEN_PULL, PRESS, SLIP, STICK, WATCH
-from mbd.kernel.events.guards import along_slip, gap_scale, gap_tolerance, guard_value, pull_round_off
+from mbd.kernel.contact.cones import along
+from mbd.kernel.events.guards import gap_scale, gap_tolerance, guard_value, pull_round_off
 from mbd.kernel.events.hermite import first_guess
 from mbd.kernel.events.refine import enough, refine
 from mbd.kernel.records import ContactForces, Guards, Kernel, Sizes
@@ -136,7 +137,7 @@ def guard_rate(K: Guards, kind: int, index: int) -> float:
     if kind == CROSS_BACK:
         return float(-K.side[index] * K.guards1[K.at_user_rate + index])
     if kind == STICK:
-        return along_slip(K, index, K.guards1, K.at_slip_rate)
+        return along(K, index, K.guards1, K.at_slip_rate)
     return 0.0
 
 

@@ -25,7 +25,7 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
-from mbd.kernel.contact.cones import HELD, along, follows, pull_of_both
+from mbd.kernel.contact.cones import HELD, along, follows, friction_size
 from mbd.kernel.events.guard_round_off import STEADY, condition_round_off, guard_round_off
 from mbd.kernel.events.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call
@@ -34,7 +34,6 @@ from mbd.kernel.records import (
     ContactRows,
     Contacts,
     Events,
-    Frictions,
     Guards,
     Mechanism,
     Model,
@@ -51,7 +50,7 @@ from mbd.kernel.stepping.restart import (
 from mbd.kernel.stepping.scales import ROUGH
 
 __all__ = [
-    "along_slip", "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
+    "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
     "pull_round_off", "update_armed", "update_side", "update_sides", "watch",
 ]  # fmt: skip
 
@@ -336,20 +335,20 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
     if K.active[K.flag_friction + f] == 1 or follows(K, f):
         return
     if K.sticks[f] == 1:
-        m0 = K.guards0[K.at_limit + f] - pull_of_both(K, f, K.lam)
-        m1 = K.guards1[K.at_limit + f] - pull_of_both(K, f, K.lam1)
+        m0 = K.guards0[K.at_limit + f] - friction_size(K, f, K.lam)
+        m1 = K.guards1[K.at_limit + f] - friction_size(K, f, K.lam1)
         if is_doubtful(K, m1, change_of_margin(K, f)):
             m1 = margin(K, f, K.time + h)
         if m1 < -pull_round_off(K, f, K.lam1):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
         return
     s = K.slip[f]
-    if s == 0.0 or (K.partner[f] >= 0 and K.hold[f] != HELD):  # in a plane γ passes zero where its direction is held
+    if s == 0.0 or (K.group_size[f] > 1 and K.hold[f] != HELD):  # in a plane γ passes zero where its direction is held
         return
-    v0 = along_slip(K, f, K.guards0, K.at_slip)
-    v1 = along_slip(K, f, K.guards1, K.at_slip)
-    d0 = along_slip(K, f, K.guards0, K.at_slip_rate) * h
-    d1 = along_slip(K, f, K.guards1, K.at_slip_rate) * h
+    v0 = along(K, f, K.guards0, K.at_slip)
+    v1 = along(K, f, K.guards1, K.at_slip)
+    d0 = along(K, f, K.guards0, K.at_slip_rate) * h
+    d1 = along(K, f, K.guards1, K.at_slip_rate) * h
     tiny = REST * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
     if v1 < -tiny:
         top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
@@ -367,35 +366,27 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
 
 def pull_round_off(K: ContactRows, f: int, lam: Reals) -> float:
     """Round-off of what is left of a sticking friction at given multipliers: that of all forces enters each of them."""
-    return ROUGH * EPS * max(pull_of_both(K, f, lam), largest_force(K))
+    return ROUGH * EPS * max(friction_size(K, f, lam), largest_force(K))
 
 
 def change_of_margin(K: Guards, f: int) -> float:
     """Most by which limit − |λ_T| of a sticking friction may have changed in the step, by its own multipliers."""
-    row = K.friction_row[f]
-    change = K.lam1[row] - K.lam[row]
-    if K.partner[f] >= 0:
-        row = K.friction_row[K.partner[f]]
-        change = sqrt(change * change + (K.lam1[row] - K.lam[row]) ** 2)
-    return float(abs(change) + abs(K.guards1[K.at_limit + f] - K.guards0[K.at_limit + f]))
-
-
-def along_slip(K: Frictions, f: int, values: Reals, first: int) -> float:
-    """Of values of frictions that begin at `first`, that along the way in which friction f slides."""
-    if K.partner[f] < 0:
-        return float(K.slip[f] * values[first + f])
-    return along(K, f, values[first + f], values[first + K.partner[f]])
+    square = 0.0
+    for g in range(f, f + K.group_size[f]):
+        change = K.lam1[K.friction_row[g]] - K.lam[K.friction_row[g]]
+        square += change * change
+    return float(sqrt(square) + abs(K.guards1[K.at_limit + f] - K.guards0[K.at_limit + f]))
 
 
 def margin(K: Switching, f: int, t1: float) -> float:
     """What is left of a sticking friction at the candidate, limit − |λ_T| of consistent multipliers."""
     if consistent(K, t1, K.q1, K.y1) != 0:
-        return float(K.guards1[K.at_limit + f] - pull_of_both(K, f, K.lam1))
+        return float(K.guards1[K.at_limit + f] - friction_size(K, f, K.lam1))
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
     if K.n_cones > 0 and K.n_dropped > 0:  # what all feet together have left, though this one may be at its limit
-        return float(limit_of(K, f) - pull_of_both(K, f, K.brink))
-    return float(limit_of(K, f) - pull_of_both(K, f, K.impulse))
+        return float(limit_of(K, f) - friction_size(K, f, K.brink))
+    return float(limit_of(K, f) - friction_size(K, f, K.impulse))
 
 
 def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
@@ -414,7 +405,7 @@ def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
     if kind == CROSS:
         return float(K.side[index] * K.guards1[K.at_user + index])
     if kind == STICK:
-        return along_slip(K, index, K.guards1, K.at_slip)
+        return along(K, index, K.guards1, K.at_slip)
     if kind == CROSS_BACK:
         return float(-K.side[index] * K.guards1[K.at_user + index])
     if kind == SLIP:

@@ -15,13 +15,13 @@ from mbd.kernel.codes import (
     STICK,
     WATCH,
 )
-from mbd.kernel.contact.cones import aim, pull_of_both, speed_of_both
+from mbd.kernel.contact.cones import aim_as_pulled, friction_size, leads_group, set_loose, set_sticking, speed_of
 from mbd.kernel.contact.contact_modes import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, STILL, log_event
 from mbd.kernel.contact.impact import impact
 from mbd.kernel.contact.impact_solve import strikes
 from mbd.kernel.events.guards import gap_scale, is_watched
 from mbd.kernel.events.impulses import AFTER, BEFORE, BESIDE, push
-from mbd.kernel.records import Balance, ContactForces, Guards, Mechanism, Switching
+from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Mechanism, Switching
 from mbd.kernel.stepping.accept_restart import project_velocity
 from mbd.kernel.stepping.restart import active_rows, capture, consistent, evaluate, evaluate_loaded, limit_of, row_speed
 
@@ -183,22 +183,26 @@ def bursts(K: Mechanism, c: int) -> bool:
 
 
 def stop_together(K: Switching, index: int) -> None:
-    """Contacts in space come to rest: the one found, and those whose sliding is over within a thousandth of dt.
+    """Frictions in a plane or in space come to rest: the group found, and those that do within a thousandth of dt.
 
     A body that slides on several feet stops on all of them at once, but for round-off and errors of the step. The
     velocities that are left become those at which nothing slides; whether it stays so is for the restart to say.
     """
     evaluate(K, K.time, K.q, K.y)
     for f in range(K.n_frictions):
-        p = K.partner[f]
-        if p > f and K.slip[f] != 0.0 and K.closed[K.friction_contact[f]] == 1:
-            speed = speed_of_both(K, f, K.guards0, K.at_slip)
-            if f == index or speed <= TOGETHER * K.dt * speed_of_both(K, f, K.guards0, K.at_slip_rate):
-                K.loose[f] = K.loose[p] = 2
-                K.sticks[f] = K.sticks[p] = 1
-                K.slip[f] = K.slip[p] = 0.0
-                capture(K, K.friction_contact[f])
+        if leads_group(K, f) and K.slip[f] != 0.0 and is_closed(K, f):
+            speed = speed_of(K, f, K.guards0, K.at_slip)
+            if f == index or speed <= TOGETHER * K.dt * speed_of(K, f, K.guards0, K.at_slip_rate):
+                set_loose(K, f, 2)
+                set_sticking(K, f, 1)
+                if K.friction_contact[f] >= 0:
+                    capture(K, K.friction_contact[f])
     project_velocity(K, K.time, K.q, K.y, active_rows(K, K.closed), True)
+
+
+def is_closed(K: Frictions, f: int) -> bool:
+    """Whether the contact of friction f is closed, or it is that of a joint."""
+    return bool(K.friction_contact[f] < 0 or K.closed[K.friction_contact[f]] == 1)
 
 
 def slip_together(K: Balance, index: int) -> None:
@@ -207,25 +211,20 @@ def slip_together(K: Balance, index: int) -> None:
     The others stick on: the body turns about one that does. Who slides goes the way of its pull, which at that load is
     the only one.
     """
-    other = K.partner[index]
-    own_way = K.slip[index]
-    other_way = K.slip[other]
-    K.sticks[index] = K.sticks[other] = 1
-    K.slip[index] = K.slip[other] = 0.0
+    set_sticking(K, index, 1)
     status = consistent(K, K.time, K.q, K.y)
-    K.slip[index] = own_way
-    K.slip[other] = other_way
+    aim_as_pulled(K, index, K.lam)
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
     for f in range(K.n_frictions):
-        p = K.partner[f]
-        if status == 0 and p > f and K.sticks[f] == 1 and K.closed[K.friction_contact[f]] == 1:
+        if status == 0 and leads_group(K, f) and K.sticks[f] == 1 and is_closed(K, f):
             limit = limit_of(K, f)
-            if f == index or (limit > 0.0 and pull_of_both(K, f, K.brink) > (1.0 - AT_LIMIT) * limit):
-                K.loose[f] = K.loose[p] = 3
-                K.sticks[f] = K.sticks[p] = 0
-                aim(K, f, K.brink[K.friction_row[f]], K.brink[K.friction_row[p]])
-    K.sticks[index] = K.sticks[other] = 0
+            if f == index or (limit > 0.0 and friction_size(K, f, K.brink) > (1.0 - AT_LIMIT) * limit):
+                set_loose(K, f, 3)
+                set_sticking(K, f, 0)
+                aim_as_pulled(K, f, K.brink)
+    for g in range(K.leader[index], K.leader[index] + K.group_size[index]):
+        K.sticks[g] = 0
 
 
 def stop_spin(K: Balance, index: int) -> None:
@@ -266,20 +265,16 @@ def switch(K: Switching) -> int:
     elif kind == STICK:
         K.loose[index] = 2
         K.sticks[index] = 0
-        if K.partner[index] >= 0:
+        if K.group_size[index] > 1:
             stop_together(K, index)
         elif K.friction_contact[index] >= 0 and K.row_unit[K.friction_row[index]] == 1:
             stop_spin(K, index)
     elif kind == SLIP:
-        K.loose[index] = 3
-        K.sticks[index] = 0
-        K.slip[index] = 1.0 if K.lam[K.friction_row[index]] > 0.0 else -1.0
-        if K.partner[index] >= 0:
-            K.loose[K.partner[index]] = 3
-            K.sticks[K.partner[index]] = 0
-            aim(K, index, K.lam[K.friction_row[index]], K.lam[K.friction_row[K.partner[index]]])
-            if K.n_dropped > 0:
-                slip_together(K, index)
+        set_loose(K, index, 3)
+        set_sticking(K, index, 0)
+        aim_as_pulled(K, index, K.lam)
+        if K.group_size[index] > 1 and K.n_dropped > 0:
+            slip_together(K, index)
     elif kind == OPEN_PULL and bursts(K, index):
         K.failure_index = index
         return NO_FORCE

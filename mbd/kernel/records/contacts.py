@@ -52,16 +52,17 @@ class Frictions(Contacts):
 
     friction_row: Integers = integers()
     friction_contact: Integers = integers()
-    partner: Integers = integers()  # the other direction of a contact in space, −1 for none
+    leader: Integers = integers()  # the first of those that slide together, itself where it is alone
+    group_size: Integers = integers()  # how many they are: 2 of a contact in space, 3 of a ball joint
     sticks: Integers = integers(lambda s: s.n_frictions, kept=True)
     loose: Integers = integers(lambda s: s.n_frictions, kept=True)
     was: Integers = integers(lambda s: s.n_frictions, kept=True)  # at the last restart: 0 off, 2 sticking, ±1 sliding
     let_go: Integers = integers(lambda s: s.n_frictions)  # 1: a friction that has let go for the step being tried
-    slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding; of two directions its cosines
+    slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding; of a group the cosines of its direction
     hold: Reals = reals(lambda s: s.n_frictions, kept=True)  # how much of these counts: see `mbd.kernel.contact.cones`
     own_hold: Reals = reals(lambda s: s.n_frictions)  # the same of a step whose directions are found by continuation
     lean: Reals = reals(lambda s: s.n_frictions, kept=True)  # the direction in which each slid last
-    across: Reals = reals(lambda s: s.n_frictions)  # γ left across directions that are held, over γ before the step
+    across: Reals = reals(lambda s: s.n_frictions)  # γ left across directions that are held, over ‖γ‖ before the step
     limit: Reals = reals(lambda s: s.n_frictions)  # largest friction
     base_limit: Reals = reals(lambda s: s.n_frictions)  # the same at zero multipliers
 

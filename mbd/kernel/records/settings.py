@@ -20,7 +20,7 @@ class Sizes(Record):
     n_frictions: int
     n_machines: int  # discrete states with transitions
     n_impulses: int  # of the user, as contacts close
-    n_cones: int  # pairs of frictions that slide together, those of contacts in space
+    n_cones: int  # groups of frictions that slide together, those of contacts in space and of ball joints
     o_q: int  # offsets into the block
     o_x: int
     o_v: int

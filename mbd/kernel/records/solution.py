@@ -38,9 +38,10 @@ class Complementarity(SchemeAbilities):
     past_limit: Reals = reals(lambda s: s.n_frictions)  # and largest frictions
     past_time: float = place("detail")  # that they cover
     n_repeats: int = place("state")  # of a non-smooth step
-    cone_who: Integers = integers(lambda s: s.n_frictions)  # pairs of frictions whose direction is looked for
+    cone_who: Integers = integers(lambda s: s.n_frictions)  # of each unknown angle, the group whose direction it turns
     cone_pivots: Integers = integers(lambda s: s.n_frictions)
-    cone_miss: Reals = reals(lambda s: s.n_frictions)  # of each, part of γ across its direction
+    cone_across: Reals = reals(lambda s: 3 * s.n_frictions)  # of each, the vector along which it turns
+    cone_miss: Reals = reals(lambda s: s.n_frictions)  # of each, part of γ across the direction
     cone_turn: Reals = reals(lambda s: s.n_frictions)  # by which it turns [rad]
     cone_slope: Reals = reals(lambda s: s.n_frictions * s.n_frictions)
     cone_kept: Reals = reals(lambda s: s.n_frictions)  # cosines before a turn
@@ -67,8 +68,8 @@ class Complementarity(SchemeAbilities):
     freedom: Reals = reals(lambda s: s.n_rows * s.n_disc_unknowns)  # multipliers without forces
     null_vectors: Reals = reals(lambda s: s.n_rows * s.n_rows)  # all of them, line by line
     null_way: Reals = reals(lambda s: s.n_rows * s.n_rows)  # combinations of these
-    disc_map: Reals = reals(lambda s: 3 * s.n_discs * s.n_disc_unknowns)  # two t_i and ℓ_i of each disc
-    disc_at: Reals = reals(lambda s: 3 * s.n_discs)
+    disc_map: Reals = reals(lambda s: 4 * s.n_discs * s.n_disc_unknowns)  # three t_i and ℓ_i of each disc
+    disc_at: Reals = reals(lambda s: 4 * s.n_discs)
     disc_weight: Reals = reals(lambda s: s.n_discs)
     disc_quad: Reals = reals(lambda s: s.n_disc_unknowns * s.n_disc_unknowns)  # Q and c of what is minimized
     disc_cost: Reals = reals(lambda s: s.n_disc_unknowns)

@@ -31,7 +31,7 @@ def wants_continuation(K: Frictions, status: int) -> bool:
         return False
     found = False
     for f in range(K.n_frictions):
-        found = found or (K.partner[f] >= 0 and K.slip[f] != 0.0 and K.hold[f] != HELD)
+        found = found or (K.group_size[f] > 1 and K.slip[f] != 0.0 and K.hold[f] != HELD)
     return found
 
 

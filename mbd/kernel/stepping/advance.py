@@ -29,7 +29,7 @@ from mbd.kernel.contact.cone_steps import (
     slides_on,
     slides_until_event,
 )
-from mbd.kernel.contact.cones import follow_motion, pull_of_both
+from mbd.kernel.contact.cones import follow_motion, friction_size
 from mbd.kernel.contact.contact_modes import room_to_log
 from mbd.kernel.contact.nonsmooth import closes_below_surface, must_release
 from mbd.kernel.contact.nonsmooth_cones import hold_for_step
@@ -80,7 +80,7 @@ def has_spurious_reaction(K: Mechanism) -> bool:
                 return True
     if K.strategy == 0:
         for f in range(K.n_frictions):
-            excess = pull_of_both(K, f, K.lam1) - K.limit[f]
+            excess = friction_size(K, f, K.lam1) - K.limit[f]
             if K.sticks[f] == 1 and excess > 0.0 and excess > PULL * largest_force(K):
                 return True
     return False
@@ -263,7 +263,7 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
     status = locate(K, h)
     if status != 0:
         return status
-    if K.event_kind == STICK and K.partner[K.event_index] >= 0:
+    if K.event_kind == STICK and K.group_size[K.event_index] > 1:
         status = come_to_zero(K, h, t1)
         if status != 0:
             return status

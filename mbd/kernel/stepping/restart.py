@@ -6,7 +6,7 @@ from mbd.kernel.algebra.redundancy import find_dependence, find_shares, shared, 
 from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import ACCELERATIONS, COMPOSE, EPS, NOT_CONVERGED, SCALES
 from mbd.kernel.contact.cone_loads import keep_in_cones
-from mbd.kernel.contact.cones import fill_slips, sliding_force
+from mbd.kernel.contact.cones import fill_slips, leads_group, sliding_force
 from mbd.kernel.hooks import call
 from mbd.kernel.records import (
     Balance,
@@ -366,15 +366,13 @@ def find_sliding_friction(K: ContactForces) -> None:
     if K.n_cones > 0:
         for f in range(K.n_frictions):
             c = K.friction_contact[f]
-            if c >= 0 and K.partner[f] > f and K.slip[f] != 0.0:
+            if c >= 0 and leads_group(K, f) and K.slip[f] != 0.0:
                 for k in range(K.anchor_start[c], K.anchor_start[c + 1]):
                     K.block[K.o_anchor + k] = K.acc[K.acc_captured + k]
     evaluate_loaded(K, K.impulse)
     for f in range(K.n_frictions):
         if K.slip[f] != 0.0:
-            own = K.acc_rate + K.friction_row[f]
-            other = K.acc_rate + (K.friction_row[K.partner[f]] if K.partner[f] >= 0 else 0)
-            K.impulse[K.friction_row[f]] = sliding_force(K, f, limit_of(K, f), K.acc, own, other)
+            K.impulse[K.friction_row[f]] = sliding_force(K, f, limit_of(K, f), K.acc, K.acc_rate, True)
 
 
 def load_accelerations(K: ContactForces) -> None:

@@ -8,7 +8,7 @@ from mbd.kernel.codes import (
     NOT_CONVERGED,
     NOT_FINITE,
 )
-from mbd.kernel.contact.cones import HELD, sliding_force, speed_of_both
+from mbd.kernel.contact.cones import HELD, leads_group, sliding_force, speed_of
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
     Balance,
@@ -79,8 +79,7 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
         for f in range(K.n_frictions):
             K.limit[f] = K.guards1[K.at_limit + f]
             if K.slip[f] != 0.0:
-                other = K.at_slip + (K.partner[f] if K.partner[f] >= 0 else 0)
-                K.lam1[K.friction_row[f]] = sliding_force(K, f, K.limit[f], K.guards1, K.at_slip + f, other)
+                K.lam1[K.friction_row[f]] = sliding_force(K, f, K.limit[f], K.guards1, K.at_slip, False)
     return 0
 
 
@@ -91,11 +90,12 @@ def blur_of(K: Guards) -> float:
     """
     largest = 0.0
     for f in range(K.n_frictions):
-        if K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD:
-            row = K.friction_row[f]
-            size = max(K.scale[K.n + K.n_rows + row], K.scale[K.n + K.n_rows + K.friction_row[K.partner[f]]])
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            size = 0.0
+            for g in range(f, f + K.group_size[f]):
+                size = max(size, K.scale[K.n + K.n_rows + K.friction_row[g]])
             least = 4.0 * K.hold[f] if K.hold[f] > 0.0 else 0.0
-            speed = speed_of_both(K, f, K.guards0, K.at_slip) + least
+            speed = speed_of(K, f, K.guards0, K.at_slip) + least
             largest = max(largest, BLURRED * size / (speed + EPS * size))
     return min(largest, MOST_BLUR)
 
@@ -157,7 +157,7 @@ def turns(K: Frictions) -> bool:
     found = False
     if K.n_cones > 0:
         for f in range(K.n_frictions):
-            found = found or (K.partner[f] > f and K.slip[f] != 0.0 and K.hold[f] != HELD)
+            found = found or (leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD)
     return found
 
 

@@ -29,19 +29,20 @@ class EventLog:
     """
 
     def __init__(self, manager: ActiveSetManager) -> None:
-        frictions = [friction.name for friction in manager.frictions]
+        names = [friction.name for friction in manager.frictions]
         guards = [guard.name for guard in manager.guards]
         self._names = (
             manager.names,
             manager.names,
             guards,
-            frictions,
-            frictions,
+            names,
+            names,
             [each.name for each in manager.impulses],
         )
         self._bearers: list[Bearer] = [(contact.name, _place(contact.rows)) for contact in manager.contacts]
-        joints = [friction for friction in manager.frictions if friction.contact < 0]
-        self._bearers += [(friction.name, _place((friction.row,))) for friction in joints]
+        frictions = manager.frictions
+        joints = {f.group or (k,): f.name for k, f in enumerate(frictions) if f.contact < 0}
+        self._bearers += [(name, _place(tuple(frictions[k].row for k in group))) for group, name in joints.items()]
         self._bearers += [(name, _place(rows)) for name, rows in manager.rolling.items()]
 
     def events(self, lines: Matrix, stored: int) -> list[EventRecord]:

@@ -55,7 +55,9 @@ class MechanismSystem(System):
         self.sticks, self.slip = sticks, slip[: mechanism.layout.n_frictions]  # of frictions
         self.hold = np.zeros(len(self.slip)) if hold is None else hold
         self.blurs = blurs  # part of the forces that is round-off
-        self.pairs = np.array([friction.partner >= 0 for friction in manager.frictions], dtype=bool)
+        self.grouped = np.array([bool(friction.group) for friction in manager.frictions], dtype=bool)
+        places = [f - min(friction.group, default=f) for f, friction in enumerate(manager.frictions)]
+        self.free = np.array([1.0 if place < 2 else 0.0 for place in places])  # as `kernel.contact.cones.fill_slips`
         self.rubs = has_rubbing(mechanism.equations)
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
@@ -63,12 +65,12 @@ class MechanismSystem(System):
 
     @property
     def slips(self) -> Any:
-        """What programs know of sliding: signs, of two directions how they are held (`mbd.kernel.contact.cones`)."""
-        if not self.pairs.any():
+        """What programs know of sliding: signs, of groups how directions are held (`mbd.kernel.contact.cones`)."""
+        if not self.grouped.any():
             return self.slip
         hold = self.hold[: len(self.slip)]
-        held = np.where(hold > 0.0, hold * self.slip, 1.0)
-        return np.where(self.pairs & (self.slip != 0.0), held, self.slip)
+        held = np.where(hold > 0.0, hold * self.slip, self.free)
+        return np.where(self.grouped & (self.slip != 0.0), held, self.slip)
 
     @property
     def is_vector(self) -> bool:

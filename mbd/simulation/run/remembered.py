@@ -129,7 +129,7 @@ def _judged(kept: Kernel, memory: Memory, run: RunData) -> str:
     for name in ("slip", "side", "lean"):
         signs = getattr(kept, name)
         if name != "side" and run.kernel.n_cones > 0:  # cosines
-            signs = signs[run.kernel.partner[: run.kernel.n_frictions] < 0]
+            signs = signs[run.kernel.group_size[: run.kernel.n_frictions] == 1]
             if not np.all(np.abs(getattr(kept, name)) <= 1.0):
                 return f"{name!r} is no direction"
         if not np.all(np.isin(signs, (-1.0, 0.0, 1.0))):

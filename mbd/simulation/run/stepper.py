@@ -160,7 +160,7 @@ class Stepper:
             o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
             n_frictions=layout.n_frictions, n_machines=len(self.manager.machines),
             n_impulses=len(self.manager.impulses),
-            n_cones=sum(f.partner >= 0 for f in self.manager.frictions) // 2,
+            n_cones=len({f.group for f in self.manager.frictions if f.group}),
             n_watched=self.mechanism.sizes["guards"],
             n_judged=layout.n_frictions
             + sum(contact.kind != "penalty" and contact.opens_on == "pull" for contact in self.manager.contacts),
