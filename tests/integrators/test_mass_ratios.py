@@ -92,9 +92,9 @@ SHAPE = (0.05, 0.03, 0.06)
 
 
 # implicit steps in space ---------------------------------------------------------------------------------------------
-def balls_with_a_light_link(mass):
+def balls_with_a_light_link(mass, cut="auto"):
     """Three bodies on ball joints, that in the middle light."""
-    model = three_balls()
+    model = three_balls(cut)
     inertia = {f"body 1.inertia.{2 * axis}": mass * each for axis, each in zip("xyz", SHAPE, strict=True)}
     start = mbd.assemble(
         model,
@@ -105,10 +105,10 @@ def balls_with_a_light_link(mass):
     return model, start
 
 
-@lru_cache(maxsize=1)
-def three_balls():
+@lru_cache(maxsize=4)
+def three_balls(cut="auto"):
     """Of 3 kg each."""
-    model = mbd.Model("light link")
+    model = mbd.Model("light link", cut=cut)
     end = model.ground.origin
     for k in range(3):
         body = mbd.RigidBody(f"body {k}", 3.0, [3.0 * each for each in SHAPE], center=(0.0, -0.2, 0.05))
@@ -149,6 +149,24 @@ def test_radau_steps_of_a_light_link_are_of_the_full_order_in_a_few_iterations(m
         for backend in ("llvm", "python")
     )
     np.testing.assert_allclose(compiled.record.a, twin.record.a, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("mass", [5e-3, 5e-5])
+@pytest.mark.parametrize("cut", [0, 1, 2])
+def test_radau_steps_of_a_light_link_whose_joints_are_cut_are_those_of_the_tree(cut, mass):
+    """Corrections with rows and masses of the middle stage alone left seven tenths of the error, and steps failed."""
+    model, start = balls_with_a_light_link(mass, cut=(f"joint {cut}",))
+    _, uncut = balls_with_a_light_link(mass)
+    exact = mbd.simulate(three_balls(), uncut, mbd.RungeKutta853(), tol=1e-10, until=0.32)
+    runs = [mbd.simulate(model, start, mbd.RadauIIA(), dt=dt, until=0.32) for dt in (0.032, 0.016)]
+    coarse, fine = (
+        max(
+            np.abs(run[f"body {k}.origin.{c}"][-1] - exact[f"body {k}.origin.{c}"][-1]) for k in range(3) for c in "xyz"
+        )
+        for run in runs
+    )
+    assert coarse > 20.0 * fine, (coarse, fine)
+    assert all(run.stats["iterations"] < 8 * run.stats["steps"] and not run.stats["shortened"] for run in runs)
 
 
 def light_link(seed):

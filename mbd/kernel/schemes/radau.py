@@ -71,6 +71,8 @@ PATIENT = 6
 """Corrections after which residuals that meet the tolerance asked for are taken for what they are [-]."""
 STUCK = 0.9
 """Part of the residual left by a correction above which it falls no more; between both it falls slowly."""
+WILD = 2.0
+"""Size of a correction over the largest rate above which it is made with the masses of each stage instead [-]."""
 
 NEGLIGIBLE = 1e-2
 """The same over the square of the first correction, the size of the step's own error [-]."""
@@ -147,6 +149,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
     left = 1e300  # the error where the last correction started
     retreats = 0
     renew = True
+    slow = False  # whether matrices of one stage leave much of the error
     status = NOT_CONVERGED
     K.failure_time = t1
     K.failure_step = h
@@ -167,6 +170,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
         if retreats < 10 and iteration > 0 and (error < 0.0 or grown):
             retreat_stages(K, m, 0.5)  # a full Newton step jumped over a steep place
             retreats += 1
+            slow = True
             continue
         if error < 0.0:
             status = NOT_FINITE
@@ -182,6 +186,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
             return complete(K, h, t1, m, renew, True)
         if error > 1.0 and not renew and error > SLOW * before:
             renew = True  # the old matrices have done their work: make them again at the same iterate
+            slow = True
             before = 1e300
             continue
         if error <= 1.0 and K.scales_of_start == 1:
@@ -197,15 +202,24 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
             break
         if error <= 1.0:  # the residuals are there: what they still correct costs two solutions
             last = moved
-            moved = correct_by_own_masses(K, m, h, t1, renew)
+            moved = correct_by_own_masses(K, m, h, t1, renew, slow)
             renew = False
             if has_converged(moved, last, first):
                 if further == further_corrections():
                     return complete(K, h, t1, m, False, iteration >= PATIENT)
                 further += 1
             continue
-        moved = correct_by_own_masses(K, m, h, t1, renew)
-        if iteration == 0:  # the predictor is of order 3, the step of order 5: stay far below its error
+        moved = correct_by_own_masses(K, m, h, t1, renew, slow)
+        if moved > WILD and m > 0 and K.vector == 0 and not slow:
+            retreat_stages(K, m, 1.0)
+            slow = True
+            renew = True
+            before = 1e300
+            left = 1e300
+            continue
+        if iteration == 0 or (
+            slow and first == 0.0
+        ):  # the predictor is of order 3, the step of order 5: stay far below its error
             first = moved
             tolerance = min(K.tolerance, max(1e-3 * first * first, tolerance))
         renew = False

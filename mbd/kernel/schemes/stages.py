@@ -45,8 +45,8 @@ from mbd.kernel.schemes.stage_matrices import matrices, solve_pair, solve_real
 from mbd.kernel.stepping.restart import share_loads
 
 __all__ = [
-    "correct_rates", "correct_stages", "evaluate_stages", "hold_block", "load_stage", "predict_stages",
-    "retreat_stages",
+    "correct_positions_where_off", "correct_rates", "correct_stages", "evaluate_stages", "hold_block", "load_stage",
+    "predict_stages", "retreat_stages",
 ]  # fmt: skip
 
 
@@ -237,9 +237,14 @@ def correct_positions_of_stages(K: Steps, m: int, h: float, whole: bool) -> None
 
 def correct_stages(K: Steps, m: int, h: float, whole: bool) -> float:
     """One simplified Newton correction of all stages; its size relative to the largest rate."""
+    correct_positions_where_off(K, m, h, whole)
+    return correct_rates(K, m, h)
+
+
+def correct_positions_where_off(K: Steps, m: int, h: float, whole: bool) -> None:
+    """`correct_positions_of_stages` where rows act, as a whole or where they are above round-off."""
     if m > 0 and (whole or is_off(K, m)):
         correct_positions_of_stages(K, m, h, whole)
-    return correct_rates(K, m, h)
 
 
 def correct_rates(K: Steps, m: int, h: float) -> float:
