@@ -158,7 +158,7 @@ def estimate_error(K: Steps, h: float, m: int) -> None:
             K.error[i] += c * K.rhs[i]
 
 
-def misses_balance(K: Balance, h: float) -> bool:
+def misses_balance(K: Kernel, h: float) -> bool:
     """What the parabola through the rates of the stages misses at `BETWEEN`, f − W, into K.stages; whether it is known.
 
     Positions and velocities there are integrals of that parabola and of the one through the velocities of the stages.
