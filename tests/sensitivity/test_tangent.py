@@ -167,6 +167,20 @@ def test_steps_that_take_several_of_newtons_matrices(inertia, height, wave, pose
     assert error <= max(1e-7, 2.0 * noise)
 
 
+def test_a_disk_that_rolls_and_leans_by_schemes_that_correct_positions():
+    """Positions are corrected along rows on positions, across those on velocities, whose directions change as well."""
+    model, body = mbd.Model("coin"), mbd.RigidBody("body", 2.0, (0.01, 0.01, 0.02))
+    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    model.constrain(mbd.Bilateral("edge", mbd.disk_touchdown(body.origin, 0.14, axis=(0, 0, 1))))
+    model.constrain(mbd.Rolling("grip", body.origin, 0.14, axis=(0, 0, 1)))
+    position = {"float.orientation": ((1.0, 0.0, 0.0), 0.3)}
+    start = mbd.assemble(model, position, {"float.x": 1.0, "float.angular_velocity.y": 1.0})
+    settings = {"dt": 0.004, "until": 0.2}
+    for scheme in (mbd.HHT(0.05, **CLOSE), mbd.GeneralizedAlpha(0.5, **CLOSE)):
+        error, noise = judged(model, start, scheme, ways=2, step=1e-4, **settings)
+        assert np.all(error <= np.maximum(1e-8, 2.0 * noise)), scheme
+
+
 def test_modes_with_timers_and_memories_have_derivatives():
     model, start = walker_with_modes(remembers=True)
     names = ["left hip.angle.rate", "waist.angle", "torso.mass"]

@@ -153,7 +153,7 @@ def derivatives_of_modes(mechanism: Mechanism, code: Any, stabilized: bool, plac
     """Of the tangent and the residual of a mode, and of the matrix times a correction W of positions.
 
     The matrix by itself is held, as Newton's method may take any; where it is a metric, `rules.begin_corrections` asks
-    for ``K W`` with W held, which stands behind the block, and of rows the part that is a change.
+    for ``K W`` with W held, which stands behind the block, and of rows on positions the part that is a change.
     """
     key = (code.rows, code.penalties, code.sliding, code.given_rows, stabilized)
     n, m, layout, tape = mechanism.layout.n, len(code.rows), mechanism.layout, mechanism.equations.tape
@@ -166,7 +166,8 @@ def derivatives_of_modes(mechanism: Mechanism, code: Any, stabilized: bool, plac
         entries = mechanism._of(key, programs.newton)
         whole = [tape.input("held", layout.size + k) for k in range(n + m)]
         parts = [tape.input("held", layout.size + n + m + k) for k in range(layout.n_v)]
-        return [_dot(entries[k * (n + m) : (k + 1) * (n + m)], whole if k < n else parts) for k in range(n + m)]
+        entire = [*(True for _ in range(n)), *(mechanism.equations.rows[row].is_velocity for row in code.rows)]
+        return [_dot(entries[k * (n + m) : (k + 1) * (n + m)], whole if entire[k] else parts) for k in range(n + m)]
 
     found = [Derivative(mechanism, name, residual, places, first) for first in (size, 0)]
     if not stabilized or not m:
