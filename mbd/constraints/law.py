@@ -129,7 +129,8 @@ class Law:
     rates : (z, ż) of its first-order states ``scope.state(self.name, field, initial)``. They follow their rates at all
         times, also while a contact is open; forces, limits and `elastic` may depend on z, rows and gaps may not
     foot : places (x, y, z) of what touches while closed and while open, if no body tells them: 'name.foot.x' in results
-    rates_while_open : False where the states of a force law stand still while it is open
+    rates_while_open : of a force law, the rates of its states while it is open, one for each; True: the same as while
+        it is closed, False: they stand still. Steps look ahead through the surface, where these must be smooth
     """
 
     rows: Sequence[Equation] = ()
@@ -140,5 +141,5 @@ class Law:
     elastic: Scalar | None = None
     while_closed: str | None = None
     rates: Sequence[tuple[Node, Scalar]] = field(default=())
-    rates_while_open: bool = True
+    rates_while_open: bool | Sequence[Scalar] = True
     foot: tuple[Sequence[Scalar], Sequence[Scalar]] | None = None

@@ -54,9 +54,11 @@ class MaxwellStop(StopWithMemory):
         """Its force, its flow, and the energy of both springs."""
         k, branch, c = self.numbers(scope)
         gap, x = gap_of(self.measure, scope), scope.state(self.name, "flow", 0.0)
-        depth = maximum(-gap, branch * x / (k + branch))
+        free = branch * x / (k + branch)
+        depth = maximum(-gap, free)
         stretch = depth - x
         return Law(
             contact=Closing(gap, self.measure.unit, "gap"), push=k * depth + branch * stretch,
             elastic=0.5 * (k * depth * depth + branch * stretch * stretch), rates=[(x, branch * stretch / c)],
+            rates_while_open=[branch * (free - x) / c],
         )  # fmt: skip

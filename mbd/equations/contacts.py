@@ -26,7 +26,7 @@ from mbd.equations.states import with_states
 from mbd.joints.base import Joint, row_unit
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.evaluate import evaluate
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["anchors_held", "laws"]
 
@@ -166,11 +166,21 @@ def _contact(
     """A law that closes and opens, by rows or by a force."""
     holding = Holding(scope, scope.first_anchor + sum(len(contact.anchors) for contact in found.contacts))
     law = law_of(word, holding, contacts)
-    acts = 1.0 if law.rates_while_open else scope.tape.input("switch", number)
-    found.rates += [(state, acts * rate) for state, rate in law.rates]
+    found.rates += _rates_of_contact(scope, law, number)
     if law.contact is not None:
         by = _by_force if law.push is not None else _by_rows
         found.contacts.append(by(found, scope, dynamics, word, law, law.contact, holding, number))
+
+
+def _rates_of_contact(scope: DerivationScope, law: Law, number: int) -> list[tuple[Node, Scalar]]:
+    """The rates of its states while it is closed, and while it is open."""
+    if law.rates_while_open is True:
+        return list(law.rates)
+    open_rates: Sequence[Scalar] = [0.0] * len(law.rates) if law.rates_while_open is False else law.rates_while_open
+    switch = scope.tape.input("switch", number)
+    return [
+        (state, alone + switch * (rate - alone)) for (state, rate), alone in zip(law.rates, open_rates, strict=True)
+    ]
 
 
 def _by_rows(

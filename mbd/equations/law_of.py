@@ -80,8 +80,10 @@ def _faults(word: Constraint, law: Law, holding: Holding) -> Iterator[str]:
         yield "it never closes, so that hold() has no instant; only laws with a contact hold values"
     if not has_pairs(law.rates):
         yield f"rates={law.rates!r} must be pairs (state, its rate), such as rates=((z, speed - z / lag),)"
-    if not (law.rates_while_open or by_force):
-        yield "rates_while_open=False is for force laws; other laws have no states that stand still"
+    if law.rates_while_open is not True and not by_force:
+        yield "rates_while_open= is for force laws; the states of other laws follow their rates at all times"
+    if not isinstance(law.rates_while_open, bool) and len(law.rates_while_open) != len(law.rates):
+        yield f"rates_while_open= has {len(law.rates_while_open)} rates for {len(law.rates)} states; give one for each"
     if law.while_closed is not None and (closes or any(row.limit is not None for row in law.rows)):
         yield "while_closed= is for rows that act as long as another contact is closed, and have no limit"
     if law.contact is not None:

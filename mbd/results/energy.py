@@ -184,7 +184,9 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     held = np.where(closed, elastic, 0.0)
     steps = -np.diff(held)
     steps[closed[:-1] & ~closed[1:]] = 0.0
-    steps += np.diff(work)
+    # what a mode or an event puts into it at an instant, as it moves the rest of a leg, comes from outside
+    put_in = np.where((np.diff(time) <= 0.0) & closed[:-1] & closed[1:], np.diff(held), 0.0)
+    steps += put_in + np.diff(work)
     begins = closed & ~np.concatenate([[False], closed[:-1]])
     if not begins.any():
         return direct
@@ -196,6 +198,7 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     np.add.at(doubt, episode[1:], unsure)
     allowed = ROUND_OFF_RTOL * size
     allowed[0] += held[0]
+    np.add.at(allowed, episode[1:], np.maximum(put_in, 0.0))
     is_known = (doubt <= RESOLVED * size) & (gain <= allowed)
     return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]], np.diff(direct), steps))])
 

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
+from mbd.equations.equations import Contact
 from mbd.results.columns import ModelColumns
 from mbd.results.energy import doubted_ledger, kinds_of_work
 from mbd.simulation.run.stored import record_of, rows_of, whole_record
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
 from mbd.equal import EQUAL_RTOL
 from mbd.simulation.run.data import EnergyFindings, RunData
+from mbd.tape.derivatives import live
 
 __all__ = ["EnergyWatch", "Judgement", "judgement", "kinds_of"]
 
@@ -272,9 +274,20 @@ def kinds_of(mechanism: Mechanism) -> frozenset[str]:
 
 
 def _lending(run: RunData) -> frozenset[str]:
-    """Penalty contacts that were open at the start and whose numbers did not change."""
-    contacts = () if run.parameter_changes else run.manager.contacts
-    return frozenset(each.name for each in contacts if each.kind == "penalty" and each.name not in run.start.mode)
+    """Penalty contacts that were open at the start and whose numbers did not change, nor follow modes."""
+    equations = run.mechanism.equations
+    held = {anchor for machine in equations.machines for anchor in machine.anchors}
+    contacts = () if run.parameter_changes else equations.contacts
+    return frozenset(
+        each.name for each in contacts
+        if each.kind == "penalty" and each.name not in run.start.mode and not (held and held & _anchors_of(each))
+    )  # fmt: skip
+
+
+def _anchors_of(contact: Contact) -> set[int]:
+    """Numbers of the anchors that the gap and the force of a contact depend on."""
+    nodes = live([node for node in (contact.gap, contact.force) if node is not None])
+    return {int(node.data[1]) for node in nodes if node.op == "input" and node.data[0] == "anchor"}
 
 
 def _sentence(run: RunData, found: Judgement) -> str:
