@@ -59,7 +59,7 @@ def assign_plates(
     unloaded: list[str] = []
     for plate in recording.plates:
         spans = _loaded(plate, threshold)
-        broken = ~np.isfinite(plate.force).all(axis=1)
+        broken = np.isnan(plate.force.sum(axis=1))
         if broken.any():
             doubt(
                 f"{plate.name} has no values in {broken.sum()} of {len(broken)} samples, the first at "

@@ -68,8 +68,8 @@ class _Rows:
         if self.inverse is not None:
             return -right @ self.inverse.T
         part = B[:, :, self.free]
-        inverse = left_inverses(part)
-        inverse = np.linalg.pinv(part) if inverse is None else inverse
+        known = left_inverses(part)
+        inverse = np.asarray(np.linalg.pinv(part) if known is None else known)
         return -np.asarray(np.einsum("kij,kj->ki", inverse, right))
 
     def moved(self, q: Matrix, step: Matrix) -> Matrix:

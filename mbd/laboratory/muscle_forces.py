@@ -211,7 +211,7 @@ def _muscles(model: Any, given: Any) -> list[Muscle]:
 
 def _rigid(muscles: list[Muscle], time: Vector | None = None, activation: Matrix | None = None) -> list[Muscle]:
     """Muscles whose tendons do not give, with these activations (R, m), or fully active."""
-    without = {"tendon": "rigid", "activation_time": 0.0, "deactivation_time": 0.0, "arguments": ("t",)}
+    without: dict[str, Any] = {"tendon": "rigid", "activation_time": 0.0, "deactivation_time": 0.0, "arguments": ("t",)}
     excitations: list[Any] = [1.0] * len(muscles)
     if time is not None and activation is not None:
         several = len(time) > 1
