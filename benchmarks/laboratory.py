@@ -44,6 +44,9 @@ def measure(repeats: int) -> list[Figure]:
         "moments": partial(processor_seconds, mbd.inverse_dynamics, model, motion),
         "postures": partial(processor_seconds, mbd.inverse_kinematics, model, recording),
     }
+    coupled, part = _coupled(model, motion)
+    driven = [joint.name for joint in person.joints if joint.name.split()[-1] not in ("trunk", "wrist", "ankle")]
+    tasks["coupled"] = partial(processor_seconds, mbd.inverse_dynamics, coupled, part, driven)
     for task in tasks.values():
         task()
     finish()
@@ -59,11 +62,12 @@ def measure(repeats: int) -> list[Figure]:
     yardstick, ratio = ("", None) if other is None else ("rnea from Python", 1.2)
     moments, postures = samples["moments"], samples["postures"]
     value = moments.least / FRAMES * 1e6
-    beside = []
+    moved = samples["coupled"]
+    beside = [Figure("the same with dependent motions", moved.least / FRAMES * 1e6, "µs", 20.0, spread=moved.spread)]
     if tool is not None:
         ours, theirs = (samples[name].least / FRAMES * 1e6 for name in ("filmed", "opensim"))
         spread = samples["filmed"].spread
-        beside = [Figure("the same from angles alone", ours, "µs", 20.0, "OpenSim's tool", theirs, 0.01, spread)]
+        beside += [Figure("the same from angles alone", ours, "µs", 20.0, "OpenSim's tool", theirs, 0.01, spread)]
     return [
         Figure("inverse dynamics, a frame", value, "µs", 20.0, yardstick, other, ratio, moments.spread),
         *beside,
@@ -80,6 +84,22 @@ def _motion(model: mbd.Model, count: int) -> dict[str, np.ndarray]:
     for name in equations.velocity_names:
         motion[name], motion[f"{name.removesuffix('.rate')}.acceleration"] = rng.normal(size=(2, count))
     return motion
+
+
+def _coupled(model: mbd.Model, motion: dict[str, np.ndarray]) -> tuple[mbd.Model, dict[str, np.ndarray]]:
+    """The person whose wrists and ankles follow elbows and knees, and the motion without these."""
+    coupled = mbd.Model("coupled patient")
+    coupled.connect(*model.joints)
+    part = dict(motion)
+    pairs = ("wrist.angle", "elbow.angle"), ("ankle.first", "knee.angle"), ("ankle.second", "knee.angle")
+    for side in "left", "right":
+        for own, other in pairs:
+            names = f"{side} {own}", f"{side} {other}"
+            follows = mbd.measure(lambda a, b: a - 0.3 * mbd.sin(b), *names, unit="rad")
+            coupled.constrain(mbd.Bilateral(f"{names[0].replace('.', ' ')} follows", follows))
+            for name in names[0], f"{names[0]}.rate", f"{names[0]}.acceleration":
+                del part[name]
+    return coupled, part
 
 
 def _recording(model: mbd.Model, person: mbd.Human, names: list[str]) -> mbd.Recording:
