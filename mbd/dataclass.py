@@ -9,6 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from collections.abc import Callable
+from operator import attrgetter
+from reprlib import recursive_repr
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
@@ -47,8 +50,13 @@ class _Placeholder:
                 delattr(owner, name)
         for name, value in self.fields.items():
             setattr(owner, name, value)
-        dataclasses.dataclass(**{**self.options, "init": False})(owner)
-        owner.__init__ = _initializer(owner, self.options.get("frozen", False))
+        frozen = self.options.get("frozen", False)
+        dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen)(owner)
+        if self.options.get("repr", True) and "__repr__" not in owner.__dict__:
+            owner.__repr__ = _shown(owner)
+        if self.options.get("eq", True):
+            _compared(owner, frozen)
+        owner.__init__ = _initializer(owner, frozen)
 
 
 def _lazy(owner: type | None = None, /, **options: bool) -> Any:
@@ -71,6 +79,44 @@ def _lazy(owner: type | None = None, /, **options: bool) -> Any:
         if name not in owner.__dict__:
             setattr(owner, name, _Placeholder(owner, name, options, fields))
     return owner
+
+
+def _shown(owner: Any) -> Any:
+    """The `__repr__` of a dataclass."""
+    names = [field.name for field in dataclasses.fields(owner) if field.repr]
+
+    @recursive_repr()
+    def __repr__(self: Any) -> str:  # noqa: N807
+        return f"{type(self).__qualname__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
+
+    __repr__.__qualname__ = f"{owner.__qualname__}.__repr__"
+    return __repr__
+
+
+def _compared(owner: Any, frozen: bool) -> None:
+    """Give a dataclass its `__eq__` and `__hash__`, where it has none of its own."""
+    fields, own = dataclasses.fields(owner), owner.__dict__
+    compared = _values_of([field.name for field in fields if field.compare])
+    hashed = _values_of([field.name for field in fields if (field.compare if field.hash is None else field.hash)])
+
+    def __eq__(self: Any, other: Any) -> Any:  # noqa: N807
+        return compared(self) == compared(other) if type(other) is type(self) else NotImplemented
+
+    def __hash__(self: Any) -> int:  # noqa: N807
+        return hash(hashed(self))
+
+    has_own = "__hash__" in own and not (own["__hash__"] is None and "__eq__" in own)
+    if not has_own:
+        owner.__hash__ = __hash__ if frozen else None
+    if "__eq__" not in own:
+        owner.__eq__ = __eq__
+
+
+def _values_of(names: list[str]) -> Callable[[Any], tuple[Any, ...]]:
+    """What reads some attributes as a tuple."""
+    if len(names) > 1:
+        return attrgetter(*names)
+    return lambda one: tuple(getattr(one, name) for name in names)
 
 
 def _initializer(owner: Any, frozen: bool) -> Any:
