@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 import mbd
 from mbd.joints.losses.base import Loss
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
 HUB, ARM, ARM_LENGTH, INERTIA, GRAVITY = 2.0, 1.0, 0.25, 0.02, 9.81
 ABOUT_PIN = INERTIA + ARM * ARM_LENGTH**2
@@ -225,3 +226,24 @@ def test_dry_friction_is_read_by_samples_only():
     model.apply(mbd.SampledLaw("half", 0.01, {"push.force.x": lambda f: 1.0 - 0.5 * f}, arguments=["sole.friction"]))
     run = mbd.simulate(model, mbd.assemble(model, {"p.x": 0.0, "p.y": 0.0}, closed="sole"), dt=1e-3, until=0.2)
     assert run["push.force.x"][-1] == pytest.approx(2.0, rel=0.1)  # 1 + ½ of itself, sample by sample
+
+
+def test_gaits_their_derivatives_and_batches_follow_a_load():
+    model = kneed_walker()
+    hips = [joint for joint in model.joints if joint.name.endswith("hip")]
+    for hip in hips:
+        reads = [f"{hip.name.split()[0]} foot.force", f"{hip.name}.rate", ("per load", 2e-4)]
+        model.apply(mbd.Motor(f"{hip.name} brake", hip, lambda load, v, c: -c * load * v, arguments=reads))
+    how = {"integrator": mbd.RungeKutta853(), "dt": 0.01}
+    start, walks = kneed_walker_start(model), []
+    for step in 0.0, 1e-5, -1e-5:
+        change = {"hip.mass": 0.5 + step} if step else None
+        walks.append(
+            mbd.limit_cycle(model, start, **how, section="right foot", mirror=("left", "right"), parameters=change)
+        )
+    assert walks[0].largest_multiplier < 0.7
+    slope = (walks[1].speed - walks[2].speed) / 2e-5
+    assert walks[0].derivatives["speed", "hip.mass"] == pytest.approx(slope, rel=1e-7)
+    many, one = mbd.batch(model, [start], **how, until=0.4), mbd.simulate(model, start, **how, until=0.4)
+    assert many["left hip.angle"][0] == one.final["left hip.angle"]
+    assert abs(one.energy.numerical[-1]) < 1e-11
