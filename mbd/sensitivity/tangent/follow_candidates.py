@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, STICK
-from mbd.kernel.contact.cone_steps import across, keeps_direction
-from mbd.kernel.contact.cones import along
+from mbd.kernel.contact.cone_directions import MOST_MEMBERS, fill_tangents
+from mbd.kernel.contact.cone_steps import keeps_direction
 from mbd.kernel.events.guards import guard_value, watch
 from mbd.kernel.events.transitions import is_due
 from mbd.kernel.records import Kernel
@@ -105,38 +105,69 @@ def follow_event(K: Kernel) -> int:
 
 
 def follow_rest(K: Kernel, h: float) -> int:
-    """The candidate at which a friction in a plane, with its direction e held, comes to rest: δh and the turn δθ of e.
+    """The candidate at which friction in a plane or in space, with e held, comes to rest: δh and the turns δθ of e.
 
-    Both velocities are zero there, that along e and that across it, ``a = 0`` and ``c = 0``:
+    All velocities γ of the group are zero there, with the slopes γ_h by the step and γ_1, γ_2 by the turns:
 
-        a_h δh + a_θ δθ = −δa   c_h δh + c_θ δθ = −δc
+        γ_h δh + γ_1 δθ₁ + γ_2 δθ₂ = −δγ,   δh = −(γ_1 × γ_2)·δγ/(γ_1 × γ_2)·γ_h, and so on in turn
 
-    Where several come to rest at one instant, the run has no derivative (`margins`).
+    In a plane there is no δθ₂, and γ_2 is the normal. Where several come to rest at one instant, the run has no
+    derivative (`margins`).
     """
     f = K.event_index
+    turns = fill_tangents(K, f, 0)
     status = candidate_after(K, seeded(h))
     if status != 0:
         return status
-    a = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
-    c = across(K, f)
-    turn(K, f, seeded(0.0))
+    x = slip_velocity(K, f, 0)
+    y = slip_velocity(K, f, 1)
+    z = slip_velocity(K, f, 2)
+    turn(K, f, 0, seeded(0.0))
     status = candidate_after(K, h)
     if status != 0:
         return status
-    turned_a = along(K, f, K.guards1[K.at_slip + f], K.guards1[K.at_slip + K.partner[f]])
-    turned_c = across(K, f)
-    turn(K, f, -seeded(0.0))
-    K.event_after = at_root(h, seed_rate(turned_c) * a - seed_rate(turned_a) * c)
-    turn(K, f, at_root(0.0, seed_rate(a) * turned_c - seed_rate(c) * turned_a))
+    x1 = slip_velocity(K, f, 0)
+    y1 = slip_velocity(K, f, 1)
+    z1 = slip_velocity(K, f, 2)
+    turn(K, f, 0, -seeded(0.0))
+    x2 = 0.0
+    y2 = 0.0
+    z2 = seeded(0.0)
+    if turns == 2:
+        turn(K, f, 1, seeded(0.0))
+        status = candidate_after(K, h)
+        if status != 0:
+            return status
+        x2 = slip_velocity(K, f, 0)
+        y2 = slip_velocity(K, f, 1)
+        z2 = slip_velocity(K, f, 2)
+        turn(K, f, 1, -seeded(0.0))
+    K.event_after = at_root(h, triple_product(x, y, z, x1, y1, z1, x2, y2, z2))
+    turn(K, f, 0, at_root(0.0, triple_product(x1, y1, z1, x2, y2, z2, x, y, z)))
+    if turns == 2:
+        turn(K, f, 1, at_root(0.0, triple_product(x2, y2, z2, x, y, z, x1, y1, z1)))
     return candidate_after(K, K.event_after)
 
 
-def turn(K: Kernel, f: int, angle: float) -> None:
-    """Turn the direction in which friction f and its partner slide."""
-    p = K.partner[f]
-    x = K.slip[f] - angle * K.slip[p]
-    K.slip[p] += angle * K.slip[f]
-    K.slip[f] = x
+def slip_velocity(K: Kernel, f: int, k: int) -> float:
+    """γ of the candidate along number k of the group of friction f; 0 where it has no such one."""
+    return float(K.guards1[K.at_slip + f + k]) if k < K.group_size[f] else 0.0
+
+
+def triple_product(
+    x: float, y: float, z: float, x1: float, y1: float, z1: float, x2: float, y2: float, z2: float
+) -> float:
+    """γ · (γ_1 × γ_2), with the slopes of the last two by what they were turned by."""
+    value = x * (seed_rate(y1) * seed_rate(z2) - seed_rate(z1) * seed_rate(y2))
+    value += y * (seed_rate(z1) * seed_rate(x2) - seed_rate(x1) * seed_rate(z2))
+    value += z * (seed_rate(x1) * seed_rate(y2) - seed_rate(y1) * seed_rate(x2))
+    return value
+
+
+def turn(K: Kernel, f: int, i: int, angle: float) -> None:
+    """Turn the direction in which the group of friction f slides, across itself along tangent i."""
+    for k in range(K.group_size[f]):
+        K.slip[f + k] += angle * without_tangent(K.cone_across[MOST_MEMBERS * i + k])
 
 
 def candidate_after(K: Kernel, h: float) -> int:
