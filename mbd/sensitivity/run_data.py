@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -99,16 +99,7 @@ class RunRows:
         """The scheme, which is known or as its settings print it."""
         if self.source is not None and self.source.scheme is not None:
             return self.source.scheme
-        text = str(self.record.settings["integrator"])
-        call = ast.parse(text, mode="eval").body
-        if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
-            raise refused(f"its integrator {text} is none of mbd's")
-        made = getattr(integrators, call.func.id, None)
-        if made is None:
-            raise refused(f"its integrator {text} is none of mbd's")
-        values = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
-        found: Integrator = made(*(ast.literal_eval(each) for each in call.args), **values)
-        return found
+        return _integrator_of(str(self.record.settings["integrator"]))
 
     @cached_property
     def ends(self) -> Vector:
@@ -181,3 +172,17 @@ class RunRows:
         """Numbers of parameters by name."""
         known = {name: k for k, name in enumerate(self.record.parameter_names)}
         return [known[name] for name in names]
+
+
+@lru_cache(maxsize=64)
+def _integrator_of(text: str) -> Integrator:
+    """The scheme that settings print so."""
+    call = ast.parse(text, mode="eval").body
+    if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
+        raise refused(f"its integrator {text} is none of mbd's")
+    made = getattr(integrators, call.func.id, None)
+    if made is None:
+        raise refused(f"its integrator {text} is none of mbd's")
+    values = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
+    found: Integrator = made(*(ast.literal_eval(each) for each in call.args), **values)
+    return found
