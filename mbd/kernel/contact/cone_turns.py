@@ -7,7 +7,7 @@ from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.contact.cone_directions import MOST_MEMBERS, fill_tangents
 from mbd.kernel.contact.cones import HELD, leads_group, product_of, speed_of
 from mbd.kernel.contact.contact_modes import STILL
-from mbd.kernel.records import Switching
+from mbd.kernel.records import Balance, ContactForces, Switching
 from mbd.kernel.stepping.restart import evaluate
 
 __all__ = ["STABLE", "estimated_turn_rate"]
@@ -48,7 +48,7 @@ def estimated_turn_rate(K: Switching) -> float:
     return rate
 
 
-def largest_ease(K: Switching, f: int) -> float:
+def largest_ease(K: Balance, f: int) -> float:
     """The largest eigenvalue of B M⁻¹ Bᵀ across the direction of the group of f; M is factored in K.kkt."""
     count = fill_tangents(K, f, 0)
     first = ease_between(K, f, 0, 0)
@@ -60,7 +60,7 @@ def largest_ease(K: Switching, f: int) -> float:
     return 0.5 * (first + second) + sqrt(half * half + mixed * mixed)
 
 
-def ease_between(K: Switching, f: int, i: int, j: int) -> float:
+def ease_between(K: Balance, f: int, i: int, j: int) -> float:
     """t_i B M⁻¹ Bᵀ t_j of the tangents i and j of the group of f."""
     for k in range(K.n):
         K.rhs[k] = row_along(K, f, j, k)
@@ -71,7 +71,7 @@ def ease_between(K: Switching, f: int, i: int, j: int) -> float:
     return value
 
 
-def row_along(K: Switching, f: int, i: int, column: int) -> float:
+def row_along(K: ContactForces, f: int, i: int, column: int) -> float:
     """Entry `column` of t_i B."""
     value = 0.0
     for g in range(K.group_size[f]):
