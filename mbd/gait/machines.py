@@ -85,9 +85,14 @@ def _has_time(node: Node) -> bool:
     return any(each.op == "input" and each.data[0] == "t" for each in live([node]))
 
 
-def remembered(equations: Equations) -> tuple[int, ...]:
-    """Anchors of machines, but for numbers of states, on which motion, events or what is stored depends."""
-    known = equations.memory.get("remembered by machines")
+def remembered(equations: Equations, states: Sequence[float]) -> tuple[int, ...]:
+    """Anchors of machines, but for numbers of states, on which motion, events or what is stored depends.
+
+    states : the numbers of the states in which machines begin; timers of other states begin with these
+    """
+    key = tuple(int(each) for each in states)
+    all_known: dict[tuple[int, ...], tuple[int, ...]] = equations.memory.setdefault("remembered by machines", {})
+    known = all_known.get(key)
     if known is None:
         own = {anchor for machine in equations.machines for anchor in machine.anchors[1:]}
         stored = {a: node for each in equations.machines for a, node in zip(each.anchors, each.captured, strict=True)}
@@ -95,14 +100,19 @@ def remembered(equations: Equations) -> tuple[int, ...]:
             outputs = programs.accelerations(equations)
             first = len(outputs) - 1 - len(equations.frictions) - equations.n_anchors
             outputs = outputs[:first] + outputs[first + equations.n_held_by_machines :]
-            found = _anchors_in([*outputs, *programs.guards(equations)]) & own
+            guards, first = programs.guards(equations), 4 * len(equations.contacts)
+            for e, guard in enumerate(equations.guards):
+                if guard.is_timer and guard.transition is not None and states:
+                    if int(states[guard.transition.machine]) != guard.transition.source:
+                        guards[first + e] = equations.tape.one
+            found = _anchors_in([*outputs, *guards]) & own
             while True:  # what is stored counts where what it is stored into does
                 more = _anchors_in([stored[anchor] for anchor in found if not _is_itself(stored[anchor], anchor)]) & own
                 if more <= found:
                     break
                 found |= more
-        known = equations.memory["remembered by machines"] = tuple(sorted(found))
-    return tuple(known)
+        known = all_known[key] = tuple(sorted(found))
+    return known
 
 
 def _anchors_in(nodes: Sequence[Node]) -> set[int]:

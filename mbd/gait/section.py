@@ -272,12 +272,13 @@ def section_of(
     gaps = tuple(pair for pair in touching if pair[0] not in watching)
     speeds = tuple(pair[0] for pair in touching if pair[0] in watching)
     held = [k for c in manager.contacts if c.kind == "penalty" and c.name in after for k in c.anchors]
-    held += [anchor for anchor in remembered(mechanism.equations) if anchor not in stored]
-    carried = _carried(mechanism, arrived, parameters, fixed, held)
     states = arrived.anchors[state_anchors(mechanism.equations)] if len(arrived.anchors) else ()
+    numbers = tuple(float(each) for each in states)
+    held += [anchor for anchor in remembered(mechanism.equations, numbers) if anchor not in stored]
+    carried = _carried(mechanism, arrived, parameters, fixed, held)
     return Section(
         mechanism, manager, arrived.mode, arrived.armed, tuple(places), gaps, tuple(sorted(set(rates))), tuple(held),
-        tuple(fixed), None if held else heading, tuple(sorted(stored)), tuple(float(each) for each in states), speeds,
+        tuple(fixed), None if held else heading, tuple(sorted(stored)), numbers, speeds,
         carried,
     )  # fmt: skip
 

@@ -121,6 +121,21 @@ def test_a_mirror_needs_partners_of_modes_and_of_what_they_remember() -> None:
         mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
 
 
+def test_a_mode_that_never_changes_leaves_a_gait_as_it_is() -> None:
+    far = mbd.measure(lambda angle: angle - 9.0, "waist.angle")
+    idle = mbd.Mode("alarm", ("quiet", "loud"), transitions=[
+        mbd.Transition("quiet", "loud", when=far), mbd.Transition("loud", "quiet", after=0.2),
+    ])  # fmt: skip
+    gaits = [
+        mbd.limit_cycle(
+            *walker(more=more), mbd.RungeKutta853(), dt=0.01, section="right foot", mirror=("left", "right")
+        )
+        for more in ((), (idle,))
+    ]
+    assert gaits[1].period == pytest.approx(gaits[0].period, rel=1e-12)
+    assert len(gaits[1].multipliers) == len(gaits[0].multipliers)
+
+
 def test_a_gait_of_one_foot_has_derivatives_though_its_steps_have_no_length() -> None:
     model = mbd.Model("hopper")
     body = mbd.PointMass("body", mass=80.0)
