@@ -220,7 +220,7 @@ class Words:
         """The contacts that are closed or about to close, and the frictions of joints, in words."""
         values, manager = self.v, self.stepper.manager
         near = [name for c, name in enumerate(manager.names) if values.closed[c] == 1 or values.closing[c] != 0]
-        near += [friction.name for friction in manager.frictions if friction.contact < 0]
+        near += dict.fromkeys(friction.name for friction in manager.frictions if friction.contact < 0)
         return f" at {', '.join(map(repr, near))}" if near else ""
 
     @property
