@@ -53,7 +53,7 @@ class Measure(ABC):
         return False
 
     def slip_velocities(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
-        """(part, velocity [m/s]) along which a contact rubs that no posture tells, as of a ball. None without one."""
+        """(part, velocity [m/s]) along which a contact slides that no posture tells, as of a ball. None without one."""
         return ()
 
     @property

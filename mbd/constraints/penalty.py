@@ -164,24 +164,24 @@ class Penalty(Constraint):
         push = self.force(gap, rate, scope, *hold(self.captured(rate)))
         contact = Closing(gap, self.measure.unit, self.opens_on, only_while=self.only_while)
         drags = []
-        if self.rubs:
+        if self.has_friction:
             coefficient = scope.parameter(self.name, "mu", self.friction)
             creep = scope.parameter(self.name, "creep", self.creep)
             drags = rub(slip_velocities(self.measure, scope, hold), coefficient * push, creep)
         return Law(contact=contact, push=push, drags=drags, elastic=self.elastic_energy(gap, scope))
 
     @property
-    def rubs(self) -> bool:
+    def has_friction(self) -> bool:
         """Whether friction resists its sliding."""
         return self.friction != 0.0
 
     def anchors(self, scope: Scope) -> int:
-        """The approach speed, where its loss follows it, and where it rubs the place of touchdown."""
-        return len(self.captured(0.0)) + (len(self.measure.captured(scope)) if self.rubs else 0)
+        """The approach speed, where its loss follows it, and with friction the place of touchdown."""
+        return len(self.captured(0.0)) + (len(self.measure.captured(scope)) if self.has_friction else 0)
 
     def bare(self) -> dict[str, Constraint | None]:
         """Its friction, beside itself."""
-        return super().bare() | ({f"{self.name} friction": replace(self, friction=0.0)} if self.rubs else {})
+        return super().bare() | ({f"{self.name} friction": replace(self, friction=0.0)} if self.has_friction else {})
 
     def resolving_dt(self, values: Mapping[str, float], mass: float, speed: float) -> float:
         """A fifth of the time until the deepest point, as `mbd.penalty_parameters` has it."""
@@ -192,9 +192,9 @@ class Penalty(Constraint):
     def details(self) -> str:
         """Where, how stiff, and what it loses."""
         loss = f"damping {self.damper:.6g}" if self.chi is None else f"chi {self.chi:.6g}"
-        rubs = f", friction {self.friction:.6g}" if self.rubs else ""
+        friction = f", friction {self.friction:.6g}" if self.has_friction else ""
         condition = condition_details(self.only_while)
-        return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}{rubs}{condition}"
+        return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}{friction}{condition}"
 
     def captured(self, gap_rate: Scalar) -> tuple[Scalar, ...]:
         """What is held from the instant of closing: the approach speed −ġ, where χ needs it."""
@@ -249,11 +249,13 @@ class Penalty(Constraint):
         return [*self.measure.mentions(), *mentions_of(self.only_while)]
 
     def parameters(self) -> dict[str, float]:
-        """`stiffness`, `damping` or `chi` and `slowest`, `mu` and `creep` where it rubs; and those of its measure."""
+        """`stiffness`, `damping` or `chi` and `slowest`, `mu` and `creep` with friction; and those of its measure."""
         chi = self.chi
         loss = {"damping": self.damper} if chi is None else {"slowest": SLOWEST, "chi": chi}
-        rubs = {"mu": self.friction, "creep": self.creep} if self.rubs else {}
-        own = {f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss, **rubs}.items()}
+        friction = {"mu": self.friction, "creep": self.creep} if self.has_friction else {}
+        own = {
+            f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss, **friction}.items()
+        }
         return own | self.measure.parameters()
 
     def domains(self) -> dict[str, Domain]:
@@ -265,7 +267,7 @@ class Penalty(Constraint):
             largest = chi_for(LEAST_RESTITUTION, law_of(self.law, self.name))
             problem = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {LEAST_RESTITUTION:g}"
             domains |= {"chi": Domain(low=0.0, high=largest, problem=problem), "slowest": positive(unit="m/s")}
-        if self.rubs:
+        if self.has_friction:
             domains["mu"] = Domain(low=0.0, problem="is negative; give 0 for none", called="friction")
             domains["creep"] = positive(unit="m/s")
         return {f"{self.name}.{field}": domain for field, domain in domains.items()} | self.measure.domains()
@@ -275,7 +277,7 @@ class Penalty(Constraint):
         faults = self.measure.faults(self.name) + super().faults() + condition_faults(self.only_while, self.name)
         if self.exponent < 1.0:
             faults.append(f"'{self.name}': exponent {self.exponent:g} is below 1, endlessly stiff at touch; give n ≥ 1")
-        if self.rubs and not (self.measure.has_tangents or self.measure.has_slip_velocities):
+        if self.has_friction and not (self.measure.has_tangents or self.measure.has_slip_velocities):
             faults.append(
                 f"'{self.name}': friction {self.friction:g} on a {self.measure.title}, which has no direction to slide "
                 "in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"

@@ -92,7 +92,7 @@ class Balance:
     def __init__(self, states: StoredStates) -> None:
         self.states, self.equations = states, states.equations
         self.terms, self.follows = _terms(self.equations)
-        self.rubs = any(getattr(contact, "drags", ()) and contact.rows for contact in self.equations.contacts)
+        self.loads_act = any(getattr(contact, "drags", ()) and contact.rows for contact in self.equations.contacts)
         self._held: dict[bytes, Held] = {}
 
     @staticmethod
@@ -118,7 +118,7 @@ class Balance:
     def _solve_in(self, mode: NDArray[np.int8], rows: Rows, mine: Flags, found: Solved) -> None:
         """The same in one mode; `mine` are the places of the results."""
         held = self.rows_in(mode)
-        slides = bool(np.any(np.abs(rows.phase) == 1)) or self.rubs
+        slides = bool(np.any(np.abs(rows.phase) == 1)) or self.loads_act
         turns = MAX_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):

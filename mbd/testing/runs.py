@@ -84,7 +84,7 @@ def _friction(findings: Findings, run: Any, friction: Friction, where: str) -> N
     limit = np.where(on, limit, 0.0)
     wrong = np.abs(along) > limit + FRICTION * size
     row = _instant(findings, where, run, wrong)
-    sentence = f"'{friction.name}' rubs with {along[row]:.6g} of at most {limit[row]:.6g}"
+    sentence = f"'{friction.name}' resists with {along[row]:.6g} of at most {limit[row]:.6g}"
     hint = "the friction of a contact is at most μ times its force, and none where it is open"
     findings.holds("friction stays within its limit", not wrong.any(), sentence, hint)
     wrong = along * rate < -FRICTION * size

@@ -13,8 +13,9 @@ from typing import Any, ClassVar
 from mbd.integrators import CompiledIntegrator
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.contract import Abilities, Scheme
+from mbd.kernel.schemes.explicit_rates import explicit_rates
 from mbd.kernel.schemes.memory import forget_steps
-from mbd.kernel.schemes.runge_kutta import explicit_rates, return_to_rows
+from mbd.kernel.schemes.return_to_rows import return_to_rows
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms, note_row_norms
 from mbd.kernel.stepping.restart import consistent, fill_block, refresh_scales
 

@@ -158,7 +158,7 @@ def sharing(K: DependentRows) -> bool:
 
     Smooth friction of contacts does so all the time.
     """
-    if K.n_dropped > 0 and K.rubs == 1:
+    if K.n_dropped > 0 and K.loads_act == 1:
         return True
     if K.n_dropped > 0:
         for f in range(K.n_frictions):

@@ -19,7 +19,7 @@ def prepare(K: Balance) -> None:
     """K.acc at the instant, directions of sliding and of sticking where contacts are now; all frictions begin stuck.
 
     A contact that closes holds the place that it strikes from here on: its tangents are those of the ground there, also
-    where it rebounds. Smooth friction of contacts, where K.rubs says that there is any, takes no part; dry friction of
+    where it rebounds. Forces that follow multipliers (K.loads_act), as smooth friction, take no part; dry friction of
     contacts has its limit at the slip before the impact.
     """
     evaluate(K, K.time, K.q, K.y)
@@ -36,7 +36,7 @@ def prepare(K: Balance) -> None:
             evaluate_loaded(K, K.past)
             for f in range(K.n_frictions):
                 K.past_limit[f] = limit_of(K, f) + (K.past_time - 1.0) * K.base_limit[f]
-    elif K.rubs == 1:  # smooth friction follows forces that stay finite
+    elif K.loads_act == 1:  # smooth friction follows forces that stay finite
         K.block[1] = 1.0
         call(K, ACCELERATIONS, K.acc)
     start_over(K)

@@ -91,7 +91,7 @@ class Settings(Sizes):
     auto: int  # 1: non-smooth steps follow where located impacts crowd
     impact_law: int  # 0 Newton, 1 Poisson, 2 sequential
     n_judged: int  # unilateral contacts that open where they pull, and frictions
-    rubs: int  # 1 where forces follow multipliers: smooth friction of contacts by rows, laws that read them
+    loads_act: int  # 1 where forces follow multipliers: smooth friction of contacts by rows, laws that read them
     loaded: int  # forces follow multipliers other than linearly: 1 pins and laws, 2 friction not at all where one pulls
     adaptive: int  # 1: steps follow the estimated error, 0: they are all dt
     error_order: int  # power of the step with which the estimated error per second falls

@@ -90,7 +90,7 @@ def end_rates(K: Balance, t1: float, m: int) -> bool:
     Rows that were stepped with are independent, so that plain factors do for `consistent`, except where R follows
     multipliers. Frictions that feel rows left out, whose multipliers are known later, keep those of the stage.
     """
-    if K.n_dropped > 0 and (K.n_frictions > 0 or K.rubs == 1):
+    if K.n_dropped > 0 and (K.n_frictions > 0 or K.loads_act == 1):
         evaluate(K, t1, K.q1, K.y1)
         return False
     if K.loaded > 0:

@@ -41,7 +41,7 @@ def follow_rates(K: Kernel, t: float) -> int:
     """
     n = K.n
     m = K.n_active
-    if K.n_frictions > 0 or K.loaded > 0 or K.rubs == 1 or K.n_dropped > 0 or prepare_rates(K, t, m) != 0:
+    if K.n_frictions > 0 or K.loaded > 0 or K.loads_act == 1 or K.n_dropped > 0 or prepare_rates(K, t, m) != 0:
         return consistent(K, t, K.q1, K.y1)
     fill_block(K, t, K.q1, K.y1)
     K.block[K.o_lam : K.o_lam + K.n_rows] = 0.0

@@ -106,9 +106,9 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
         notes = degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))) + notes
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
-    rubs = loaded and any(code.given_rows for code in run.stepper.modes)
+    slid = loaded and any(code.given_rows for code in run.stepper.modes)
     moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))
-    dependent = redundancy(equations.rows, run.stepper.dependent, rubs, moved, _left_singular(run))
+    dependent = redundancy(equations.rows, run.stepper.dependent, slid, moved, _left_singular(run))
     notes += [dependent] if dependent else singular_start(run)
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:

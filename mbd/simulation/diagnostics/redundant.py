@@ -18,7 +18,7 @@ MOST_TOLD = 8
 
 
 def redundancy(
-    rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], rubs: bool, moved: bool = True, passed: bool = False
+    rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], slid: bool, moved: bool = True, passed: bool = False
 ) -> str:
     """The note on rows that left the solve; '' if none did.
 
@@ -26,7 +26,7 @@ def redundancy(
     ----------
     rows : of the equations
     dependent : numbers of the rows that left, and of those on which each depends
-    rubs : whether friction that follows multipliers has slid beside them
+    slid : whether friction that follows multipliers has slid beside them
     moved : whether the run went far enough to tell a singular configuration from rows that depend on others anywhere
     passed : whether rows that depended on each other do so no longer, all of them acting: a singular configuration
     """
@@ -40,7 +40,7 @@ def redundancy(
     what = (
         "how they share a load is not determined, nor is the drag of friction that slides: multipliers of least norm "
         "are taken"
-        if rubs
+        if slid
         else "they did so in a singular configuration only, where branches of motions cross: the motion from there is "
         "not unique; start beside it"
         if passed

@@ -25,10 +25,10 @@ from mbd.simulation.user_calls import call_user
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
-__all__ = ["MechanismSystem", "PlainScheme", "has_rubbing", "row_units", "unit_blocks"]
+__all__ = ["MechanismSystem", "PlainScheme", "loads_act", "row_units", "unit_blocks"]
 
 
-def has_rubbing(equations: Equations) -> bool:
+def loads_act(equations: Equations) -> bool:
     """Whether forces follow multipliers: smooth friction of contacts by rows, and laws that read them."""
     return any(c.drags and c.rows for c in equations.contacts) or follows_multipliers(equations) > 0
 
@@ -58,7 +58,7 @@ class MechanismSystem(System):
         self.grouped = np.array([bool(friction.group) for friction in manager.frictions], dtype=bool)
         places = [f - min(friction.group, default=f) for f, friction in enumerate(manager.frictions)]
         self.free = np.array([1.0 if place < 2 else 0.0 for place in places])  # as `kernel.contact.cones.fill_slips`
-        self.rubs = has_rubbing(mechanism.equations)
+        self.loads_act = loads_act(mechanism.equations)
         self.evaluated: Vector | None = None  # the inputs evaluated last, to explain a failure with
         layout = mechanism.layout
         self.n_q, self.n_v, self.n_z = layout.n_q, layout.n_v, layout.n_z
@@ -102,7 +102,7 @@ class MechanismSystem(System):
 
     def _given_rows(self, mode: Mode) -> tuple[int, ...]:
         """Rows that act and depend on others, where how loads are shared moves the mechanism: a friction slides."""
-        if not (self.slip.any() or self.rubs) or not any(self.dropped):
+        if not (self.slip.any() or self.loads_act) or not any(self.dropped):
             return ()
         held = self.manager.active_rows(self.manager.flags(mode.closed), self.sticks)
         return tuple(row for row in held if self.dropped[row])

@@ -20,7 +20,7 @@ from mbd.kernel.records import PROGRAMS, Kernel
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.simulation.run.call_table import CallTable
-from mbd.simulation.run.plain import MechanismSystem, PlainScheme, has_rubbing, row_units, unit_blocks
+from mbd.simulation.run.plain import MechanismSystem, PlainScheme, loads_act, row_units, unit_blocks
 from mbd.simulation.run.shelves import Shelves, plan_of
 from mbd.simulation.tolerance.driven import driving_rows
 from mbd.tape.derivatives import live
@@ -164,7 +164,7 @@ class Stepper:
             n_watched=self.mechanism.sizes["guards"],
             n_judged=layout.n_frictions
             + sum(contact.kind != "penalty" and contact.opens_on == "pull" for contact in self.manager.contacts),
-            rubs=int(has_rubbing(self.mechanism.equations)),
+            loads_act=int(loads_act(self.mechanism.equations)),
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
             vector=int(self.mechanism.vector), treelike=0,
@@ -225,7 +225,7 @@ class Stepper:
         held = self.manager.active_rows(flags, sticks)
         rows = tuple(row for row in held if not dropped[row])
         sliding = tuple(int(f) for f in np.flatnonzero(slip))
-        given_rows = tuple(row for row in held if dropped[row]) if sliding or v.rubs else ()
+        given_rows = tuple(row for row in held if dropped[row]) if sliding or v.loads_act else ()
         make = self._maker()
         try:
             code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, given_rows)
