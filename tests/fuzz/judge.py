@@ -159,7 +159,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     found = Faults(told.time)
     tol = run.settings["tol"] if run.settings.get("tol") else 0.0
     # with dry friction no step is taken again: curves pass through rows, as good as the order of the scheme
-    again = run.settings["between"].startswith("stages") and not run.record.equations.frictions
+    rubs = run.record.equations is None or bool(run.record.equations.frictions)
+    again = run.settings["between"].startswith("stages") and not rubs
     precise = again or run.settings["integrator"].startswith(("RungeKutta853", "Radau"))
     with np.errstate(all="ignore"):
         try:
