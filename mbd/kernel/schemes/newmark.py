@@ -8,7 +8,7 @@ the velocity formulas of the scheme with their own rate ż, of order 2 as well (
 from __future__ import annotations
 
 from mbd.kernel.codes import PASSING
-from mbd.kernel.contact.cones import HELD
+from mbd.kernel.contact.cones import HELD, friction_size
 from mbd.kernel.records import Balance, Kernel, Steps
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.direction_continuation import (
@@ -34,6 +34,9 @@ from mbd.kernel.stepping.restart import (
 )
 
 __all__ = ["SCHEME", "newmark_accept", "newmark_error", "newmark_resume", "newmark_start", "newmark_step"]
+
+CHANGES = 4.0
+"""Changes of multipliers in a step within which they may decide otherwise once they are those of the balance [-]."""
 
 
 def newmark_start(K: Kernel) -> int:
@@ -107,11 +110,32 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
             if status != 0:
                 return status
         elif not (status == 0 and K.scales_of_start == 1 and lower_to_step(K)):
-            if status == 0 and K.driven == 1 and K.n_active > 0:
+            if status == 0 and K.driven == 1 and K.n_active > 0 and (K.adaptive == 1 or may_switch(K)):
                 balance_end(K, t1)
             return status
         else:
             hold = FOLLOWS
+
+
+def may_switch(K: Kernel) -> bool:
+    """Whether `CHANGES` times what the step changes of multipliers takes a contact to pull, or a friction to its limit.
+
+    Elsewhere nothing hangs on multipliers that alternate.
+    """
+    for c in range(K.n_contacts):
+        if K.closed[c] == 1 and K.kind[c] == 0 and K.opens[c] == 0 and K.normal[c] >= 0:
+            row = K.normal[c]
+            if (
+                K.lam1[row] + CHANGES * abs(K.lam1[row] - K.lam[row]) > 0.0
+            ):  # those of a contact that pushes are below 0
+                return True
+    for f in range(K.n_frictions):
+        if K.sticks[f] == 1:
+            row = K.friction_row[f]
+            change = abs(K.lam1[row] - K.lam[row])
+            if friction_size(K, f, K.lam1) + CHANGES * change > K.guards0[K.at_limit + f]:
+                return True
+    return False
 
 
 def balance_end(K: Balance, t1: float) -> None:
