@@ -8,10 +8,10 @@ import numpy as np
 
 from mbd.dataclass import dataclass
 from mbd.simulation.tolerance.comparison import Gap
-from mbd.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from mbd.simulation.run.run import Run
+    from mbd.trajectory import Trajectory
 
 __all__ = ["Trial", "is_rounding", "least_error", "rounding", "same_steps"]
 
