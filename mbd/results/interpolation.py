@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import field, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -29,6 +29,8 @@ class Grid:
     """The times of the stored rows; two equal neighbours are the two sides of a switch."""
 
     time: Vector
+    _slopes: dict[int, tuple[Matrix, Matrix]] = field(default_factory=dict, repr=False)
+    """Slopes of whole columns that are asked for again and again, by the identity of the columns, which are kept."""
 
     @property
     def cuts(self) -> Index:
@@ -82,6 +84,14 @@ class Grid:
                 rates[start:stop] = np.gradient(values[start:stop], self.time[start:stop], axis=0, edge_order=order)
         return rates
 
+    def _slopes_of(self, multipliers: Matrix) -> Matrix:
+        """The slopes of the run's multipliers, made once however often states between the rows are asked for."""
+        kept = self._slopes.get(id(multipliers))
+        if kept is None:
+            self._slopes.clear()
+            kept = self._slopes[id(multipliers)] = multipliers, self.slopes(multipliers)
+        return kept[1]
+
     def between(
         self, rows: Rows, places: Places, q_rate: Matrix, smooth: bool = False, charts: Charts | None = None
     ) -> Rows:
@@ -107,7 +117,7 @@ class Grid:
         else:
             z, change = hermite(places, *states), hermite_rate(places, *states)
             q, v, a = places.blend(rows.q, q_rate), hermite(places, *ends), hermite_rate(places, *ends)
-        lam = places.blend(rows.lam, self.slopes(rows.lam))
+        lam = places.blend(rows.lam, self._slopes_of(rows.lam))
         return replace(rows.part(low), time=places.time, q=q, v=v, z=z, a=a, s=change, lam=lam)
 
     def rougher(self, rows: Rows, places: Places, found: Rows, plain: bool, smooth: bool) -> Rows:

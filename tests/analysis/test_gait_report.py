@@ -217,7 +217,24 @@ def test_the_largest_value_is_found_between_samples_and_at_jumps(seed):
 
     dense = np.concatenate([np.linspace(0.0, 1.0, 400_001), place + width * np.linspace(-0.1, 0.1, 40_001)])
     expected = max(values(dense, "after").max(), values(breaks, "after").max(), values(breaks, "before").max())
-    assert largest(values, 0.0, 1.0, breaks) == pytest.approx(expected, rel=1e-7)
+    assert largest(values, [(0.0, 1.0)], breaks) == [pytest.approx(expected, rel=1e-7)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_intervals_asked_for_together_have_the_maxima_that_each_has_alone(seed):
+    rng = np.random.default_rng(seed)
+    breaks = np.sort(rng.uniform(0.0, 3.0, 5))
+    intervals = [tuple(np.sort(rng.uniform(0.0, 3.0, 2))) for _ in range(4)]
+    calls = []
+
+    def values(times, at):
+        calls.append(len(times))
+        return np.searchsorted(breaks, times, side="right" if at == "after" else "left") % 3 + np.sin(7.0 * times)
+
+    together, asked = largest(values, intervals, breaks), len(calls)
+    assert together == [largest(values, [one], breaks)[0] for one in intervals]
+    assert asked == len(calls) - len(intervals) * asked == 10  # twice at first and in each of four refinements
+    assert largest(values, [], breaks) == []
 
 
 def test_a_peak_is_that_of_the_run_at_all_times():

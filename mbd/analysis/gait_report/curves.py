@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbd.analysis.gait_report.moments import Moments
-from mbd.analysis.gait_report.strides import Side, Stride, base_name, of_side
+from mbd.analysis.gait_report.strides import Side, base_name, of_side
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
@@ -58,7 +58,7 @@ def curves_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> lis
     scale = 1.0 if mass is None else 1.0 / mass
     found = []
     for side in sides:
-        samples = [_sampled(run, side, stride, angles[side.name], moments) for stride in side.strides]
+        samples = _sampled(run, side, angles[side.name], moments)
         for angle in angles[side.name]:
             name, subject = angle.name, angle.subject
             found.append(_curve(samples, side, subject, "angle", "°", f"{name}", np.rad2deg(1.0)))
@@ -114,12 +114,11 @@ def _as_in_the_clinic(run: Trajectory, angle: _Angle) -> _Angle:
     return angle._replace(shown=-1.0) if bends else angle
 
 
-def _sampled(
-    run: Trajectory, side: Side, stride: Stride, angles: Sequence[_Angle], moments: Moments
-) -> dict[str, Vector]:
-    """What the curves of a side are made of, over one stride."""
-    times = stride.begin + PERCENT / 100.0 * stride.duration
-    times[-1] = stride.end - 1e-9 * stride.duration  # before the strike that ends it
+def _sampled(run: Trajectory, side: Side, angles: Sequence[_Angle], moments: Moments) -> list[dict[str, Vector]]:
+    """What the curves of a side are made of, over each of its strides."""
+    # every stride ends just before the strike that ends it
+    shares = np.append(PERCENT[:-1] / 100.0, 1.0 - 1e-9)
+    times = np.concatenate([stride.begin + shares * stride.duration for stride in side.strides])
     named = run.at(times)
     found = {angle.name: angle.shown * np.asarray(named[angle.name]) for angle in angles}
     known = moments.at(run, times)
@@ -127,7 +126,9 @@ def _sampled(
         if angle.coordinate in known:
             found[f"{angle.name} moment"] = angle.shown * angle.sign * known[angle.coordinate]
             found[f"{angle.name} power"] = known[angle.coordinate] * np.asarray(named[f"{angle.coordinate}.rate"])
-    return found | forces_at(run, side, times)
+    found |= forces_at(run, side, times)
+    columns = {name: np.split(values, len(side.strides)) for name, values in found.items()}
+    return [{name: column[k] for name, column in columns.items()} for k in range(len(side.strides))]
 
 
 def grips_of(run: Trajectory, side: Side) -> list[str]:

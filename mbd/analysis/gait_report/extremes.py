@@ -16,35 +16,48 @@ FEWEST = 9
 """Samples of a part between two events at least, and of each refinement [-]."""
 
 
-def largest(values: Callable[[Vector, OneSide], Vector], begin: float, end: float, breaks: Sequence[float]) -> float:
-    """The maximum of a function that is smooth between `breaks`, at which it may jump.
+def largest(
+    values: Callable[[Vector, OneSide], Vector], intervals: Sequence[tuple[float, float]], breaks: Sequence[float]
+) -> list[float]:
+    """The maximum in each interval of a function that is smooth between `breaks`, at which it may jump.
 
-    1. each part is sampled from just after its beginning to just before its end;
+    1. each part of an interval is sampled from just after its beginning to just before its end;
     2. around the largest sample of all the function is sampled again between that sample's neighbours, several times.
+
+    The samples of all intervals are asked for at once.
 
     Parameters
     ----------
     values : of the function at times [s], 'after' or 'before' what happens there
     """
-    knots = np.unique([begin, *(time for time in breaks if begin < time < end), end])
-    best = (-np.inf, knots[:2])
-    for first, last in pairwise(knots):
-        # samples of the whole interval among which the largest is looked for first
-        count = max(FEWEST, int(np.ceil(1001 * (last - first) / (end - begin))))
-        found, times = _sampled(values, first, last, count)
-        best = max(best, _around(found, times), key=lambda one: one[0])
+    parts, owners = [], []
+    for owner, (begin, end) in enumerate(intervals):
+        knots = np.unique([begin, *(time for time in breaks if begin < time < end), end])
+        for first, last in pairwise(knots):
+            # samples of the whole interval among which the largest is looked for first
+            count = max(FEWEST, int(np.ceil(1001 * (last - first) / (end - begin))))
+            parts.append(np.linspace(first, last, count))
+            owners.append(owner)
+    # of each interval the part with the largest sample
+    best: dict[int, tuple[float, Vector]] = {}
+    for owner, times, found in zip(owners, parts, _sampled(values, parts), strict=True):
+        best[owner] = max(best.get(owner, (-np.inf, times[:2])), _around(found, times), key=lambda one: one[0])
     for _ in range(4):  # each four times as finely
-        here, near = _around(*_sampled(values, float(best[1][0]), float(best[1][1]), FEWEST))
-        best = max(best[0], here), near
-    return float(best[0])
+        finer = [np.linspace(float(near[0]), float(near[1]), FEWEST) for _, near in best.values()]
+        for owner, times, found in zip(best, finer, _sampled(values, finer), strict=True):
+            here, near = _around(found, times)
+            best[owner] = max(best[owner][0], here), near
+    return [float(best[owner][0]) for owner in range(len(intervals))]
 
 
-def _sampled(
-    values: Callable[[Vector, OneSide], Vector], first: float, last: float, count: int
-) -> tuple[Vector, Vector]:
-    """The function from just after the first time to just before the last one."""
-    times = np.linspace(first, last, count)
-    return np.concatenate([values(times[:-1], "after"), values(times[-1:], "before")]), times
+def _sampled(values: Callable[[Vector, OneSide], Vector], parts: Sequence[Vector]) -> list[Vector]:
+    """The function in each part, from just after its first time to just before its last one."""
+    if not parts:
+        return []
+    inside = values(np.concatenate([times[:-1] for times in parts]), "after")
+    ends = values(np.array([times[-1] for times in parts]), "before")
+    split = np.split(inside, np.cumsum([len(times) - 1 for times in parts])[:-1])
+    return [np.append(found, end) for found, end in zip(split, ends, strict=True)]
 
 
 def _around(found: Vector, times: Vector) -> tuple[float, Vector]:

@@ -75,7 +75,11 @@ def measures_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> l
     impulses = run.impulses
     for side in sides:
         others = [each for each in sides if each is not side]
-        strides = [_of_stride(run, side, others, stride, mass, impulses) for stride in side.strides]
+        sampled = zip(_peaks(run, side), _clearances(run, side), _impulses(run, side), strict=True)
+        strides = [
+            _of_stride(run, side, others, stride, mass, impulses, own)
+            for stride, own in zip(side.strides, sampled, strict=True)
+        ]
         found[side.name] = [values for values, _ in strides]
         found_gross[side.name] = float(np.mean([gross for _, gross in strides]))
     measures = []
@@ -90,9 +94,13 @@ def measures_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> l
 
 
 def _of_stride(
-    run: Trajectory, side: Side, others: Sequence[Side], stride: Stride, mass: float | None, impulses: Sequence[Impulse]
-) -> tuple[Values, float]:
-    """The numbers of a stride, and what its forward impulse comes to without signs."""
+    run: Trajectory, side: Side, others: Sequence[Side], stride: Stride, mass: float | None,
+    impulses: Sequence[Impulse], sampled: tuple[float, float, NDArray[np.float64]],
+) -> tuple[Values, float]:  # fmt: skip
+    """The numbers of a stride, and what its forward impulse comes to without signs.
+
+    sampled : its largest normal force [N], the clearance of its swing [m] and what its forces come to [N s]
+    """
     period, (step_time, step_length) = stride.duration, stride.step
     stance = (stride.off - stride.begin) / period * 100.0
     together = [
@@ -101,16 +109,11 @@ def _of_stride(
         for other in others
         for c, d in _within(other, stride)
     ]
-    events = [event.time for event in run.events]
-    peak = largest(
-        lambda times, at: forces_at(run, side, times, at)["normal force"],
-        stride.begin, stride.end, events,
-    )  # fmt: skip
+    peak, clearance, (normal, forward, gross) = sampled
     if stride.begin > run.time[0]:
         struck, impacts = _impacts(run, side, stride, impulses)
     else:  # of a foot that stands at the start the strike is not known
         struck, impacts = float("nan"), np.full(2, np.nan)
-    normal, forward, gross = _impulse(run, side, stride)
     normal, forward = normal + impacts[0], forward + impacts[1]
     gross += abs(impacts[1]) if np.isfinite(impacts[1]) else 0.0
     per, scale = ("", 1.0) if mass is None else ("/kg", 1.0 / mass)
@@ -124,7 +127,7 @@ def _of_stride(
         ("stance", "%"): stance,
         ("swing", "%"): 100.0 - stance,
         ("double support", "%"): sum(together) / period * 100.0,
-        ("clearance", "mm"): 1e3 * _clearance(run, side, stride),
+        ("clearance", "mm"): 1e3 * clearance,
         ("normal impulse", f"N s{per}"): scale * normal,
         ("forward impulse", f"N s{per}"): scale * forward,
         ("strike impulse", f"N s{per}"): scale * struck,
@@ -148,20 +151,24 @@ def _impacts(
     return struck, np.array([sum(one.impulse for one in normal), forward])
 
 
-def _impulse(run: Trajectory, side: Side, stride: Stride) -> NDArray[np.float64]:
-    """∫ of the normal force, of the forward force and of its size (3,) [N s], without impacts.
+def _impulses(run: Trajectory, side: Side) -> list[NDArray[np.float64]]:
+    """∫ of the normal force, of the forward force and of its size over each stride (3,) [N s], without impacts.
 
     It is taken from one event to the next, at which forces may jump.
     """
-    events = [event.time for event in run.events if stride.begin < event.time < stride.end]
-    # parts of a stride on each of which these points integrate a force, besides those that events make
-    knots = np.unique([*np.linspace(stride.begin, stride.end, 251), *events])
-    half = np.diff(knots)[:, None] / 2.0
-    times = knots[:-1, None] + half * (1.0 + POINTS)
-    forces = forces_at(run, side, times.ravel())
-    columns = [forces[name].reshape(times.shape) for name in ("normal force", "forward force")]
-    columns.append(np.abs(columns[1]))
-    return np.array([float(np.sum(half * WEIGHTS * force)) for force in columns])
+    times, weights = [], []
+    for stride in side.strides:
+        events = [event.time for event in run.events if stride.begin < event.time < stride.end]
+        # parts of a stride on each of which these points integrate a force, besides those that events make
+        knots = np.unique([*np.linspace(stride.begin, stride.end, 251), *events])
+        half = np.diff(knots)[:, None] / 2.0
+        times.append((knots[:-1, None] + half * (1.0 + POINTS)).ravel())
+        weights.append((half * WEIGHTS).ravel())
+    forces = forces_at(run, side, np.concatenate(times))
+    normal, forward = forces["normal force"], forces["forward force"]
+    ends = np.cumsum([len(own) for own in times])[:-1]
+    parts = zip(weights, *(np.split(column, ends) for column in (normal, forward, np.abs(forward))), strict=True)
+    return [np.array([np.sum(weight * force) for force in columns]) for weight, *columns in parts]
 
 
 def _within(side: Side, stride: Stride) -> list[tuple[float, float]]:
@@ -170,17 +177,24 @@ def _within(side: Side, stride: Stride) -> list[tuple[float, float]]:
     return [(a, b) for a, b in cut if b > a]
 
 
-def _clearance(run: Trajectory, side: Side, stride: Stride) -> float:
-    """The smallest gap of the foot in the middle of swing [m]; NaN without a swing."""
-    if not np.isfinite(stride.off):
-        return float("nan")
-    begin, end = (stride.off + share * (stride.end - stride.off) for share in MIDDLE)
+def _peaks(run: Trajectory, side: Side) -> list[float]:
+    """The largest normal force of each stride [N]."""
+    strides = [(stride.begin, stride.end) for stride in side.strides]
+    events = [event.time for event in run.events]
+    return largest(lambda times, at: forces_at(run, side, times, at)["normal force"], strides, events)
+
+
+def _clearances(run: Trajectory, side: Side) -> list[float]:
+    """The smallest gap of the foot in the middle of the swing of each stride [m]; NaN without a swing."""
 
     def sunk(times: Vector, at: OneSide) -> Vector:
         named = run.at(times, side=at)
         return np.asarray(-np.min([named[f"{name}.gap"] for name in side.contacts], axis=0))
 
-    return -largest(sunk, begin, end, [event.time for event in run.events])
+    swings = {stride.begin: (stride.off, stride.end) for stride in side.strides if np.isfinite(stride.off)}
+    middles = [(off + MIDDLE[0] * (end - off), off + MIDDLE[1] * (end - off)) for off, end in swings.values()]
+    found = dict(zip(swings, largest(sunk, middles, [event.time for event in run.events]), strict=True))
+    return [-found[stride.begin] if stride.begin in found else float("nan") for stride in side.strides]
 
 
 def energy_of(run: Trajectory, sides: Sequence[Side]) -> list[Spent]:
