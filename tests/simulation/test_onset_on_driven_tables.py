@@ -65,3 +65,44 @@ def test_a_block_slips_where_its_limit_is_reached(seed):
         slips = [event.time for event in run.events if event.kind == "slipped" and event.time > EARLIEST]
         assert slips, scheme
         assert abs(slips[0] - onset) <= 1e-9, scheme
+
+
+def shaken(seed):
+    """A block on a table that swings to and fro and up and down, ever faster, so that both sides of |T| ≤ μ p change.
+
+    Returns the model, ``|ẍ| − μ (g + ÿ)`` over time, and an instant before which the block sticks [s].
+    """
+    rng = np.random.default_rng(seed)
+    model = mbd.Model("table")
+    table, block = mbd.PointMass("table", 3.0), mbd.PointMass("block", rng.uniform(0.5, 2.0))
+    flight = mbd.Translation("flight", model.ground.origin, block.origin, axes="xyz" if seed % 2 else "xy")
+    model.connect(mbd.Translation("rail", model.ground.origin, table.origin), flight)
+    t = 0.02 * np.arange(42)
+    excess = []
+    for name, rate, least, most in ("x", rng.uniform(4.0, 8.0), 0.1, 0.3), ("y", rng.uniform(8.0, 16.0), 0.05, 0.2):
+        values = rng.uniform(least, most) * t**2 * np.sin(rate * t)
+        excess.append(CubicSpline(t, values, bc_type="clamped").derivative(2))
+        drive = mbd.Samples(t, values, kind="spline", ends="clamped")
+        model.constrain(mbd.Bilateral(f"drive {name}", mbd.measure(lambda s: s, f"rail.{name}"), value=drive))
+    fine = np.linspace(0.0, t[-1], 20001)
+    needed = np.abs(excess[0](fine)) / (9.81 + excess[1](fine))
+    late = np.flatnonzero((needed > 1.02 * np.max(needed[fine < 0.5])) | (9.81 + excess[1](fine) < 1.0))[0]
+    mu = needed[late]
+    touch = mbd.touchdown(block.origin, mbd.Plane((0.0, 1.0, 0.0), 0.0, frame=table.origin))
+    model.constrain(mbd.Unilateral("foot", touch, friction=mu))
+    return model, lambda s: np.abs(excess[0](s)) - mu * (9.81 + excess[1](s)), fine[late - 1]
+
+
+@pytest.mark.parametrize("seed", [16, 20, 30])
+def test_a_block_slips_where_its_limit_comes_down_to_what_holds_it(seed):
+    """Forces change by more than themselves in a step: multipliers of such a step lag by several times their change."""
+    model, excess, sticks = shaken(seed)
+    fine = np.linspace(sticks - 1e-3, 0.82, 4001)
+    k = int(np.flatnonzero(excess(fine) > 0.0)[0])
+    onset = brentq(excess, fine[k - 1], fine[k], xtol=1e-14)
+    dt = (onset + seed % 3 * 1.5e-4 + 1e-4) / int(onset / 0.0104)
+    start = mbd.assemble(model, {}, project=True)
+    for scheme in SCHEMES[:6]:
+        run = mbd.simulate(model, start, scheme, dt=dt, until=min(0.82, onset + 2.0 * dt))
+        slips = [event.time for event in run.events if event.kind == "slipped"]
+        assert slips and abs(slips[0] - onset) <= 1e-9, scheme
