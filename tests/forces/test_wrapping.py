@@ -116,6 +116,42 @@ def test_two_surfaces_share_the_tangent_between_them():
     assert length(P, (3.0, 0.5, 0.1), first, below) == pytest.approx(length(P, (3.0, 0.5, 0.1), first), abs=1e-15)
 
 
+def test_two_spheres_share_a_path_that_leaves_every_plane():
+    """The least of |PA| + arc AB + |BC| + arc CD + |DS|; its slope by P is (P − A)/|PA|."""
+    P, S, middles, radii = (
+        (-0.09, -0.04, -0.01),
+        (0.2, 0.02, 0.0),
+        ((0.02, -0.01, -0.01), (0.08, -0.01, 0.01)),
+        (0.04, 0.03),
+    )
+    ground, c, r = mbd.Model("m").ground, np.array(middles), radii
+    spheres = [mbd.WrappingSphere(ground.point(*middle), radius) for middle, radius in zip(middles, radii, strict=True)]
+
+    def places(x):
+        u = x.reshape(4, 3) / np.linalg.norm(x.reshape(4, 3), axis=1)[:, None]
+        return u, np.array([c[k // 2] + r[k // 2] * u[k] for k in range(4)])
+
+    def whole(x):
+        u, (A, B, C, D) = places(x)
+        arcs = sum(
+            r[k] * math.atan2(np.linalg.norm(np.cross(u[2 * k], u[2 * k + 1])), u[2 * k] @ u[2 * k + 1]) for k in (0, 1)
+        )
+        return 10.0 * (math.dist(P, A) + math.dist(B, C) + math.dist(D, S) + arcs)
+
+    def outside(x):
+        u, (A, B, C, D) = places(x)
+        return [(P - A) @ u[0], (C - B) @ u[1], (B - C) @ u[2], (S - D) @ u[3]]
+
+    guess = np.array([[0.0, -1.0, 0.0], [0.3, -1.0, 0.0], [0.2, -0.7, -0.7], [0.3, -0.7, -0.7]])
+    limits = {"type": "ineq", "fun": outside}
+    best = minimize(whole, np.ravel(guess), constraints=limits, options={"ftol": 1e-16, "maxiter": 500})
+    assert min(outside(best.x)) > 0.0
+    assert length(P, S, *spheres) == pytest.approx(best.fun / 10.0, abs=1e-9)
+    A = places(best.x)[1][0]
+    slope = [(length(P + h, S, *spheres) - length(P - h, S, *spheres)) / 2e-6 for h in 1e-6 * np.eye(3)]
+    np.testing.assert_allclose(slope, (P - A) / math.dist(P, A), atol=1e-5)
+
+
 @pytest.mark.parametrize("kind", ["sphere", "cylinder"])
 def test_length_and_slope_are_continuous_where_the_path_lifts_off(kind):
     ground, r = mbd.Model("m").ground, 0.3
