@@ -63,6 +63,16 @@ def test_redundant_pins_share_their_force_with_least_norm_and_a_note():
     assert "redundant" in note and "pin 2" in note and "least norm" in note
 
 
+def test_a_law_that_reads_a_force_which_redundant_rows_share_is_told():
+    """The motion then follows how they share it; a law that reads a force which is determined leaves it unique."""
+    for reads, told in (("pin 2.reaction_force.y", "the motion under 'drive', which reads it"), ("base 0.rate", "")):
+        model, start = parallel_cranks()
+        model.apply(mbd.Motor("drive", model.joints[0], lambda value: 0.01 * value, arguments=[reads]))
+        run = mbd.simulate(model, start, mbd.RungeKutta4(), dt=2e-2, until=0.2, backend="python")
+        (note,) = run.stats["notes"]
+        assert told in note and ("motion is unique" in note) == (not told)
+
+
 @pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 1, 0, 2)])
 def test_a_table_on_four_legs_rests_on_equal_forces_in_any_order(order, scheme):

@@ -13,17 +13,19 @@ determinants must be positive.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.equations.programs import law_forces
 from mbd.tape.derivatives import live
+from mbd.tape.node import Node
 
 if TYPE_CHECKING:
     from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["NEARLY", "circular_laws"]
+__all__ = ["NEARLY", "circular_laws", "multipliers_in"]
 
 LEFT = 0.01
 """Part of the determinant without the law below which it counts as zero [-]."""
@@ -56,7 +58,7 @@ def circular_laws(stepper: Stepper, least: float = LEFT) -> str:
     ratio = sign * other * np.exp(min(changed - size, 50.0)) if sign != 0.0 and np.isfinite(size) else 1.0
     if ratio >= least:
         return ""
-    names = [effect.name for effect in equations.effects if _reads(effect.generalized())]
+    names = [effect.name for effect in equations.effects if multipliers_in(effect.generalized())]
     s = "s" * (len(names) == 1)
     end = ", so that no force or several satisfy both" if ratio < LEFT else ", and by more as the loop gain comes to 1"
     return (
@@ -66,6 +68,6 @@ def circular_laws(stepper: Stepper, least: float = LEFT) -> str:
     )
 
 
-def _reads(forces: object) -> bool:
-    """Whether generalized forces depend on multipliers."""
-    return any(node.op == "input" and node.data[0] == "lam" for node in live(list(forces)))  # type: ignore[call-overload]
+def multipliers_in(forces: Iterable[Node]) -> set[int]:
+    """Numbers of the rows whose multipliers generalized forces depend on."""
+    return {int(node.data[1]) for node in live(list(forces)) if node.op == "input" and node.data[0] == "lam"}

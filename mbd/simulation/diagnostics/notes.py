@@ -19,7 +19,7 @@ from mbd.simulation.diagnostics.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.diagnostics.half_turns import half_turns
 from mbd.simulation.diagnostics.idle_modes import idle_modes
 from mbd.simulation.diagnostics.impact_step import dt_of_impacts
-from mbd.simulation.diagnostics.redundant import redundancy
+from mbd.simulation.diagnostics.redundant import readers_of, redundancy
 from mbd.simulation.diagnostics.singular import singular_start
 from mbd.simulation.diagnostics.stiff import bounded_by_stability
 from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
@@ -108,7 +108,8 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
     slid = loaded and any(code.given_rows for code in run.stepper.modes)
     moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))
-    dependent = redundancy(equations.rows, run.stepper.dependent, slid, moved, _left_singular(run))
+    readers = readers_of(equations, run.stepper.dependent)
+    dependent = redundancy(equations.rows, run.stepper.dependent, slid, moved, _left_singular(run), readers)
     notes += [dependent] if dependent else singular_start(run)
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:

@@ -8,18 +8,20 @@ import numpy as np
 
 from mbd.assembly.conflicts import Member, linear_conflict
 from mbd.assembly.dependence import Dependence, dependences
-from mbd.equations.equations import Row
+from mbd.equations.equations import Equations, Row
 from mbd.kernel.records import Kernel
+from mbd.simulation.diagnostics.circular import multipliers_in
 
-__all__ = ["clash", "redundancy"]
+__all__ = ["clash", "readers_of", "redundancy"]
 
 MOST_TOLD = 8
 """Redundant rows that a note tells one by one."""
 
 
 def redundancy(
-    rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], slid: bool, moved: bool = True, passed: bool = False
-) -> str:
+    rows: Sequence[Row], dependent: Mapping[int, tuple[int, ...]], slid: bool, moved: bool = True,
+    passed: bool = False, readers: Sequence[str] = (),
+) -> str:  # fmt: skip
     """The note on rows that left the solve; '' if none did.
 
     Parameters
@@ -29,6 +31,7 @@ def redundancy(
     slid : whether friction that follows multipliers has slid beside them
     moved : whether the run went far enough to tell a singular configuration from rows that depend on others anywhere
     passed : whether rows that depended on each other do so no longer, all of them acting: a singular configuration
+    readers : names of laws that read multipliers of such rows, from `readers_of`
     """
     if not dependent:
         return ""
@@ -44,12 +47,23 @@ def redundancy(
         else "they did so in a singular configuration only, where branches of motions cross: the motion from there is "
         "not unique; start beside it"
         if passed
+        else f"how they share a load is not determined, nor is the motion under {', '.join(map(repr, readers))}, which "
+        "reads it: give the mechanism fewer rows, or read what they hold together"
+        if readers
         else "the motion is unique, their multipliers are not: those of least norm are given"
         if moved
         else "their multipliers are not unique; nor is the motion, if this is a singular configuration, where branches "
         "of motions cross: start beside it"
     )
     return f"redundant constraints: {len(texts)} ({'; '.join(texts[:MOST_TOLD] + more)}); {what}"
+
+
+def readers_of(equations: Equations, dependent: Mapping[int, tuple[int, ...]]) -> list[str]:
+    """Names of the laws that read multipliers of rows that depend on each other; a sum of them may be determined."""
+    if not dependent or not equations.held_forces:
+        return []
+    shared = {row for group in dependent.items() for row in (group[0], *group[1])}
+    return [effect.name for effect in equations.effects if shared & multipliers_in(effect.generalized())]
 
 
 def clash(rows: Sequence[Row], K: Kernel) -> str:
