@@ -125,7 +125,7 @@ def _unknown(model: Description, name: str, known: Iterable[str]) -> str:
             f"{name!r} is a result of the motion, on which its laws cannot depend, but for the forces of constraints, "
             "contacts and joints, such as 'foot.force'; let a mbd.Controller read it"
         )
-    return nearest(name, known, "quantity")
+    return nearest(name, known, "quantity", beside=names_of_held_forces(model))
 
 
 AGAIN = "; where the cell of a notebook was run twice, let it begin with model = mbd.Model(…)"

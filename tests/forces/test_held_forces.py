@@ -200,7 +200,7 @@ WRONG = {
         "'mode' stores 'n'",
     ),
     "a row": (mbd.Bilateral("tie", mbd.measure(lambda n, q: n - q, "foot.force", "hinge.angle")), "'tie' reads"),
-    "a name": (mbd.Bilateral("tie", mbd.measure(lambda n: n, "foot.forse")), "no quantity named 'foot.forse'"),
+    "a name": (mbd.Bilateral("tie", mbd.measure(lambda n: n, "foot.forse")), "did you mean 'foot.force'"),
 }  # fmt: skip
 
 
