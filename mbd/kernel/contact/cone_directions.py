@@ -1,4 +1,4 @@
-"""Which way frictions in a plane or in space slide where the solution itself tells: as sliding begins, and in impacts.
+"""Directions in which frictions in a plane or in space slide, as sliding begins and in impacts: parts of the solution.
 
 λ_T = limit e with ‖e‖ = 1, and e is the direction of the velocity (or acceleration) γ that comes of it. Each e is
 projected, ``e ← (limit e + ρ γ)/‖…‖`` with ρ the mass that the point has (Alart & Curnier 1991), until Newton's method
@@ -14,7 +14,7 @@ from mbd.kernel.contact.branches import is_on, solve_directed
 from mbd.kernel.contact.cones import aim, aim_along, leads_group
 from mbd.kernel.records import Balance, ContactForces, ContactRows
 
-__all__ = ["MOST_MEMBERS", "fill_tangents", "misses", "turn_directions"]
+__all__ = ["MAX_GROUP_SIZE", "fill_tangents", "misses", "turn_directions"]
 
 EXACT = 1e-14
 """γ × e over its terms that is round-off [-]."""
@@ -22,8 +22,8 @@ SMALL_TURN = 1e-6
 """Angle by whose effect slopes are measured [rad]."""
 LARGEST_TURN = 0.5
 """Most that a step of Newton's method turns [rad]."""
-MOST_MEMBERS = 3
-"""Directions of a group of frictions that slide together, at most [-]."""
+MAX_GROUP_SIZE = 3
+"""Frictions that slide together, at most: those of a ball joint [-]."""
 
 
 def gained(K: ContactForces, row: int) -> float:
@@ -69,8 +69,8 @@ def fill_tangents(K: ContactForces, f: int, i: int) -> int:
             largest = k
     sign = 1.0 if K.slip[f + largest] > 0.0 else -1.0
     if m == 2:
-        K.cone_across[MOST_MEMBERS * i] = -K.slip[f + 1]
-        K.cone_across[MOST_MEMBERS * i + 1] = K.slip[f]
+        K.cone_across[MAX_GROUP_SIZE * i] = -K.slip[f + 1]
+        K.cone_across[MAX_GROUP_SIZE * i + 1] = K.slip[f]
         K.cone_who[i] = f
         return i + 1
     for k in range(m):
@@ -79,7 +79,7 @@ def fill_tangents(K: ContactForces, f: int, i: int) -> int:
         part = K.slip[f + k] / (1.0 + abs(K.slip[f + largest]))
         for j in range(m):
             beside = K.slip[f + j] + (sign if j == largest else 0.0)
-            K.cone_across[MOST_MEMBERS * i + j] = (1.0 if j == k else 0.0) - part * beside
+            K.cone_across[MAX_GROUP_SIZE * i + j] = (1.0 if j == k else 0.0) - part * beside
         K.cone_who[i] = f
         i += 1
     return i
@@ -101,8 +101,8 @@ def find_misses(K: ContactForces, count: int) -> float:
             value = gained(K, K.friction_row[f + k])
             size = max(size, terms(K, K.friction_row[f + k]))
             forward += K.slip[f + k] * value
-            leaned += K.slip[f + k] * K.cone_across[MOST_MEMBERS * i + k]
-            miss += K.cone_across[MOST_MEMBERS * i + k] * value
+            leaned += K.slip[f + k] * K.cone_across[MAX_GROUP_SIZE * i + k]
+            miss += K.cone_across[MAX_GROUP_SIZE * i + k] * value
         K.cone_miss[i] = miss - leaned * forward
         worst = max(worst, abs(K.cone_miss[i]) / (size + 1e-300))
         if forward < -EXACT * size:
@@ -140,7 +140,7 @@ def turn_by(K: ContactForces, i: int, angle: float) -> None:
     """Turn a direction across itself, by unknown i; to second order, for small angles exactly enough."""
     f = K.cone_who[i]
     for k in range(K.group_size[f]):
-        K.slip[f + k] += angle * K.cone_across[MOST_MEMBERS * i + k]
+        K.slip[f + k] += angle * K.cone_across[MAX_GROUP_SIZE * i + k]
     aim(K, f)
 
 

@@ -35,7 +35,7 @@ from mbd.kernel.records import Frictions, Guards, Kernel, Switching
 from mbd.kernel.stepping.trial_step import try_step, turns
 
 __all__ = [
-    "LONGER", "SHORTER", "TURNS_AWAY", "across", "approached_end", "come_to_zero", "keeps_direction", "shorter_turn",
+    "LONGER", "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "keeps_direction", "shorter_turn",
     "slides_at_first", "slides_on", "slides_until_event",
 ]  # fmt: skip
 

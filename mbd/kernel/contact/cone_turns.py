@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
-from mbd.kernel.contact.cone_directions import MOST_MEMBERS, fill_tangents
+from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents
 from mbd.kernel.contact.cones import HELD, leads_group, product_of, speed_of
 from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.records import Balance, ContactForces, Switching
@@ -76,5 +76,5 @@ def row_along(K: ContactForces, f: int, i: int, column: int) -> float:
     value = 0.0
     for g in range(K.group_size[f]):
         row = K.friction_row[f + g]
-        value += K.cone_across[MOST_MEMBERS * i + g] * K.acc[K.acc_B + row * K.n + column]
+        value += K.cone_across[MAX_GROUP_SIZE * i + g] * K.acc[K.acc_B + row * K.n + column]
     return value

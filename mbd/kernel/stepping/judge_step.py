@@ -59,7 +59,7 @@ def has_spurious_reaction(K: Mechanism) -> bool:
 
 
 def clear_rejected_events(K: Guards) -> None:
-    """No guard has been found to be no event yet, but for events that the step passes."""
+    """Clear the flags of rejected guards; events that the step passes stay rejected."""
     K.active[: K.n_contacts + K.n_guards + K.n_frictions] = 0
     for e in range(K.n_guards):
         K.active[K.flag_user + e] = 1 if K.crossed[e] >= 0.0 else 0

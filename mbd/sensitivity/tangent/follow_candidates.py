@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, STICK
-from mbd.kernel.contact.cone_directions import MOST_MEMBERS, fill_tangents
+from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents
 from mbd.kernel.contact.cone_steps import keeps_direction
 from mbd.kernel.events.guards import guard_value, watch
 from mbd.kernel.events.transitions import is_due
@@ -167,7 +167,7 @@ def triple_product(
 def turn(K: Kernel, f: int, i: int, angle: float) -> None:
     """Turn the direction in which the group of friction f slides, across itself along tangent i."""
     for k in range(K.group_size[f]):
-        K.slip[f + k] += angle * without_tangent(K.cone_across[MOST_MEMBERS * i + k])
+        K.slip[f + k] += angle * without_tangent(K.cone_across[MAX_GROUP_SIZE * i + k])
 
 
 def candidate_after(K: Kernel, h: float) -> int:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["idle_modes"]
 
-MOST_ROWS = 400
-"""Rows at which what a transition waits for is evaluated [-]."""
+MAX_ROWS = 400
+"""Rows at which what a transition waits for is evaluated, at most [-]."""
 
 
 def idle_modes(run: RunData, record: Record, columns: ModelColumns) -> list[str]:
@@ -46,7 +46,7 @@ def idle_modes(run: RunData, record: Record, columns: ModelColumns) -> list[str]
 
 def _value(columns: ModelColumns, guard: Guard, record: Record) -> tuple[np.ndarray, np.ndarray]:
     """Some rows of the run, the last one among them, and the value of a guard at these."""
-    rows = np.unique(np.linspace(0, len(record.time) - 1, min(MOST_ROWS, len(record.time))).astype(int))
+    rows = np.unique(np.linspace(0, len(record.time) - 1, min(MAX_ROWS, len(record.time))).astype(int))
     (found,) = columns.evaluate([guard.value], columns.part(rows, [guard.value]))
     return rows, np.broadcast_to(np.asarray(found, dtype=float), rows.shape)
 
