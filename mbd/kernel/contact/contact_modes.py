@@ -86,12 +86,7 @@ def resolve_contact_modes(K: Switching) -> int:
         if K.kind[c] == 0:
             if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
                 K.free[c] = 1
-    status = complementarity(K, 0)
-    if status == NO_IMPACT or status == 0:
-        painleve_contacts = find_painleve_contacts(K)
-        if painleve_contacts >= 0:
-            K.failure_index = painleve_contacts
-            return NO_FORCE
+    status = find_branches(K)
     if status != 0:
         return status
     take_consistent(K)
@@ -123,6 +118,36 @@ def resolve_contact_modes(K: Switching) -> int:
                 log_event(K, LOG_SLIPPED, f, 0.0, NO_IMPULSE)
         K.was[f] = now
     return 0
+
+
+def find_branches(K: Balance) -> int:
+    """`complementarity` at the acceleration level, without slides whose normal force is unstable; a status.
+
+    From rest in a plane such a slide is consistent only where sticking is: with ``(g̈, w) = w₀ + G (p, T)`` along the
+    pull, ``w dg̈/dp = det G (μ p − |T|)`` of the sticking p and T. Both end at the limit ``|T| = μ p``, where the
+    contact parts with ``g̈ = −p dg̈/dp``, the one motion left. In space the pull may turn as sliding begins.
+    """
+    status = complementarity(K, 0)
+    parted = 0
+    while status == 0 or status == NO_IMPACT:
+        c = find_painleve_contacts(K)
+        if c < 0:
+            break
+        if K.free[c] == 0 or K.active[c] == 0 or parted == K.n_contacts or not slides_from_rest(K, c):
+            K.failure_index = c
+            return NO_FORCE
+        K.active[c] = 0
+        parted += 1
+        status = complementarity(K, 0)
+    return int(status)
+
+
+def slides_from_rest(K: Frictions, c: int) -> bool:
+    """Whether a contact that slides has no velocity along its friction."""
+    found = False
+    for f in range(K.n_frictions):
+        found = found or (K.friction_contact[f] == c and K.loose[f] > 0)
+    return found
 
 
 def frictional_state(K: Frictions, f: int) -> int:
@@ -234,14 +259,19 @@ def find_painleve_contacts(K: Balance) -> int:
 
 
 def take_turns(K: Balance) -> int:
-    """K.turn of each contact that slides, −1 of others: its number among those of its island; how many turns."""
+    """K.turn of each contact that slides, −1 of others: its number among those of its island; how many turns.
+
+    Contacts that slide from rest are tested as far as their branches go: in a plane, and where they are closed.
+    """
     turns = 0
     for c in range(K.n_contacts):
         K.turn[c] = -1
         K.cone_flags[c] = K.active[c]
     for f in range(K.n_frictions):
         c = K.friction_contact[f]
-        if c >= 0 and K.sticks[f] == 0 and K.slip[f] != 0.0 and K.loose[f] == 0 and K.closed[c] == 1:
+        if c < 0 or K.sticks[f] == 1 or K.slip[f] == 0.0:
+            continue
+        if K.closed[c] == 1 if K.loose[f] == 0 else (K.active[c] == 1 and K.group_size[f] == 1):
             K.turn[c] = 0
             K.active[c] = 1
             turns = 1

@@ -19,6 +19,7 @@ from mbd.integrators.base import Point
 from mbd.kernel import codes
 from mbd.results.record import EventRecord
 from mbd.simulation.diagnostics.grip import lost_grip
+from mbd.simulation.diagnostics.painleve import consistent_forces
 from mbd.simulation.diagnostics.redundant import clash
 from mbd.simulation.diagnostics.residuals import residuals_of
 from mbd.simulation.diagnostics.round_off import Remainder, remainder
@@ -127,6 +128,11 @@ class Words:
     def grip(self) -> str:
         """What has lost its grip, '' if nothing has."""
         return lost_grip(self.stepper, self.events)
+
+    @cached_property
+    def consistent_forces(self) -> tuple[str, str]:
+        """How many forces the sliding contact that failed may have, and a clause with the numbers."""
+        return consistent_forces(self.stepper, int(self.v.failure_index))
 
     @property
     def switches(self) -> str:
@@ -395,8 +401,8 @@ CAUSES = (
     ),
     Cause(
         (codes.NO_FORCE,),
-        "Painlevé: no consistent contact force at {x.contact!r}, which slides with friction so that a push makes it "
-        "approach{x.closed}",
+        "Painlevé: {x.consistent_forces[0]} at {x.contact!r}, which slides with friction so that a push makes it "
+        "approach{x.closed}{x.consistent_forces[1]}",
         "rigid bodies with Coulomb friction have no motion there: lower the friction coefficient, or make the contact "
         "compliant with mbd.Penalty",
     ),

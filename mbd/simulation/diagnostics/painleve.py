@@ -1,0 +1,46 @@
+"""What each motion of a contact that slides in Painlevé's paradox would need, in numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mbd.simulation.run.stepper import Stepper
+
+__all__ = ["consistent_forces"]
+
+NONE, SEVERAL = "no consistent contact force", "more than one consistent contact force"
+
+
+def consistent_forces(stepper: Stepper, contact: int) -> tuple[str, str]:
+    """How many forces a sliding contact may have at the accepted state, and a clause on them, '' if it is not known.
+
+    Its gap accelerates by ``g̈ = g̈₀ + p dg̈/dp`` under its push p, with the friction that follows p, where the contacts
+    that are closed and the frictions that stick go on as they are. Sliding needs ``g̈ = 0`` with ``p ≥ 0``, opening
+    ``g̈₀ ≥ 0``. With ``dg̈/dp < 0`` neither is possible if ``g̈₀ < 0`` and both are if ``g̈₀ > 0`` (Painlevé 1895).
+    """
+    v, mechanism = stepper.kernel, stepper.mechanism
+    flags, slips = v.closed[: v.n_contacts].copy(), v.slip[: v.n_frictions].copy()
+    flags[contact] = 0
+    held = [k for k in stepper.manager.active_rows(flags, v.sticks[: v.n_frictions]) if not v.dropped[k]]
+    normal = int(v.normal[contact])
+    q, y, anchors = v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors]
+    penalties = stepper.manager.penalties(flags)
+    terms = mechanism.acceleration_terms(float(v.time), q, y, v.params, anchors, penalties, slips, v.lam[: v.n_rows])
+    n, m = v.n, len(held)
+    matrix, right = np.zeros((n + m, n + m)), np.zeros((n + m, 2))
+    matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, terms.R[:, held], terms.B[held]
+    right[:n, 0], right[n:, 0], right[:n, 1] = -terms.f, -terms.bias[held], terms.R[:, normal]
+    try:
+        free, gained = terms.B[normal] @ np.linalg.solve(matrix, right)[:n]
+    except np.linalg.LinAlgError:
+        return NONE, ""
+    free += terms.bias[normal]
+    if not (np.isfinite(free) and gained < 0.0):
+        return NONE, ""
+    each, push = f": each newton of it gives {gained:.3g} m/s² of the gap, so that ", abs(free / gained)
+    if free < 0.0:
+        return NONE, f"{each}sliding it would pull with {push:.3g} N, and open it would sink in with {-free:.3g} m/s²"
+    return SEVERAL, f"{each}it may push with {push:.3g} N or open with {free:.3g} m/s², and nothing tells which"

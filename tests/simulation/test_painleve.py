@@ -1,0 +1,104 @@
+"""A rod that stands on a foot with much friction and is drawn aside: it slides, or parts where no slide is possible.
+
+With the pushes (p, T) on the foot its acceleration is ``(w, g̈) = w₀ + G (T, p)``. Sliding towards the pull has
+``dg̈/dp = 1/m + l² sin φ (sin φ − μ cos φ)/J`` (Génot & Brogliato 1999, Eur. J. Mech. A 18:653). Where that is negative,
+sticking, sliding and parting are all consistent below the limit ``|T| = μ p``, and beyond it parting alone.
+"""
+
+import numpy as np
+import pytest
+
+import mbd
+from tests.simulation.test_dry_walkers import falling_walker
+
+G, MASS, INERTIA, HALF, LEAN, RATE = 9.81, 2.0, 0.1, 1.0, 0.5, 50.0
+S, C = np.sin(LEAN), np.cos(LEAN)
+SCHEMES = [mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA(), mbd.RungeKutta853()]
+
+
+def drawn_rod(mu, pull):
+    """A rod that leans by φ; a force `pull` at its center draws it aside, and a torque keeps it from turning."""
+    model, rod = mbd.Model("rod", gravity=(0.0, -G, 0.0)), mbd.RigidBody("rod", mass=MASS, inertia=INERTIA)
+    model.connect(mbd.Planar("place", model.ground.origin, rod.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(rod.point(-HALF * S, -HALF * C)), friction=mu))
+
+    def torque(t):
+        return 0.0, 0.0, HALF * (MASS * G * S - pull(t) * C)
+
+    model.apply(mbd.Applied("pull", rod.origin, arguments=("t",), force=lambda t: (-pull(t), 0.0, 0.0), torque=torque))
+    return model, mbd.assemble(model, position={"place.y": HALF * C}, closed="foot")
+
+
+def gain(mu):
+    """dg̈/dp of the foot that slides towards the pull [1/kg]."""
+    return 1.0 / MASS + HALF**2 * S * (S - mu * C) / INERTIA
+
+
+def gap_after(mu, time):
+    """Gap of the foot that long after it has parted at the limit of its friction [m]."""
+    spin = HALF * (MASS * G * (S - mu * C) * time**2 / 2.0 - RATE * C * time**3 / 6.0) / INERTIA
+    at = LEAN - spin  # the lean from the vertical, against the angle of the body
+    return HALF * C - G * time**2 / 2.0 - HALF * np.cos(at)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@pytest.mark.parametrize("mu", [0.3, 0.6, 0.8, 1.2])
+def test_a_foot_at_its_limit_slides_or_parts_as_its_normal_force_is_stable(mu, scheme):
+    model, start = drawn_rod(mu, lambda t: RATE * t)
+    limit = mu * MASS * G / RATE
+    run = mbd.simulate(model, start, scheme, dt=1e-3, until=limit + 0.02)
+    (event,) = run.events
+    assert event.kind == ("slipped" if gain(mu) > 0.0 else "opened")
+    assert event.time == pytest.approx(limit, rel=1e-9)
+    if gain(mu) < 0.0:
+        assert run["foot.gap"][-1] == pytest.approx(gap_after(mu, run.time[-1] - limit), rel=2e-3)
+        assert gap_after(mu, 1e-4) == pytest.approx(-MASS * G * gain(mu) * 1e-8 / 2.0, rel=1e-2)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@pytest.mark.parametrize("mu", [0.3, 0.8, 1.2])
+def test_a_foot_that_can_stick_sticks_though_it_could_slide_or_part(mu, scheme):
+    model, start = drawn_rod(mu, lambda t: 0.95 * mu * MASS * G)
+    run = mbd.simulate(model, start, scheme, dt=1e-3, until=0.05)
+    assert not run.events
+    assert np.abs(run["foot.gap"]).max() < 1e-12 and run["foot.force"][-1] == pytest.approx(MASS * G, rel=1e-9)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_a_start_beyond_the_limit_parts_where_no_slide_is_possible(scheme):
+    model, start = drawn_rod(0.8, lambda t: 0.82 * MASS * G)
+    run = mbd.simulate(model, start, scheme, dt=1e-3, until=0.01)
+    assert [(event.kind, event.time) for event in run.events] == [("opened", 0.0)]
+    assert run["foot.gap"][-1] > 0.0
+
+
+def test_a_walker_whose_foot_can_stick_no_more_parts():
+    """It slipped and stuck at 0.73226 s without end: the slide has dg̈/dp = −0.11 /kg."""
+    model, start = falling_walker(2)
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.74)
+    assert (run.events[-1].name, run.events[-1].kind) == ("foot0", "opened")
+    fine = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.74)
+    assert run.events[-1].time == pytest.approx(fine.events[-1].time, abs=1e-4)
+    assert run["foot0.gap"][-1] == pytest.approx(fine["foot0.gap"][-1], rel=0.02)
+
+
+def test_what_contradicts_each_motion_of_a_paradox_is_told_in_numbers():
+    """Without torque the rod that slides sinks in if open, ``g̈₀ = −g``, and would have to pull if closed."""
+    model, rod = mbd.Model("rod", gravity=(0.0, -G, 0.0)), mbd.RigidBody("rod", mass=MASS, inertia=INERTIA)
+    model.connect(mbd.Planar("place", model.ground.origin, rod.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(rod.point(-HALF * S, -HALF * C)), friction=1.2))
+    start = mbd.assemble(model, {"place.y": HALF * C}, {"place.x": -1.0}, closed="foot")
+    run = mbd.simulate(model, start, dt=1e-3, until=0.1, on_failure="return")
+    assert "Painlevé: no consistent contact force at 'foot'" in run.message
+    assert f"each newton of it gives {gain(1.2):.3g} m/s² of the gap" in run.message
+    assert f"sliding it would pull with {G / -gain(1.2):.3g} N, and open it would sink in with 9.81 m/s²" in run.message
+
+
+def test_where_a_slide_and_parting_are_consistent_both_are_told():
+    pull = 0.95 * 1.2 * MASS * G
+    model, _ = drawn_rod(1.2, lambda t: pull)
+    start = mbd.assemble(model, {"place.y": HALF * C}, {"place.x": -1.0}, closed="foot")
+    run = mbd.simulate(model, start, dt=1e-3, until=0.1, on_failure="return")
+    free = -G - HALF**2 * S * (MASS * G * S - pull * C) / INERTIA
+    assert "Painlevé: more than one consistent contact force at 'foot'" in run.message
+    assert f"it may push with {-free / gain(1.2):.3g} N or open with {free:.3g} m/s²" in run.message
