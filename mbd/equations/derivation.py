@@ -94,7 +94,9 @@ def _derived(
     are `carried` as coordinates of their own in a second derivation. Laws that read forces of constraints know their
     rows from the `first` one.
     """
-    scope = DerivationContext(model.ground, plan.edges, plan.cut, model.gravity, model.tunable, plan.planar, carried)
+    written = {name for controller in model.controllers for name in controller.writes}
+    tunable = {*model.tunable, *written}  # what a controller writes is no constant, whatever it begins with
+    scope = DerivationContext(model.ground, plan.edges, plan.cut, model.gravity, tunable, plan.planar, carried)
     scope.held_force = held = HeldForces(model, scope, first)
     declare_machines(scope, model.machines, scope.quantities.value)
     scope.offer_frames(model.frames.values())
@@ -114,7 +116,6 @@ def _derived(
     kinetic = sum((cause.kinetic for cause in found if cause.kinetic is not None), dynamics.kinetic())
     found = [cause for cause in found if cause.works]
     joints = (*plan.edges, *plan.cut)
-    written = {name for controller in model.controllers for name in controller.writes}
     always = [*model.bilaterals, *model.nonholonomic]
     constraints = laws(scope, dynamics, joints, always, model.contacts, model.events, gathered, written=written)
     with gathered.catch():

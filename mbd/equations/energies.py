@@ -38,7 +38,8 @@ class Lowering:
 
     def __init__(self, system: EnergyDescription) -> None:
         names = [coordinate.name for coordinate in system.coordinates]
-        self.scope = CoordinateScope(names, system.own_parameters, system.tunable)
+        written = {name for controller in system.controllers for name in controller.writes}
+        self.scope = CoordinateScope(names, system.own_parameters, {*system.tunable, *written})
         self.tape, self.inputs, self.q, self._known = self.scope.tape, self.scope.inputs, self.scope.q, self.scope.known
         self.faults: list[str] = []
         try:

@@ -37,6 +37,22 @@ def test_a_sampled_controller_is_called_at_its_instants_with_what_it_reads():
     assert trajectory.final.time == 0.1
 
 
+@pytest.mark.parametrize("written", [0.0, 1.0, 0.5])
+def test_what_a_controller_writes_is_an_input_from_the_first_derivation_on(written):
+    def twice(name):
+        return mbd.Controller("law", lambda t, values, state: {name: 2.0}, period=0.1, writes=[name])
+
+    model = pushed(twice("push.force.x"), force=written)
+    model.tunable = ()
+    energies = mbd.Lagrangian(
+        "cart", ["x"], kinetic=lambda x_rate: x_rate**2 / 2, potential=lambda x, f: -f * x, parameters={"f": written},
+        controllers=[twice("f")],
+    )  # fmt: skip
+    for trajectory in run(model), mbd.simulate(energies, mbd.assemble(energies), dt=0.01, until=1.0):
+        assert trajectory.record.q[-1, 0] == pytest.approx(1.0, abs=1e-10)
+        assert not any("derived once more" in note for note in trajectory.stats["notes"])
+
+
 @pytest.mark.parametrize("period", [0.03, 0.0042, 0.0137])
 @pytest.mark.parametrize("formulation", ["ggl", "index3"])
 def test_steps_never_exceed_dt_at_the_instants_of_a_controller(period, formulation):
