@@ -11,6 +11,7 @@ import sys
 import textwrap
 import time
 import traceback
+import warnings
 import webbrowser
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -19,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.values import printable
-from mbd.errors import MbdError, ModelError, SimulationError
+from mbd.errors import MbdError, MbdWarning, ModelError, SimulationError
 from mbd.progress import progress_bar
 from mbd.scripts import (
     OPTIONS,
@@ -366,6 +367,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit code: 0, or 1 after an error that was reported."""
     if argv is None:
         gc.set_threshold(20_000)  # Python's 700 cost a process of two seconds a tenth of it
+        warnings.formatwarning = partial(_warning, warnings.formatwarning)
     parser = _parser()
     arguments = parser.parse_args(argv)
     if not hasattr(arguments, "function"):
@@ -388,6 +390,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("stopped", file=sys.stderr)
         return 130
     return code
+
+
+def _warning(usual: Callable[..., str], message: Warning | str, category: type[Warning], file: str, *at: Any) -> str:
+    """A doubt in one sentence, with the line of a script where that is what it came from."""
+    if issubclass(category, MbdWarning) and (not file.endswith(".py") or not Path(file).is_file()):
+        return f"warning: {message}\n"
+    return usual(message, category, file, *at)
 
 
 def _where(error: BaseException, script: str) -> str:

@@ -7,6 +7,8 @@ import os
 import re
 import subprocess
 import sys
+import warnings
+from functools import partial
 from hashlib import sha256
 
 import numpy as np
@@ -313,6 +315,20 @@ def test_misspelt_words_are_no_abbreviations(words, answer, capsys):
     with pytest.raises(SystemExit):
         cli.main(words)
     assert answer in capsys.readouterr().err
+
+
+def test_a_wrong_value_of_an_option_makes_the_option_no_misspelling(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["run", "kneed-walker", "--set", "knee"])
+    told = capsys.readouterr().err
+    assert "expected NAME=VALUE" in told and "did you mean" not in told
+
+
+def test_a_doubt_names_a_line_of_a_script_only(script):
+    place = script("import mbd")
+    told = partial(cli._warning, warnings.formatwarning, "a doubt", mbd.MbdWarning)
+    assert told("<frozen runpy>", 88) == told("/usr/bin/env", 8) == "warning: a doubt\n"
+    assert told(place, 1).startswith(f"{place}:1: MbdWarning: a doubt\n")
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_the_script_runs(script, tmp_path, capsys):

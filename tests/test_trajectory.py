@@ -11,6 +11,7 @@ import pytest
 
 import mbd
 from mbd.errors import TrajectoryError, UnknownNameError
+from mbd.results import summary
 from mbd.results.interpolation import Grid
 from mbd.results.record import Record
 from mbd.results.units import unit
@@ -300,3 +301,11 @@ def test_a_run_prints_what_matters():
 def test_an_event_reads_as_a_sentence():
     event = ball().events[0]
     assert repr(event).startswith("<0.447214 s: 'floor' closed, impulse 16.") and "energy loss" in repr(event)
+
+
+def test_a_growth_that_is_not_known_is_not_told():
+    known = {"requested": 1e-6, "estimated": 2e-15, "growth": 1.7, "runs": [{"steps": 11}, {"steps": 17}]}
+    assert "global over local errors 1.7; runs of 11 + 17 steps" in summary.accuracy(known)
+    assert summary.accuracy(known | {"growth": float("nan")}) == (
+        "estimated error of coordinates 2e-15, asked for 1e-06; runs of 11 + 17 steps"
+    )

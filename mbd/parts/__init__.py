@@ -74,14 +74,16 @@ _NAMES = {name: module for module, names in _HOMES.items() for name in names.spl
 __all__ = [*_NAMES]
 
 
-def __getattr__(name: str) -> Any:
-    """A part, from its module, when it is first used (PEP 562)."""
-    if name not in _NAMES:
-        raise AttributeError(f"mbd.parts has no {name!r}; it has {', '.join(_NAMES)}")
-    from mbd.arguments import explained
+if not TYPE_CHECKING:  # type checkers know the names above, and that there are no others
 
-    value = globals()[name] = explained(getattr(importlib.import_module(f"mbd.parts.{_NAMES[name]}"), name))
-    return value
+    def __getattr__(name: str) -> Any:
+        """A part, from its module, when it is first used (PEP 562)."""
+        if name not in _NAMES:
+            raise AttributeError(f"mbd.parts has no {name!r}; it has {', '.join(_NAMES)}")
+        from mbd.arguments import explained
+
+        value = globals()[name] = explained(getattr(importlib.import_module(f"mbd.parts.{_NAMES[name]}"), name))
+        return value
 
 
 def __dir__() -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
@@ -77,9 +78,11 @@ def cost(run: Trajectory) -> str:
 def accuracy(tolerance: Mapping[str, Any]) -> str:
     """The estimated error beside the one asked for, how errors grew, and what the runs cost."""
     steps = " + ".join(str(one["steps"]) for one in tolerance["runs"])
+    growth = tolerance["growth"]  # unknown where local errors are round-off
+    grown = f"global over local errors {growth:.2g}; " if math.isfinite(growth) else ""
     return (
         f"estimated error of coordinates {tolerance['estimated']:.2g}, asked for {tolerance['requested']:g}; "
-        f"global over local errors {tolerance['growth']:.2g}; runs of {steps} steps"
+        f"{grown}runs of {steps} steps"
     )
 
 

@@ -30,7 +30,9 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Usage, what is wrong, and what was probably meant."""
-        words = re.findall(r"invalid choice: '([^']*)'|(--[\w-]+)", message.partition("(choose")[0])
+        # of the argument that an error is about, and of what is expected of it, the spelling is right
+        wrong = re.sub(r"^argument [^:]*: (?!invalid choice).*", "", message.partition("(choose")[0])
+        words = re.findall(r"invalid choice: '([^']*)'|(--[\w-]+)", wrong)
         known = [option for action in self._actions for option in (*action.option_strings, *(action.choices or ()))]
         meant = [each for pair in words for each in difflib.get_close_matches("".join(pair), known, n=1)]
         super().error(message + (f"; did you mean {' or '.join(repr(each) for each in meant)}?" if meant else ""))
