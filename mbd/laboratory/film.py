@@ -12,9 +12,13 @@ from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number, number, shown
 from mbd.errors import ModelError, nearest
 from mbd.laboratory.recording import PlateRecord, Recording
+from mbd.notes import doubt
 from mbd.trajectory import Trajectory
 
 __all__ = ["film"]
+
+DOUBTFUL = 0.01
+"""Mean error of what plates carry, over its mean size, above which it is in doubt: schemes err by less [-]."""
 
 
 def film(
@@ -23,8 +27,11 @@ def film(
     """What cameras and force plates record of a run, to try an evaluation on a motion whose truth is known.
 
     Each contact of a point with the ground has a plate of its own under it, which measures its normal force and its
-    friction without errors. ``recording.save("walk.trc")`` writes the markers, ``recording.save("walk.mot")`` the
-    plates, ``recording.save("walk.c3d")`` both.
+    friction without errors. Plates lie in the level y = 0: where they carry other forces than those that act on the
+    mechanism from outside, as on slopes and steps, `MbdWarning` says so.
+
+    ``recording.save("walk.trc")`` writes the markers, ``recording.save("walk.mot")`` the plates,
+    ``recording.save("walk.c3d")`` both.
 
     Parameters
     ----------
@@ -74,7 +81,28 @@ def film(
         found[name] = seen[title] + scatter * rng.standard_normal((len(time), 3))
     places = [contact for contact in run.facts.contacts if contact.place and contact.unit == "m"]
     plates = [_plate(run, seen, time, contact.name, contact.place) for contact in places]
+    if plates:
+        _doubt_other_forces(seen, plates)
     return Recording(time, found, plates=tuple(plates))
+
+
+def _doubt_other_forces(seen: Any, plates: Sequence[PlateRecord]) -> None:
+    """Warn where plates carry other forces, or moments about the origin, than those from outside."""
+    for what, unit, carried in (
+        ("force", "N", np.sum([plate.force for plate in plates], axis=0)),
+        ("moment", "N m", np.sum([plate.moment for plate in plates], axis=0)),
+    ):
+        acts = np.asarray(seen[f"external {what}"])
+        off = np.abs(carried - acts)
+        if np.mean(off) > DOUBTFUL * np.mean(np.abs(acts)):
+            k, axis = np.unravel_index(int(np.argmax(off)), off.shape)
+            has, should = (round(float(each[k, axis]), 9) + 0.0 for each in (carried, acts))
+            doubt(
+                f"film: at t = {seen.time[k]:.3g} s the plates carry a {what} of {has:.3g} {unit} along "
+                f"{'xyz'[axis]}, and {should:.3g} {unit} acts from outside; plates lie in y = 0 and measure contacts "
+                "alone: the ground slopes or lies higher, or something else holds the mechanism"
+            )
+            return
 
 
 def _plate(run: Trajectory, seen: Any, time: Vector, contact: str, place: str) -> PlateRecord:

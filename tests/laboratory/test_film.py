@@ -51,3 +51,24 @@ def test_what_cannot_be_filmed_is_named(what, sentence):
         mbd.film(run, **what)
     with pytest.raises(mbd.ModelError, match="a run of mbd.simulate"):
         mbd.film("walk.trc", ["seat.center"])
+
+
+@pytest.mark.parametrize(
+    ("ground", "sentence"),
+    [
+        (mbd.Plane((0.2, 1.0, 0.0)), "a force of -3.85 N along x, and 0 N acts from outside"),
+        (lambda x: 0.1 * x, "a force of 1.95 N along x"),
+        (mbd.Plane((0.0, 1.0, 0.0), 0.15), "a moment of .* N m along z"),
+    ],
+    ids=["slope", "hill", "step"],
+)
+def test_plates_that_would_carry_something_else_are_in_doubt(ground, sentence):
+    """A block that stands on a slope, and one that slides on a step."""
+    model, block = mbd.Model("block"), mbd.PointMass("block", 2.0)
+    model.connect(mbd.Translation("air", model.ground.origin, block.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(block.origin, ground), friction=0.8))
+    velocity = {"air.x": 1.0} if isinstance(ground, mbd.Plane) and ground.offset else {}
+    start = mbd.assemble(model, {"air.x": 0.3}, velocity, closed="foot")
+    run = mbd.simulate(model, start, dt=1e-3, until=0.1)
+    with pytest.warns(mbd.MbdWarning, match=sentence):
+        mbd.film(run, ["block.origin"])
