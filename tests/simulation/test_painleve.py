@@ -10,6 +10,7 @@ import pytest
 
 import mbd
 from tests.simulation.test_dry_walkers import falling_walker
+from tests.simulation.test_pushed_soles import two_pushed_feet
 
 G, MASS, INERTIA, HALF, LEAN, RATE = 9.81, 2.0, 0.1, 1.0, 0.5, 50.0
 S, C = np.sin(LEAN), np.cos(LEAN)
@@ -102,3 +103,10 @@ def test_where_a_slide_and_parting_are_consistent_both_are_told():
     free = -G - HALF**2 * S * (MASS * G * S - pull * C) / INERTIA
     assert "Painlevé: more than one consistent contact force at 'foot'" in run.message
     assert f"it may push with {-free / gain(1.2):.3g} N or open with {free:.3g} m/s²" in run.message
+
+
+@pytest.mark.slow
+def test_no_numbers_are_told_of_a_corner_that_other_corners_hold():
+    model, start = two_pushed_feet(7)
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.21, on_failure="return")
+    assert "each newton" not in run.message and "more than one" not in run.message

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 __all__ = ["consistent_forces"]
 
+ROUND_OFF = 1e-9
+"""Part of what a push gives the gap alone below which it gives none, as in the kernel [-]."""
 NONE, SEVERAL = "no consistent contact force", "more than one consistent contact force"
 
 
@@ -38,7 +40,9 @@ def consistent_forces(stepper: Stepper, contact: int) -> tuple[str, str]:
     except np.linalg.LinAlgError:
         return NONE, ""
     free += terms.bias[normal]
-    if not (np.isfinite(free) and gained < 0.0):
+    inertia = np.diag(terms.M)
+    alone = float(np.sum(np.divide(terms.B[normal] ** 2, inertia, out=np.zeros(n), where=inertia > 0.0)))
+    if not (np.isfinite(free) and gained < -ROUND_OFF * alone):  # other contacts hold it
         return NONE, ""
     each, push = f": each newton of it gives {gained:.3g} m/s² of the gap, so that ", abs(free / gained)
     if free < 0.0:
