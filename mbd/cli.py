@@ -42,6 +42,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Script", "examples", "find", "main"]
 
+_wrapped = partial(textwrap.fill, width=100, break_long_words=False, break_on_hyphens=False)
+"""Text in lines of 100 columns at most."""
+
 TOLD = (
     MbdError, OSError, ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError,
     RuntimeError, SyntaxError, TypeError, ValueError,
@@ -221,7 +224,8 @@ def examples_command(arguments: argparse.Namespace) -> int:
     width = max(map(len, known), default=0)
     for name, path in known.items():
         text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-        print(f"{name:<{width}}  {text.partition(chr(10))[0]}")
+        first = text.partition("\n")[0]
+        print(_wrapped(first, initial_indent=f"{name:<{width}}  ", subsequent_indent=" " * (width + 2)))
     print("run one with: mbd run NAME" if known else f"no examples in {folder()}")
     return 0
 
@@ -300,10 +304,9 @@ def info_command(arguments: argparse.Namespace) -> int:
     rows["backend"] = chosen.name + (f" ({chosen.note})" if chosen.note else "")
     rows["code cache"] = str(default_cache().directory or "off") if chosen.name == "llvm" else "off"
     rows["examples"] = f"{len(examples())} in {folder()}"
-    wrap = partial(textwrap.fill, width=100, break_long_words=False, break_on_hyphens=False)
     for name, value in rows.items():
-        print(wrap(value, initial_indent=f"{name:<14}", subsequent_indent=" " * 14))
-    print("\n" + "\n".join(wrap(line, subsequent_indent="    ") for line in as_text().splitlines()))
+        print(_wrapped(value, initial_indent=f"{name:<14}", subsequent_indent=" " * 14))
+    print("\n" + "\n".join(_wrapped(line, subsequent_indent="    ") for line in as_text().splitlines()))
     return 0
 
 

@@ -145,6 +145,12 @@ def test_an_unknown_example_gets_the_nearest_name(monkeypatch, tmp_path, capsys)
     assert cli.find("kneed_walker") == cli.find("kneed-walker") == tmp_path / "kneed_walker.py"
 
 
+def test_examples_are_listed_in_lines_of_a_terminal(capsys):
+    assert cli.main(["examples"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 100 and len(lines) > len(scripts.examples())
+
+
 def test_a_missing_script_is_named(capsys):
     assert cli.main(["run", "absent.py"]) == 1
     assert capsys.readouterr().err == "error: no script at 'absent.py'\n"

@@ -245,9 +245,8 @@ def _made(
 def _dimensions(values: Any) -> list[tuple[tuple[str, ...], list[tuple[Any, ...]]]]:
     """Names that change together, with their values in turn; every fault of the values at once."""
     if not isinstance(values, Mapping) or not values:
-        raise ModelError(
-            f"values of a sweep must map names to lists, such as {{'rod.mass': [1.0, 2.0]}}, not {shown(values)}"
-        )
+        got = "a State; they come before the start" if isinstance(values, State) else shown(values)
+        raise ModelError(f"values of a sweep must map names to lists, such as {{'rod.mass': [1.0, 2.0]}}, not {got}")
     faults: list[str] = []
     found: list[tuple[tuple[str, ...], list[tuple[Any, ...]]]] = []
     for name, several in values.items():

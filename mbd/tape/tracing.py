@@ -84,7 +84,7 @@ def _called(
         inspect.signature(function).bind(*values)
     except TypeError as exc:
         raise TraceError(
-            f"{what}: {title} is called with {len(values)} arguments, in order {names}, but cannot take them ({exc}); "
+            f"{what}: {title} is called with {_count(values)}, in order {names}, but cannot take them ({exc}); "
             "change its parameters, or say which arguments it wants"
         ) from exc
     except ValueError:
@@ -137,6 +137,11 @@ def _component(value: Any, what: str, source: str, tape: Tape) -> Node:
             "check the numbers it uses (divisions by zero, logarithms, missing samples)"
         )
     return node
+
+
+def _count(values: Sequence[object]) -> str:
+    """'1 argument', '2 arguments'."""
+    return f"{len(values)} argument{'s' * (len(values) != 1)}"
 
 
 def _title(function: Any) -> str:

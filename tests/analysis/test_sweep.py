@@ -81,3 +81,9 @@ def test_faults_are_told_before_the_first_run(values, more, said):
     start = mbd.assemble(model)
     with pytest.raises(mbd.ModelError, match=said):
         mbd.sweep(model, values, start, **{"until": 0.1, "dt": 1e-2} | settings)
+
+
+def test_values_in_the_place_of_the_start_are_told_in_one_line():
+    model, _ = falling()
+    with pytest.raises(mbd.ModelError, match=r"not a State; they come before the start$"):
+        mbd.sweep(model, mbd.assemble(model), {"ball.mass": [1.0]}, dt=1e-3, until=0.1)
