@@ -36,7 +36,7 @@ from mbd.kernel.stepping.trial_step import try_step, turns
 
 __all__ = [
     "LONGER", "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "keeps_direction", "shorter_turn",
-    "slides_at_first", "slides_on", "slides_until_event",
+    "slides_at_first", "slides_on", "slides_until_event", "speeds_up",
 ]  # fmt: skip
 
 PART = 0.5
@@ -113,6 +113,15 @@ def approached_end(K: Switching, t1: float) -> float:
         if 0.0 < K.turning_step < end - K.time:
             end = K.time + K.turning_step
     return end
+
+
+def speeds_up(K: Guards) -> bool:
+    """Whether what slides in a direction that turns gets faster, as all does that has begun to slide."""
+    found = True
+    for f in range(K.n_frictions):
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+            found = found and product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate) >= 0.0
+    return found
 
 
 def turning_of(K: Guards, f: int) -> float:

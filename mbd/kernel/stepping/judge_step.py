@@ -11,6 +11,7 @@ from mbd.kernel.contact.cone_steps import (
     slides_at_first,
     slides_on,
     slides_until_event,
+    speeds_up,
 )
 from mbd.kernel.contact.cones import friction_size
 from mbd.kernel.contact.nonsmooth import closes_below_surface, must_release
@@ -263,7 +264,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
     status = conclude(K, h, full, t1, cut, within, quiet, holds, pulls)
     if status != 0:
         return status
-    if within and 0.0 < K.turning_step < 0.1 * K.step:  # there are many of these as sliding begins
+    if within and 0.0 < K.turning_step < 0.1 * K.step and speeds_up(K):  # there are many of these as sliding begins
         return -1
     K.steps_since_row += 1
     if (K.vector == 0 and wants_row(K, h)) or K.steps_since_row >= K.stride:
