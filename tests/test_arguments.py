@@ -47,6 +47,8 @@ WORDS = {
     mbd.Muscle: ("muscle", FRAMES, 600.0, 0.1, 0.2),
     mbd.PolynomialPath: (HINGE, {(0,): 0.3, (1,): -0.04}),
     mbd.ViaPoint: (ROD.end,),
+    mbd.WrappingSphere: (ROD.end, 0.05),
+    mbd.WrappingCylinder: (ROD.end, 0.05, "z"),
     mbd.Mode: ("phase", ("swing", "stance")),
     mbd.SampledLaw: ("PD", 0.01, {"u": lambda angle: -angle}, ("hinge.angle",)),
     mbd.Transition: ("swing", "stance", "foot"),
@@ -111,7 +113,7 @@ BESIDE = {
         mbd.limit_cycle, mbd.linearize,
         mbd.load, mbd.mobility, mbd.project, mbd.replay, mbd.sensitivities, mbd.simulate, mbd.sweep,
         mbd.branch, mbd.find_gait, mbd.optimize, mbd.inverse_dynamics, mbd.read,
-        mbd.inverse_kinematics, mbd.muscle_forces, mbd.read_band,
+        mbd.film, mbd.inverse_kinematics, mbd.muscle_forces, mbd.read_band,
         mbd.assign_plates, mbd.ForcePlate, mbd.scale, mbd.read_model, mbd.write_model, mbd.margin_of_stability,
     ),
     "of numbers and traced values": (

@@ -195,7 +195,7 @@ RESULTS = {
 """Values that are handed to users, who make none."""
 RESULTS |= {"ImportReport", "ImportedModel", "InverseDynamics", "InverseKinematics", "PlateRecord", "Recording"}
 RESULTS |= {"MuscleForces", "NormativeBand"}
-RESULTS |= {"margin_of_stability", "read_band"}  # of runs that stand, of files: tests/laboratory
+RESULTS |= {"film", "margin_of_stability", "read_band"}  # of runs that stand, of files: tests/laboratory
 RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
