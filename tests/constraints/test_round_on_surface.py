@@ -156,7 +156,7 @@ def test_energy_goes_only_where_friction_and_impacts_take_it(kind, friction):
     model = kind(lambda x, z: waves(x, z), friction)
     position = {"float.x": 0.2, "float.y": 0.6, "float.orientation": ("xyz", (0.2, 0.1, 0.3))}
     start = mbd.assemble(model, position, {"float.x": 0.5, "float.z": 0.3, "float.angular_velocity": (2.0, 1.0, -9.0)})
-    for scheme, dt in (mbd.RungeKutta853(), 2e-3), (mbd.RadauIIA(), 1e-3):
+    for scheme, dt in (mbd.RungeKutta853(), 4e-3), (mbd.RadauIIA(), 1e-3):
         run = mbd.simulate(model, start, scheme, dt=dt, until=0.35)
         assert run.events
         assert np.max(np.abs(run.energy.numerical)) < 1e-6

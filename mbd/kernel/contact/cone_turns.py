@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
-from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents
+from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents, mass_of
 from mbd.kernel.contact.cones import HELD, leads_group, product_of, speed_of
 from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.records import Balance, ContactForces, Switching
@@ -24,12 +24,11 @@ SOON = 100.0
 def estimated_turn_rate(K: Switching) -> float:
     """Estimated rate [1/s] at which friction turns γ that it does not point along, Σ limit λ/(‖γ‖ + s).
 
-    λ is the largest eigenvalue of B M⁻¹ Bᵀ across the direction, which rows that hold make smaller; that pushes follow
-    the direction is left out. The rate is large where γ is small, just after sliding has begun and before it ends: an
-    explicit scheme must follow it.
+    λ is that of B M⁻¹ Bᵀ across the direction (see `ease_across`); that pushes follow the direction is left out. The
+    rate is large where γ is small, just after sliding has begun and before it ends: an explicit scheme must follow it.
     """
     rate = 0.0
-    known = False
+    evaluated = False
     for f in range(K.n_frictions):
         if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
             gain = product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate)
@@ -37,23 +36,33 @@ def estimated_turn_rate(K: Switching) -> float:
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
             if gain < 0.0 and speed > STILL and speed > SOON * change * K.dt:  # it slows down, and is still fast
                 continue
-            if not known:
+            if not evaluated:
                 evaluate(K, K.time, K.q, K.y)
-                for i in range(K.n * K.n):
-                    K.kkt[i] = K.acc[i]
-                known = factor(K.kkt, K.n, K.pivots) == 0
+                evaluated = True
             speed += 4.0 * K.hold[f]
-            if known and speed > 0.0:
-                rate += K.guards0[K.at_limit + f] * largest_ease(K, f) / speed
+            if speed > 0.0:
+                rate += K.guards0[K.at_limit + f] * ease_across(K, f) / speed
     return rate
+
+
+def ease_across(K: Balance, f: int) -> float:
+    """What a force across the direction of the group of f gains: of a ball joint the largest eigenvalue λ.
+
+    Of a contact, other corners of whose foot may hold, which makes λ far too large, the mean by the diagonal of M; true
+    rates were found up to 1.24 times those that follow from it.
+    """
+    if K.group_size[f] == 2:
+        mass = mass_of(K, f)
+        return 1.0 / mass if mass > 0.0 else 0.0
+    for i in range(K.n * K.n):
+        K.kkt[i] = K.acc[i]
+    return largest_ease(K, f) if factor(K.kkt, K.n, K.pivots) == 0 else 0.0
 
 
 def largest_ease(K: Balance, f: int) -> float:
     """The largest eigenvalue of B M⁻¹ Bᵀ across the direction of the group of f; M is factored in K.kkt."""
-    count = fill_tangents(K, f, 0)
+    fill_tangents(K, f, 0)
     first = ease_between(K, f, 0, 0)
-    if count == 1:
-        return first
     second = ease_between(K, f, 1, 1)
     mixed = ease_between(K, f, 0, 1)
     half = 0.5 * (first - second)
