@@ -23,7 +23,7 @@ from mbd.view.style import CYCLE, rules
 
 __all__ = ["write_page"]
 
-DPI, COLORS = 100, 16
+DPI, COLORS = 96, 16
 """Of plots: all of them together are less than a megabyte."""
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
