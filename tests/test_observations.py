@@ -144,7 +144,7 @@ def test_what_is_no_number_is_an_error_where_it_is_asked_for(tmp_path):
         ("u", lambda scope: float("nan"), (), "not a finite number"),
         ("u", lambda scope: [scope.time], (), "one number or three components"),
         ("u", lambda a: 1.0 if a > 0.0 else 0.0, ("knee.angle",), "observation 'u'"),
-        ("u", lambda a, b: a, ("knee.angle",), "called with 1 arguments"),
+        ("u", lambda a, b: a, ("knee.angle",), "called with 1 argument,"),
         ("u", lambda scope: scope.rate(scope.named("knee.reaction_force.x")), (), "the rate of a function of acc"),
         ("u", lambda scope: scope.frame(leg()[2].point(0.3, 0.7)).position, (), "name the point"),
         ("u", lambda p: p[0], (mbd.Link("arm", 1.0, 1.0, 0.5).end,), "a body that no joint connects"),
