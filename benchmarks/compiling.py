@@ -24,7 +24,7 @@ MODES = (LEFT, (*LEFT, RIGHT[1]), RIGHT, (*RIGHT, LEFT[1]))
 def measure(repeats: int) -> list[Figure]:
     """Equations, and machine code until the first step and for the whole gait. The stepping kernel is not touched:
     it is compiled once a machine, not once a model."""
-    with TemporaryDirectory() as full:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as full:
         tasks: dict[str, Callable[[], float]] = {
             "Python loop": partial(processor_seconds, python_loop),
             "derive": partial(processor_seconds, _derive),
@@ -74,5 +74,5 @@ def _make(folder: str, modes: int) -> None:
 
 
 def _cold(modes: int) -> float:
-    with TemporaryDirectory() as empty:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as empty:
         return processor_seconds(_make, empty, modes)

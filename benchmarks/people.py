@@ -176,12 +176,12 @@ def _make(folder: str, wait: bool = False) -> None:
 
 
 def _cold() -> float:
-    with TemporaryDirectory() as empty:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as empty:
         return processor_seconds(_make, empty)
 
 
 def _making(repeats: int) -> list[Figure]:
-    with TemporaryDirectory() as full:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as full:
         _make(full, wait=True)
         tasks: dict[str, Callable[[], float]] = {
             "Python loop": partial(processor_seconds, python_loop),
