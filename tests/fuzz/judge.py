@@ -159,8 +159,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
     found = Faults(told.time)
     tol = run.settings["tol"] if run.settings.get("tol") else 0.0
     # with dry friction no step is taken again: curves pass through rows, as good as the order of the scheme
-    rubs = run.record.equations is None or bool(run.record.equations.frictions)
-    again = run.settings["between"].startswith("stages") and not rubs
+    has_friction = run.record.equations is None or bool(run.record.equations.frictions)
+    again = run.settings["between"].startswith("stages") and not has_friction
     precise = again or run.settings["integrator"].startswith(("RungeKutta853", "Radau"))
     with np.errstate(all="ignore"):
         try:
@@ -170,7 +170,8 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             uncertain = 4 * int(run.stats["singular_steps"])  # a row ends two steps, each looked at twice
             laws.closure(found, bodies, rates="index3" not in run.settings["integrator"], told=uncertain)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
-            share = share + tol if rubs else share  # curves through rows that may err by tol rad: forces turn by that
+            if has_friction:  # curves pass through rows that may err by tol rad: forces turn by that
+                share += tol
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
             laws.balance(found, bodies, loads(bodies), share, stiff + _turned(run, model, times))
             laws.constraints(found, bodies)

@@ -7,8 +7,9 @@ where they alone can share: z is orthogonal to that (in the metric W of `kernel.
 2. else the ones nearest to it that do, ``min ‖z‖`` with ``‖λ_T‖ ≤ limit`` for each foot;
 3. where there are none those which exceed the limits least, ``min σ`` with ``‖λ_T‖ ≤ limit + σ w``, w the limits of 1.
 
-σ = 0 is the largest load that sticks, found from both sides: K.brink has the multipliers of 3. They tell who slips then
-and which way: σ rises with the power that the load has beyond that of friction in some motion of sliding feet.
+σ = 0 is the largest load that sticks, found from both sides: K.lam_at_limit has the multipliers of 3. They tell who
+slips then and which way: σ rises with the power that the load has beyond that of friction in some motion of sliding
+feet.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ NARROW = 1e-11
 def keep_in_cones(K: Balance, lam: Reals) -> None:
     """Multipliers of least norm become ones in all cones where there are such; K.dependence and K.limit are known.
 
-    K.brink has those at the largest load that sticks, or λ itself where it is in all cones.
+    K.lam_at_limit has those at the largest load that sticks, or λ itself where it is in all cones.
     """
-    K.brink[: K.n_rows] = lam[: K.n_rows]
+    K.lam_at_limit[: K.n_rows] = lam[: K.n_rows]
     if K.n_dropped == 0 or K.strategy == 1 or not exceeds(K, lam):
         return
     spans = find_freedoms(K, sharing(K))
@@ -52,7 +53,7 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
         return
     sigma = find_brink(K, spans, discs)
     for row in range(K.n_rows):
-        K.brink[row] = lam[row] + scale * freed(K, row, spans)
+        K.lam_at_limit[row] = lam[row] + scale * freed(K, row, spans)
     if sigma < -NARROW:
         find_nearest(K, spans, discs)
     for row in range(K.n_rows):

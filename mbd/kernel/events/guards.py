@@ -385,7 +385,7 @@ def margin(K: Switching, f: int, t1: float) -> float:
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
     evaluate_loaded(K, K.loads)
     if K.n_cones > 0 and K.n_dropped > 0:  # what all feet together have left, though this one may be at its limit
-        return float(limit_of(K, f) - friction_size(K, f, K.brink))
+        return float(limit_of(K, f) - friction_size(K, f, K.lam_at_limit))
     return float(limit_of(K, f) - friction_size(K, f, K.impulse))
 
 

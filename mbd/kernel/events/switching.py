@@ -219,10 +219,10 @@ def slip_together(K: Balance, index: int) -> None:
     for f in range(K.n_frictions):
         if status == 0 and leads_group(K, f) and K.sticks[f] == 1 and is_closed(K, f):
             limit = limit_of(K, f)
-            if f == index or (limit > 0.0 and friction_size(K, f, K.brink) > (1.0 - AT_LIMIT) * limit):
+            if f == index or (limit > 0.0 and friction_size(K, f, K.lam_at_limit) > (1.0 - AT_LIMIT) * limit):
                 set_loose(K, f, 3)
                 set_sticking(K, f, 0)
-                aim_as_pulled(K, f, K.brink)
+                aim_as_pulled(K, f, K.lam_at_limit)
     for g in range(K.leader[index], K.leader[index] + K.group_size[index]):
         K.sticks[g] = 0
 

@@ -61,7 +61,7 @@ class Complementarity(SchemeAbilities):
     cone_dropped: Integers = integers(lambda s: s.n_unknowns)  # dependent rows before it
     turn: Integers = integers(lambda s: s.n_contacts)  # in which each is tested for Painlevé's paradox, −1 for none
     cone_slips: Reals = reals(lambda s: s.n_frictions)
-    brink: Reals = reals(
+    lam_at_limit: Reals = reals(
         lambda s: s.n_rows
     )  # multipliers at the largest load that sticks: see `mbd.kernel.contact.cone_loads`
     rise: Reals = reals(lambda s: s.n_frictions)  # what a push of one more adds to each limit

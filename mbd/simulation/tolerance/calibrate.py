@@ -21,7 +21,7 @@ FIRST = 0.5
 """Local errors of the first run, summed up, over the tolerance [-]."""
 BEYOND = 3.0
 """Estimated error over the tolerance above which it counts as missed once repeats are used up [-]."""
-MOST_RUNS = 5
+MAX_RUNS = 5
 """Runs in all, unless the last one came much nearer."""
 NEARER = 0.5
 """Error over that of the most accurate run before up to which a run has come nearer [-]."""
@@ -75,8 +75,8 @@ def calibrated(
         return _outcome([first], first, search, first.problem)
     trials = [] if first.problem else [first]
     wanted: float | None = first.allowed / (ratio if trials else PILOT)
-    for count in range(1, MOST_RUNS + 4):  # runs beyond these, each while the one before has come nearer
-        if wanted is None or (count >= MOST_RUNS and not _coming_nearer(trials, tol)):
+    for count in range(1, MAX_RUNS + 4):  # runs beyond these, each while the one before has come nearer
+        if wanted is None or (count >= MAX_RUNS and not _coming_nearer(trials, tol)):
             break
         refused = _no_room(trials, wanted, power, order)
         if refused and not search.best(trials).error <= tol:
