@@ -7,9 +7,11 @@ the addresses of arrays. They do not change while the kernel runs, which the mac
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -28,6 +30,7 @@ __all__ = [
     "kernel_functions",
     "kernel_object",
     "kernel_text",
+    "no_collection",
     "object_of",
     "source_digest",
 ]
@@ -99,12 +102,16 @@ def object_of(text: str, level: int = 2) -> bytes:
 
 
 def compiled(text: str, here: Host, level: int) -> bytes:
-    """The object file of an IR text for the processor that `here` says, for callers that hold `COMPILING`."""
+    """The object file of an IR text for the processor that `here` says, for callers that hold `COMPILING`.
+
+    Level 0 selects instructions one by one, which takes a seventh of the time of level 1; the others take one more of
+    LLVM's levels for code than for passes.
+    """
     import llvmlite.binding as llvm
 
     module = llvm.parse_assembly(text)
     target = llvm.Target.from_triple(here.triple)
-    machine = target.create_target_machine(cpu=here.cpu, features=here.features, opt=min(level + 1, 3))
+    machine = target.create_target_machine(cpu=here.cpu, features=here.features, opt=min(level + 1, 3) if level else 0)
     tuning = llvm.create_pipeline_tuning_options(speed_level=level)
     tuning.loop_vectorization = tuning.loop_unrolling = False  # loops of a few turns
     tuning.slp_vectorization = True
@@ -128,7 +135,20 @@ def kernel_text() -> str:
     """The kernel in LLVM's words."""
     from mbd.kernel.translation.llvm import llvm_text
 
-    return llvm_text(kernel_functions(), ENTRY)
+    with no_collection():
+        return llvm_text(kernel_functions(), ENTRY)
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Without the search for cycles of objects: trees have none, and it takes a third of the time of making them."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def kernel_c_source() -> str:

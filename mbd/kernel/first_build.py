@@ -75,9 +75,10 @@ def keep(tag: str, make: Callable[[], bytes]) -> None:
             time.sleep(PAUSE)
             continue
         try:
-            if hasattr(os, "nice"):
-                os.nice(10)  # beside the run that waits for nothing
-            store.store(key, make(), lasting=True)
+            if store.load(key, lasting=True) is None:  # nobody has built it since the last look
+                if hasattr(os, "nice"):
+                    os.nice(10)  # beside the run that waits for nothing
+                store.store(key, make(), lasting=True)
         finally:
             mark.unlink(missing_ok=True)
         break

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Sequence
+from dataclasses import is_dataclass
 from typing import Any
 
 from mbd.errors import CapabilityError
@@ -16,14 +16,14 @@ __all__ = ["check_memory"]
 
 def check_memory(found: Sequence[Function]) -> None:
     """Refuse a scheme whose functions use an array of `MEMORY` for which its entry gives no length."""
-    sizes = Kernel(**dict.fromkeys(TABLE.integers, 2))
+    sizes, known = Kernel(**dict.fromkeys(TABLE.integers, 2)), dict[str, set[str]]()
     for scheme in contract.schemes():
         own = scheme.memory(sizes)
         for hook in (getattr(scheme, name) for name in contract.HOOKS):
             start = f"{hook.__module__.removeprefix('mbd.kernel.')}.{hook.__name__}." if hook else "no hook"
             for function in found:
                 if function.symbol.startswith(start):
-                    used = [name for name in _fields(function, set()) if name in contract.MEMORY and name not in own]
+                    used = sorted((_fields(function, known) & set(contract.MEMORY)) - set(own))
                     if used:
                         raise CapabilityError(
                             f"the scheme {scheme.name!r}: its {hook.__name__} uses K.{used[0]}, to which its memory "
@@ -31,21 +31,20 @@ def check_memory(found: Sequence[Function]) -> None:
                         )
 
 
-def _fields(part: Any, seen: set[str]) -> Iterator[str]:
-    """Names of the fields that a function and all that it calls use."""
-    if isinstance(part, Field):
-        yield part.name
-    elif isinstance(part, Call):
-        yield from _fields(part.function, seen)
-        yield from _fields(part.arguments, seen)
-        return
-    if isinstance(part, Function):
-        if part.symbol not in seen:
-            seen.add(part.symbol)
-            yield from _fields(part.body, seen)
-    elif isinstance(part, list | tuple):
-        for each in part:
-            yield from _fields(each, seen)
-    elif is_dataclass(part):
-        for each in fields(part):
-            yield from _fields(getattr(part, each.name), seen)
+def _fields(function: Function, known: dict[str, set[str]]) -> set[str]:
+    """Names of the fields that a function and all that it calls use, each looked through once."""
+    if function.symbol not in known:
+        found: set[str] = set()
+        waiting: list[Any] = [function.body]
+        while waiting:
+            part = waiting.pop()
+            if isinstance(part, Call):
+                found |= _fields(part.function, known)
+                waiting += part.arguments
+            elif isinstance(part, list | tuple):
+                waiting += part
+            elif is_dataclass(part):
+                found |= {part.name} if isinstance(part, Field) else set()
+                waiting += vars(part).values()
+        known[function.symbol] = found
+    return known[function.symbol]

@@ -115,19 +115,20 @@ class _Translation:
 
     def _translated(self, source: Source, node: ast.FunctionDef, function: tree.Function) -> tree.Function:
         function.locals = dict(function.arguments)
-        stated, known = function.result, None
-        while known != function.locals:  # until no assignment widens a name any more
-            known, function.result = dict(function.locals), stated
-            function.body = _Body(source, function, self, node.name).block(node.body)
+        stated, widens = function.result, True
+        while widens:  # what was read before a name widened has the kind that it had then
+            function.result, body = stated, _Body(source, function, self, node.name)
+            function.body, widens = body.block(node.body), body.widens
             function.result = function.result or "none"
         return function
 
 
 class _Body:
-    """Statements and expressions of one function; its local names widen as it is read."""
+    """Statements and expressions of one function; `widens`: one of its local names has got a wider kind."""
 
     def __init__(self, source: Source, function: tree.Function, translation: _Translation, name: str) -> None:
         self.source, self.function, self.translation, self.name = source, function, translation, name
+        self.widens = False
 
     # statements -----------------------------------------------------------------------------------------------------
     def block(self, statements: Sequence[ast.stmt]) -> list[tree.Statement]:
@@ -167,7 +168,9 @@ class _Body:
         if not isinstance(node, ast.Name):
             raise CapabilityError(hints.expected("a name, an element or a field to assign to", node))
         names = self.function.locals
-        names[node.id] = tree.joined(names.get(node.id, kind), kind)
+        known = names.get(node.id, kind)
+        names[node.id] = tree.joined(known, kind)
+        self.widens |= names[node.id] != known
         return tree.Local(node.id, names[node.id])
 
     def _AugAssign(self, node: ast.AugAssign) -> list[tree.Statement]:

@@ -94,7 +94,8 @@ def keep_optimized() -> None:
 
 def text() -> str:
     """The kernel with derivatives in LLVM's words."""
-    return tangent_text(_trees(), ENTRY, HELD)
+    with build.no_collection():
+        return tangent_text(_trees(), ENTRY, HELD)
 
 
 def plain_entry() -> Callable[[Table], int]:
