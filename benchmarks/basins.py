@@ -12,7 +12,7 @@ import mbd
 from benchmarks.figures import Figure, interleaved
 from benchmarks.stopwatch import processor_seconds
 from mbd.simulation.batch.runner import Runner
-from mbd.simulation.run.many import start_line
+from mbd.simulation.many_runs import start_line
 
 __all__ = ["measure"]
 

@@ -77,7 +77,6 @@ if TYPE_CHECKING:
         touchdown as touchdown,
         twist as twist,
     )
-    from mbd.description import on_slope as on_slope
     from mbd.equations.energy_description import Coordinate as Coordinate
     from mbd.errors import (
         AssemblyError as AssemblyError,
@@ -174,11 +173,12 @@ if TYPE_CHECKING:
     from mbd.optimization.optimum import Optimum as Optimum
     from mbd.parts.whole_body.human import Human as Human, human as human
     from mbd.results.failure import Failure as Failure
+    from mbd.results.trajectory import Trajectory as Trajectory, load as load
     from mbd.sensitivity.result import Sensitivities as Sensitivities
     from mbd.sensitivity.sensitivities import sensitivities as sensitivities
     from mbd.simulation.batch.batch import batch as batch
     from mbd.simulation.batch.result import Batch as Batch
-    from mbd.simulation.diagnostics.replay import Replay as Replay, replay as replay
+    from mbd.simulation.replay import Replay as Replay, replay as replay
     from mbd.simulation.simulate import simulate as simulate
     from mbd.state import State as State
     from mbd.tape.functions import (
@@ -205,7 +205,7 @@ if TYPE_CHECKING:
         tanh as tanh,
         where as where,
     )
-    from mbd.trajectory import Trajectory as Trajectory, load as load
+    from mbd.topology.description import on_slope as on_slope
 
 __version__ = "0.2.0"
 
@@ -259,7 +259,7 @@ _HOMES = {
     "mbd.joints": "Cylindrical Free Planar Prismatic Revolute Screw Spherical Translation Universal Weld",
     "mbd.joints.losses": "AffineFriction CompressibleDamper Coulomb Dahl Dissipation LuGre PinFriction Quadratic "
     "Stribeck Tabulated Valves Viscous",
-    "mbd.description": "on_slope",
+    "mbd.topology.description": "on_slope",
     "mbd.model": "Model",
     "mbd.parts.whole_body.human": "Human human",
     "mbd.assembly.projection": "project",
@@ -268,14 +268,14 @@ _HOMES = {
     "mbd.results.failure": "Failure",
     "mbd.sensitivity.result": "Sensitivities",
     "mbd.sensitivity.sensitivities": "sensitivities",
-    "mbd.simulation.diagnostics.replay": "Replay replay",
+    "mbd.simulation.replay": "Replay replay",
     "mbd.simulation.batch.batch": "batch",
     "mbd.simulation.batch.result": "Batch",
     "mbd.simulation.simulate": "simulate",
     "mbd.state": "State",
     "mbd.tape.functions": "acos asin atan atan2 clip cos cosh exp floor hypot log maximum minimum mod pi sign sin sinh "
     "sqrt tan tanh where",
-    "mbd.trajectory": "Trajectory load",
+    "mbd.results.trajectory": "Trajectory load",
 }
 """The public names, by the module they live in; the block above tells the same to editors and type checkers."""
 

@@ -38,7 +38,7 @@ from mbd.view import lab_arguments
 from mbd.view.parser import Parser, writable
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Script", "examples", "find", "main"]
 
@@ -117,7 +117,7 @@ def run_command(arguments: argparse.Namespace) -> int:
 
 def show_command(arguments: argparse.Namespace) -> int:
     """``mbd show``: print and draw a stored run, without simulating again."""
-    from mbd.trajectory import load
+    from mbd.results.trajectory import load
     from mbd.view.report import draw
 
     path = Path(arguments.run)
@@ -269,7 +269,7 @@ def gait_command(arguments: argparse.Namespace) -> int:
 def _walked(name: str, arguments: argparse.Namespace, progress: Any, changes: dict[str, Any]) -> Any:
     """A stored run, a recording with its model, or the run of a script."""
     from mbd.laboratory.command import is_model_file, measured, model_of_file
-    from mbd.trajectory import load
+    from mbd.results.trajectory import load
 
     if is_run_file(name):
         return load(name)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.domains import ParameterCheck
-from mbd.description import Description
 from mbd.notebook import Faults, Text
 from mbd.notes import doubt
+from mbd.topology.description import Description
 
 if TYPE_CHECKING:
     from mbd.equations.cost import Cost

@@ -20,7 +20,7 @@ from mbd.progress import Progress
 from mbd.results.storage import SUFFIX
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["OPTIONS", "Script", "examples", "find", "folder"]
 
@@ -127,9 +127,9 @@ class Script:
 
     def _made(self) -> Trajectory | None:
         """The run that the script has made: that named `run`, else the last one."""
-        if "mbd.trajectory" not in sys.modules:
+        if "mbd.results.trajectory" not in sys.modules:
             return None
-        from mbd.trajectory import Trajectory
+        from mbd.results.trajectory import Trajectory
 
         made = [value for value in self.names.values() if isinstance(value, Trajectory)]
         own = self.names.get("run")
@@ -140,7 +140,7 @@ class Script:
             raise ModelError(f"{self.path.name} {why}, so {', '.join(changes)} must be changed in the script")
 
     def _run_of_main(self, progress: Progress | None, changes: Mapping[str, Any]) -> Trajectory:
-        from mbd.trajectory import Trajectory
+        from mbd.results.trajectory import Trajectory
 
         function = self.names["main"]
         takes = inspect.signature(function).parameters

@@ -18,13 +18,13 @@ from typing import Any
 import mbd
 from mbd import parts
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Triple
 from mbd.constraints.base import Constraint
 from mbd.constraints.measure import Measure
 from mbd.forces.base import Force
 from mbd.integrators import Integrator
 from mbd.joints.base import Joint
 from mbd.joints.losses.base import Loss
-from mbd.scope import Triple
 from mbd.tape.node import Scalar
 from tests.parts.benches import Part
 

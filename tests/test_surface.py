@@ -53,7 +53,7 @@ mbd.simulate(walker, kneed_walker_start(walker), mbd.HHT(alpha=0.05), dt=1e-3, u
 """
     needless = {*HEAVY} - {"llvmlite"} | {
         "scipy", "numpy.random", "importlib.metadata", "mbd.kernel.translation.translate",
-        "mbd.simulation.diagnostics.replay",
+        "mbd.simulation.replay",
     }  # fmt: skip
     loaded(program)  # the stepping kernel is built where this run is the first of its machine
     assert loaded(program).isdisjoint(needless)

@@ -14,8 +14,8 @@ from mbd.errors import TrajectoryError, UnknownNameError
 from mbd.results import summary
 from mbd.results.interpolation import Grid
 from mbd.results.record import Record
+from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
-from mbd.trajectory import Trajectory
 from tests.view.handmade_runs import ball, oscillation, oscillator, record, walker
 
 
@@ -63,7 +63,7 @@ def test_names_of_solve_ivp_work_too():
 
 def test_a_terminal_event_is_a_success_with_its_own_status():
     run = ball()
-    end = mbd.trajectory.EventRecord(float(run.time[-1]), "event", "fell", row=len(run) - 1)
+    end = mbd.results.trajectory.EventRecord(float(run.time[-1]), "event", "fell", row=len(run) - 1)
     fell = Trajectory(
         record(
             run.record.equations,

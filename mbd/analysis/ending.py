@@ -15,7 +15,7 @@ from mbd.notebook import Text
 from mbd.results.summary import cost, entries, of_the_swing, strategy
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Summary", "ending", "summary"]
 

@@ -19,7 +19,7 @@ from mbd.notebook import table as html_table
 from mbd.results.record import EventRecord
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Gait", "Step", "gait", "mirrored"]
 

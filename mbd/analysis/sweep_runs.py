@@ -18,14 +18,14 @@ from typing import Any, NamedTuple, TypeAlias
 from weakref import WeakValueDictionary
 
 from mbd.dataclass import dataclass
-from mbd.description import Description
 from mbd.equations.derivation import FrontDoor
 from mbd.errors import MbdError, ModelError, SimulationError
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.interrupted import stopped
+from mbd.simulation.run.user_calls import call_user
 from mbd.simulation.simulate import simulate
-from mbd.simulation.user_calls import call_user
 from mbd.state import State
-from mbd.trajectory import Trajectory
+from mbd.topology.description import Description
 
 __all__ = ["NOT_RUN", "SETTINGS", "Results", "Row", "Runs", "cell", "rows_of"]
 

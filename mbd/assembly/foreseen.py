@@ -14,12 +14,12 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.inertia import lost_sentence
-from mbd.description import Description
 from mbd.equations.sizes import FEW, LARGE, operations, require_room
 from mbd.errors import AssemblyError
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Tape
 from mbd.topology.check import faults
+from mbd.topology.description import Description
 from mbd.topology.plan import Plan, plan
 
 __all__ = ["require_inertia", "weighted_velocities"]

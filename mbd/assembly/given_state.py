@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.manager import manager_of
 from mbd.bodies.values import named_number_faults
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of

@@ -7,10 +7,10 @@ from typing import Any
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
-from mbd.description import Description
 from mbd.equations.derivation_context import DerivationContext
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
+from mbd.topology.description import Description
 from mbd.topology.plan import plan, uncut
 
 __all__ = ["opening"]

@@ -12,6 +12,7 @@ from mbd.arrays import Matrix
 from mbd.assembly.conflicts import Conflict, loops_of
 from mbd.assembly.dependence import Dependence, dependences, rank_of
 from mbd.assembly.infeasibility import acceleration_conflict, position_conflicts, velocity_conflict
+from mbd.assembly.manager import manager_of
 from mbd.assembly.posture import (
     TOLERANCE,
     Posture,
@@ -22,7 +23,6 @@ from mbd.assembly.posture import (
     move,
     position_rows,
 )
-from mbd.assembly.trivial_rows import manager_of
 from mbd.bodies.values import named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of

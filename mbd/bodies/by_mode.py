@@ -15,7 +15,7 @@ __all__ = ["ByMode", "by_mode_of", "number_by_mode", "parameter_by_mode", "param
 
 
 class Modes(Protocol):
-    """What of a `mbd.scope.Scope` is asked here."""
+    """What of a `mbd.bodies.scope.Scope` is asked here."""
 
     def state_names(self, mode: str) -> Sequence[str]:
         """The states of a mode."""

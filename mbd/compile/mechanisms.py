@@ -10,11 +10,11 @@ from weakref import WeakKeyDictionary
 
 from mbd.compile.forking import free_in_child
 from mbd.compile.mechanism import Mechanism
-from mbd.description import Description
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
 from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
+from mbd.topology.description import Description
 
 __all__ = ["mechanism_of", "require_model", "tunable_model"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from mbd.bodies.algebra import cross, difference, dot, scaled, total
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
-from mbd.scope import Scope, Triple
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 

@@ -7,11 +7,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
 from mbd.bodies.domains import Parameterized
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.constraints.law import Equation, Hold, Law
 from mbd.constraints.measure import mentioned_names
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["KINDS", "Constraint", "VelocityConstraint"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.constraints.base import Constraint
 from mbd.constraints.expressions import is_expression
@@ -26,7 +27,6 @@ from mbd.forces.quantities import (
     value_parameters,
 )
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.derivatives import live
 from mbd.tape.functions import atan2, cos, sin
 from mbd.tape.node import Node, Scalar

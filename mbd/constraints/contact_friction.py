@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss, LossSum, without_states
 from mbd.joints.losses.isotropic import isotropic
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["friction_of", "has_dry_part", "resistance"]

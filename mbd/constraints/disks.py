@@ -10,6 +10,7 @@ from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
 from mbd.constraints.round_on_surface import NO_PLACE, edge_on
@@ -19,7 +20,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope, Triple
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from mbd.bodies.domains import Domain
 from mbd.bodies.promises import function_of
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, flag, name_of, names_of
 from mbd.constraints.expressions import is_expression, plain
 from mbd.constraints.machine import Change, Machine
@@ -16,7 +17,6 @@ from mbd.constraints.unilateral import measure_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Event"]

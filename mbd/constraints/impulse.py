@@ -8,6 +8,7 @@ from typing import Any, Literal
 from mbd.bodies.algebra import dot, rotate
 from mbd.bodies.base import Frame
 from mbd.bodies.point_mass import PointMass
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, name_of, triple
 from mbd.constraints.base import Constraint
 from mbd.dataclass import dataclass
@@ -23,7 +24,6 @@ from mbd.forces.quantities import (
     value_parameters,
 )
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["ORDERS", "Impulse"]

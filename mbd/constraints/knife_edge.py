@@ -8,12 +8,12 @@ from typing import Any
 from mbd.bodies.algebra import dot, rotate
 from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import Vector3, name_of, unit_vector
 from mbd.constraints.base import VelocityConstraint
 from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["KnifeEdge"]

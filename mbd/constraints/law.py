@@ -18,8 +18,8 @@ A constraint of one's own is a frozen dataclass with a `name`, derived from `mbd
         k = scope.parameter(self.name, "stiffness", self.stiffness)
         return Law(contact=Closing(gap), push=k * mbd.maximum(-gap, 0.0))
 
-`scope` is what forces have too (`mbd.scope.Scope`); ``scope.rate(gap)`` is ġ. ``hold(values)`` gives the values as they
-were at the instant of closing.
+`scope` is what forces have too (`mbd.bodies.scope.Scope`); ``scope.rate(gap)`` is ġ. ``hold(values)`` gives the values
+as they were at the instant of closing.
 """
 
 from __future__ import annotations

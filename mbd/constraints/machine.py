@@ -12,9 +12,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.constraints.base import Constraint
 from mbd.dataclass import dataclass
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Change", "Machine", "state_of"]

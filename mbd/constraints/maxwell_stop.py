@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from mbd.bodies.domains import Domain, positive
+from mbd.bodies.scope import Scope
 from mbd.constraints.law import Closing, Hold, Law
 from mbd.constraints.measure import gap_of
 from mbd.constraints.stop_with_memory import StopWithMemory
 from mbd.dataclass import dataclass
-from mbd.scope import Scope
 from mbd.tape.functions import maximum
 
 __all__ = ["MaxwellStop"]

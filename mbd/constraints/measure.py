@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
 from mbd.bodies.promises import scalar
+from mbd.bodies.scope import Scope
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["Measure", "gap_of", "mentioned_names"]

@@ -6,13 +6,13 @@ from typing import Any
 
 from mbd.bodies.algebra import difference, dot, norm, rotate
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
 from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = [

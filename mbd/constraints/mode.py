@@ -7,6 +7,7 @@ from dataclasses import field, replace
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, is_number, name_of, number
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.machine import SEPARATOR, Change, Machine
@@ -15,7 +16,6 @@ from mbd.constraints.user_measure import measure
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Mode", "Transition"]

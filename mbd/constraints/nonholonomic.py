@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, is_number, name_of
 from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.expressions import is_expression, plain, quantities_in
@@ -21,7 +22,6 @@ from mbd.forces.quantities import (
     scalar,
     value_parameters,
 )
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import traced_scalar
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.constraints.expressions import is_expression, plain, quantities_in
 from mbd.constraints.measure import Measure
@@ -13,7 +14,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import ArgumentSpec, Mention, arguments_of, mentioned, resolved
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 from mbd.tape.tracing import traced
 

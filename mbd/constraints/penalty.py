@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Literal
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, name_of, number
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Hold, Law
@@ -20,7 +21,6 @@ from mbd.constraints.unilateral import measure_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.functions import maximum
 from mbd.tape.node import Scalar
 

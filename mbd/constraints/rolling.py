@@ -10,6 +10,7 @@ from mbd.bodies.algebra import cross, difference, dot, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import flag, name_of, number, unit_vector
 from mbd.constraints.base import VelocityConstraint
 from mbd.constraints.disks import to_edge
@@ -19,7 +20,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope, Triple
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Rolling"]

@@ -12,6 +12,7 @@ from mbd.bodies.algebra import dot, rotate, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.constraints.measure import Measure
 from mbd.constraints.soles import Sole, sole_of
@@ -20,7 +21,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.functions import atan2, sin
 from mbd.tape.node import Node, Scalar
 

@@ -19,8 +19,8 @@ import math
 from collections.abc import Sequence
 
 from mbd.bodies.algebra import cross, derivatives_at, difference, dot, scaled, total
+from mbd.bodies.scope import Scope, Triple
 from mbd.constraints.surfaces import Surface
-from mbd.scope import Scope, Triple
 from mbd.tape.derivatives import substitute
 from mbd.tape.functions import cos, sin, sqrt, where
 from mbd.tape.node import Node, Scalar

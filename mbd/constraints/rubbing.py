@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mbd.bodies.scope import Scope
 from mbd.constraints.law import Drag, Hold
 from mbd.constraints.measure import Measure
-from mbd.scope import Scope
 from mbd.tape.derivatives import substitute
 from mbd.tape.functions import maximum, sqrt
 from mbd.tape.node import Node, Scalar

@@ -8,12 +8,12 @@ from dataclasses import field, replace
 from typing import Any
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, names_of, number
 from mbd.constraints.machine import SEPARATOR, Change, Machine
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.forces.quantities import Mention, arguments_of, mentioned, resolved
-from mbd.scope import Scope
 from mbd.tape.functions import floor
 from mbd.tape.node import Node, Scalar
 from mbd.tape.tracing import traced_scalar

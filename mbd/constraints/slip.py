@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from mbd.bodies.algebra import cross, difference, dot, total
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope, Triple
 from mbd.constraints.balls import Ball
 from mbd.constraints.surfaces import Plane, Surface
-from mbd.scope import Scope, Triple
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["slip_along"]

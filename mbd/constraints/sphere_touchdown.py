@@ -10,6 +10,7 @@ from mbd.bodies.algebra import scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import number
 from mbd.constraints.balls import Ball
 from mbd.constraints.measure import Measure
@@ -19,7 +20,6 @@ from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["SphereTouchdown", "sphere_touchdown"]

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Drag, Hold, Law
@@ -14,7 +15,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.functions import cos, sin, sqrt
 
 __all__ = ["SpringLeg"]

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
 from mbd.constraints.measure import Measure
@@ -14,7 +15,6 @@ from mbd.constraints.unilateral import measure_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.node import Node
 
 __all__ = ["StopWithMemory"]

@@ -8,11 +8,11 @@ from typing import Any, cast
 
 from mbd.bodies.algebra import basis, cross, derivatives_at, difference, dot, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import Vector3, number, triple, unit_vector
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
-from mbd.scope import Scope, Triple
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced_scalar

@@ -8,12 +8,12 @@ from typing import Any
 
 from mbd.bodies.algebra import dot
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope, Triple
 from mbd.constraints.measure import Measure
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope, Triple
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Touchdown", "touchdown"]

@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 from mbd.bodies.algebra import cross, dot, rotate
+from mbd.bodies.scope import Rotation, Scope
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
-from mbd.scope import Rotation, Scope
 from mbd.tape.functions import atan2, sqrt, where
 from mbd.tape.node import Scalar
 

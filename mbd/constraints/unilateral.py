@@ -8,6 +8,7 @@ from functools import partial
 from typing import Literal
 
 from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
 from mbd.constraints.contact_friction import friction_of, has_dry_part, resistance
@@ -28,7 +29,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import Loss
-from mbd.scope import Scope
 from mbd.tape.functions import maximum
 from mbd.tape.node import Scalar
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among
 from mbd.constraints.expressions import plain, quantities_in
 from mbd.constraints.measure import Measure
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import ArgumentSpec, Mention, arguments_of, mentioned, quantity_of, resolved
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import traced_scalar
 

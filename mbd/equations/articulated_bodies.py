@@ -19,10 +19,10 @@ from dataclasses import field
 
 from mbd.bodies.algebra import ZERO, cross, difference, dot, product, rotate, sum_of, total, transpose
 from mbd.bodies.mass import MassProperties
+from mbd.bodies.scope import Rotation, Triple
 from mbd.dataclass import dataclass
 from mbd.equations.composite_mass import Composite
 from mbd.equations.kinematics import Moving
-from mbd.scope import Rotation, Triple
 from mbd.tape.functions import minimum
 from mbd.tape.node import Node, Scalar, Tape
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mbd.bodies.algebra import cross, difference, rotate, total
+from mbd.bodies.scope import Triple
 from mbd.equations.kinematics import Moving
 from mbd.equations.placement import Axes, Mark, Placement, Point
-from mbd.scope import Triple
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar
 

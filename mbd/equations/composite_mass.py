@@ -16,9 +16,9 @@ from collections.abc import Mapping, Sequence
 
 from mbd.bodies.algebra import cross, difference, dot, product, rotate, scaled, sum_of, total, transpose
 from mbd.bodies.mass import MassProperties
+from mbd.bodies.scope import Rotation, Triple
 from mbd.dataclass import dataclass
 from mbd.equations.kinematics import Moving
-from mbd.scope import Rotation, Triple
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["composite_mass_matrix"]

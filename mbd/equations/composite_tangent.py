@@ -28,13 +28,13 @@ from dataclasses import field
 
 from mbd.bodies.algebra import difference
 from mbd.bodies.mass import MassProperties
+from mbd.bodies.scope import Rotation, Triple
 from mbd.dataclass import dataclass
 from mbd.equations.changes import partials
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematic_proxies import Wrench
 from mbd.equations.kinematics import Moving
 from mbd.equations.placement import Placement
-from mbd.scope import Rotation, Triple
 from mbd.tape.derivatives import Sweeps, jvp
 from mbd.tape.node import Node, Scalar, Tape
 

@@ -42,7 +42,7 @@ from mbd.topology.check import require_valid
 from mbd.topology.plan import Plan, plan
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["FrontDoor", "derivation_faults", "derive"]
 

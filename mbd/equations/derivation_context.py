@@ -9,6 +9,7 @@ from functools import partial
 
 from mbd.bodies.algebra import IDENTITY, difference, product, rotate, transpose
 from mbd.bodies.base import Body, Frame
+from mbd.bodies.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.bodies.values import Vector3
 from mbd.configuration import Configuration
 from mbd.equations import changes
@@ -24,7 +25,6 @@ from mbd.equations.placement import Placement
 from mbd.errors import UnknownNameError, nearest
 from mbd.forces.rotor import Rotor
 from mbd.joints.base import Joint, row_unit
-from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.tape.derivatives import jvp, live, substitute
 from mbd.tape.functions import sin
 from mbd.tape.node import Node, Scalar, Tape
@@ -39,7 +39,7 @@ def placeholders(tape: Tape) -> tuple[Rotation, Triple]:
 
 
 class DerivationContext(ParameterScope):
-    """`mbd.scope.Scope` over a spanning tree; words see places and velocities as views, which `real` resolves.
+    """`mbd.bodies.scope.Scope` over a spanning tree; words see places and velocities as views, which `real` resolves.
 
     Parameters
     ----------

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from mbd.bodies.scope import Scope
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Coordinate
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematic_proxies import View
 from mbd.equations.parameters import ParameterTable
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["DerivationScope", "Generalized", "Resolving"]

@@ -13,6 +13,7 @@ from dataclasses import field, replace
 
 from mbd.bodies.algebra import cross, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
+from mbd.bodies.scope import Triple
 from mbd.dataclass import dataclass
 from mbd.equations.articulated_bodies import articulated_accelerations
 from mbd.equations.composite_mass import composite_mass_matrix
@@ -21,7 +22,6 @@ from mbd.equations.inputs import Inputs
 from mbd.equations.kinematic_proxies import KinematicProxies, Wrench
 from mbd.equations.kinematics import Moving, Twist, twists
 from mbd.equations.placement import Placement
-from mbd.scope import Triple
 from mbd.tape.derivatives import vjp
 from mbd.tape.node import Node, Scalar
 

@@ -14,9 +14,9 @@ from mbd.constraints.event import Event
 from mbd.constraints.machine import Machine
 from mbd.constraints.observation import Observation
 from mbd.dataclass import dataclass
-from mbd.description import all_are, served
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
+from mbd.topology.description import all_are, served
 
 __all__ = ["Coordinate", "EnergyDescription", "Expression"]
 

@@ -10,7 +10,7 @@ from mbd.bodies.link import Link
 from mbd.bodies.marker import Marker
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["Segments", "figure_of", "shown_markers"]
 

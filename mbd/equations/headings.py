@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from mbd.bodies.algebra import IDENTITY
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope
 from mbd.equations.kinematics import Moving
 from mbd.equations.placement import Heading
 from mbd.joints.base import Joint
 from mbd.joints.reversed import Reversed
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Headings", "Spin", "direction", "spin"]

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.algebra import total
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope, Triple
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.touchdown import Touchdown
-from mbd.scope import Scope, Triple
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["HELD_BY", "WAYS", "held_contacts", "offer_held"]
 

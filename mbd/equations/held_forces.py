@@ -27,7 +27,7 @@ from mbd.tape.node import Node
 from mbd.topology.held_forces import OF_GAPS, REACTIONS, names_of_held_forces
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["HeldForces", "held_force_faults"]
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from mbd.bodies.algebra import ZERO, cross, rotate, transpose
+from mbd.bodies.scope import Rotation, Triple
 from mbd.dataclass import dataclass
 from mbd.equations.kinematics import Moving
 from mbd.equations.placement import Axes, Heading, Placement, Point
-from mbd.scope import Rotation, Triple
 from mbd.tape.derivatives import live, substitute, vjp
 from mbd.tape.node import Node, Scalar
 

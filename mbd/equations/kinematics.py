@@ -16,9 +16,9 @@ from collections.abc import Mapping, Sequence
 
 from mbd.bodies.algebra import IDENTITY, ZERO, cross, difference, product, rotate, scaled, total, transpose
 from mbd.bodies.base import Body
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar, Tape
 

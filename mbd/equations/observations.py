@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import FrameMotion, JointMotion
 from mbd.constraints.observation import Observation
 from mbd.equations.coordinate_scope import CoordinateScope
 from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.outputs import AXES, Outputs
 from mbd.errors import ModelError, UnknownNameError, nearest
-from mbd.scope import FrameMotion, JointMotion
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar, Table
 

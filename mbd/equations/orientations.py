@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from mbd.bodies.algebra import rotate
+from mbd.bodies.scope import Scope
 from mbd.equations.outputs import Outputs
 from mbd.joints.anatomy import System, angles_of, measured
 from mbd.joints.base import Joint
 from mbd.joints.euler import PLACES, SEQUENCES, euler_angles
 from mbd.joints.quaternions import rotation_of, rotation_vector
 from mbd.joints.reversed import Reversed
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["offer_orientations"]

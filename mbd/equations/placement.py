@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from mbd.bodies.algebra import IDENTITY, ZERO, cross, difference, product, rotate, total
+from mbd.bodies.scope import Rotation, Triple
 from mbd.dataclass import dataclass
 from mbd.equations.kinematics import Column, Moving
-from mbd.scope import Rotation, Triple
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["Axes", "Heading", "Mark", "Placement", "Point"]

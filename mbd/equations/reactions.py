@@ -12,13 +12,13 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total, transpose
+from mbd.bodies.scope import Triple
 from mbd.equations.derivation_context import DerivationContext, placeholders
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Row
 from mbd.equations.kinematics import Moving
 from mbd.joints.base import Joint
 from mbd.joints.reversed import Reversed
-from mbd.scope import Triple
 from mbd.tape.derivatives import substitute, vjp
 from mbd.tape.node import Scalar
 

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Triple
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.equations import Contact, Effect, Equations, Row
@@ -15,11 +16,10 @@ from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.reactions import Wrench, reaction
 from mbd.forces.base import Force
 from mbd.joints.base import Joint, Label
-from mbd.scope import Triple
 from mbd.tape.node import Node, Scalar, Tape
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["offer_contacts", "offer_effects", "offer_results", "offer_rows"]
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.algebra import basis, rotate, scaled, total
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import Vector3
 from mbd.constraints.balls import Ball
 from mbd.constraints.base import Constraint
@@ -24,11 +25,10 @@ from mbd.constraints.surfaces import Plane, Surface
 from mbd.dataclass import dataclass
 from mbd.equations.held import held_contacts, offer_held
 from mbd.equations.outputs import AXES, Outputs
-from mbd.scope import Scope, Triple
 from mbd.tape.node import Scalar
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["HEIGHT", "PLACE", "Shape", "drawn", "offer_shapes", "shapes_of"]
 

@@ -16,6 +16,7 @@ from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.link import Link
 from mbd.bodies.mass import inertia_matrix
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import Vector3
 from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.rolling import Rolling
@@ -24,10 +25,9 @@ from mbd.constraints.turning_measures import Cone
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.shapes import Shape, drawn
 from mbd.joints.base import Joint
-from mbd.scope import Scope, Triple
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["offer_solids", "solids_of"]
 

@@ -10,11 +10,11 @@ from functools import cached_property
 
 from mbd.bodies.algebra import cross, difference, dot, rotate, scaled, total
 from mbd.bodies.mass import MassProperties
+from mbd.bodies.scope import Triple
 from mbd.dataclass import dataclass
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.kinematics import Moving
 from mbd.equations.outputs import AXES, Outputs
-from mbd.scope import Triple
 from mbd.tape.functions import sqrt, where
 from mbd.tape.node import Node, Scalar
 

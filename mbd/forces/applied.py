@@ -9,6 +9,7 @@ from mbd.bodies.algebra import rotate
 from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import by_mode_of
 from mbd.bodies.point_mass import PointMass
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -23,7 +24,6 @@ from mbd.forces.quantities import (
     triple_of,
     value_parameters,
 )
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["Applied"]

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Parameterized
+from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Action", "Force", "Result", "frame_of", "joint_of"]

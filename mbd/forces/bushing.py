@@ -7,13 +7,13 @@ from typing import Any
 from mbd.bodies.algebra import cross, difference, product, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.bodies.values import is_number, name_of, number, shown, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.joints.quaternions import increment_rates, of_rotation, rotation_vector
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.functions import atan2
 from mbd.tape.node import Node, Scalar
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import is_number, name_of
 from mbd.dataclass import dataclass
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import Loss, loss_of, rates_of
 from mbd.joints.losses.viscous import Viscous
-from mbd.scope import Scope
 
 __all__ = ["Damper"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -19,7 +20,6 @@ from mbd.forces.quantities import (
     value_parameters,
 )
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["DCMotor"]

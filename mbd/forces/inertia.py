@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import names_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
-from mbd.scope import Scope
 
 __all__ = ["InertialArgument", "bias_forces", "mass_matrix"]
 

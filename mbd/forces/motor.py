@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.by_mode import by_mode_of
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -19,7 +20,6 @@ from mbd.forces.quantities import (
     value_parameters,
 )
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 
 __all__ = ["Motor"]
 

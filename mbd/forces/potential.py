@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.forces.quantities import Mention, arguments_of, mentioned, quantity_of, scalar, value_parameters
-from mbd.scope import Scope
 
 __all__ = ["Potential"]
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import ByMode
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import is_number, number
 from mbd.errors import ModelError, UnknownNameError
 from mbd.forces.inertia import InertialArgument
 from mbd.forces.samples import Samples
 from mbd.forces.scipy_curves import is_curve
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 

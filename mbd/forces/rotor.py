@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Node
 
 __all__ = ["Rotor"]

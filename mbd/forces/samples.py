@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, flag, number, numbers, shown
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.scipy_curves import curves_of
 from mbd.forces.smoothing import smoothed
 from mbd.notes import doubt
-from mbd.scope import Scope
 from mbd.tape.interpolation import Pieces, hold, linear, monotone, spline
 from mbd.tape.node import Node, Scalar
 from mbd.tape.table import Table

@@ -8,11 +8,11 @@ from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
 from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["Spring"]

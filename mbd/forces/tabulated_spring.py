@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, numbers
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.interpolation import Pieces, integral
 from mbd.tape.node import Scalar
 

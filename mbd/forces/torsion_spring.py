@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["TorsionSpring"]

@@ -10,7 +10,7 @@ import numpy as np
 from mbd.results.ledger import SPENT
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["cost_of_transport", "energy_by_cause"]
 

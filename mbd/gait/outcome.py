@@ -11,7 +11,7 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Outcome", "fall_of"]
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.trivial_rows import POSES
 from mbd.compile.mechanism import Mechanism
+from mbd.compile.trivial_rows import POSES
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.joints.reflected import ACROSS, mirrored_signs

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.manager import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import ScalarFunction, scalar_function

@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from mbd.bodies.algebra import IDENTITY, product, transpose
+from mbd.bodies.scope import Rotation
 from mbd.joints.euler import euler_angles
-from mbd.scope import Rotation
 
 __all__ = ["ANATOMY", "Angle", "System", "angles_of", "measured"]
 

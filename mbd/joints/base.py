@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, Parameterized
 from mbd.bodies.promises import scalar
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.bodies.values import among, name_of, number
 from mbd.errors import ModelError, nearest
 from mbd.joints.anatomy import ANATOMY
 from mbd.joints.losses.base import Loss, loss_of
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["AWAITED", "Joint", "JointLoss", "Label", "row_unit"]

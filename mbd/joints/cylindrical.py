@@ -7,11 +7,11 @@ from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import ZERO, axis_rotation, dot, scaled
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.bodies.values import Vector3, unit_vector
 from mbd.dataclass import dataclass
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, across_rows, align_rows, angle_about
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Cylindrical"]

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from itertools import product as every
 from typing import Any
 
+from mbd.bodies.scope import Rotation
 from mbd.joints.quaternions import quaternion_product
-from mbd.scope import Rotation
 from mbd.tape.functions import atan2, sqrt, where
 
 __all__ = [

@@ -7,11 +7,11 @@ from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import IDENTITY, ZERO, rotate, transpose
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
 from mbd.joints import quaternions
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.spherical import ANGULAR_VELOCITY, ORIENTATION
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Free"]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mbd.bodies.algebra import basis, dot, rotate
+from mbd.bodies.scope import Rotation, Triple
 from mbd.bodies.values import Vector3
-from mbd.scope import Rotation, Triple
 from mbd.tape.functions import atan2
 from mbd.tape.node import Scalar
 

@@ -7,10 +7,10 @@ from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import IDENTITY, ZERO, axis_rotation, rotate, transpose
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, align_rows, angle_about
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Planar"]

@@ -17,7 +17,7 @@ from math import factorial
 from typing import Any
 
 from mbd.bodies.algebra import cross
-from mbd.scope import Rotation, Triple
+from mbd.bodies.scope import Rotation, Triple
 from mbd.tape.functions import atan2, cos, sin, sqrt, where
 from mbd.tape.node import Scalar
 

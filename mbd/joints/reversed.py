@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from mbd.bodies.algebra import cross, difference, rotate, scaled, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
 from mbd.joints.base import Joint, JointLoss, Label
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Reversed"]

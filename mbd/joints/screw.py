@@ -9,12 +9,12 @@ from dataclasses import KW_ONLY, field
 from mbd.bodies.algebra import axis_rotation, dot, scaled
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, across_rows, align_rows, sine_cosine
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.functions import atan2, cos, sin
 from mbd.tape.node import Scalar
 

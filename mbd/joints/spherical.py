@@ -8,13 +8,13 @@ from dataclasses import KW_ONLY, field
 from mbd.bodies.algebra import IDENTITY, ZERO, dot
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
 from mbd.joints import quaternions
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.losses.base import Loss
 from mbd.joints.losses.isotropic import isotropic
 from mbd.joints.parts import place_rows
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Spherical"]

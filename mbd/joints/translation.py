@@ -7,11 +7,11 @@ from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import IDENTITY, ZERO
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import place_rows, turn_rows
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Translation"]

@@ -7,12 +7,12 @@ from dataclasses import KW_ONLY, field
 
 from mbd.bodies.algebra import ZERO, axis_rotation, cross, dot, product, rotate, transpose
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.bodies.values import Vector3, unit_vector
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, place_rows
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.functions import atan2
 from mbd.tape.node import Scalar
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from mbd.bodies.algebra import IDENTITY, ZERO
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
 from mbd.joints.base import Joint, Label
 from mbd.joints.parts import place_rows, turn_rows
-from mbd.scope import Rotation, Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["Weld"]

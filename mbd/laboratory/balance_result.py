@@ -21,7 +21,7 @@ from mbd.laboratory.force_plate import ForcePlate
 from mbd.laboratory.measured_gait import MeasuredGait, gait_of_dynamics
 from mbd.results.names import scalars_behind
 from mbd.results.tables import library
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 __all__ = ["InverseDynamics"]
 

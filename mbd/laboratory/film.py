@@ -13,7 +13,7 @@ from mbd.bodies.values import is_number, number, shown
 from mbd.errors import ModelError, nearest
 from mbd.laboratory.recording import PlateRecord, Recording
 from mbd.notes import doubt
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 __all__ = ["film"]
 

@@ -14,6 +14,7 @@ from scipy.interpolate import PchipInterpolator
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.algebra import cross, difference
 from mbd.bodies.base import Frame
+from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import name_of, number, shown
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -21,7 +22,6 @@ from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.forces.samples import Samples
 from mbd.laboratory.recording import LOADED, PlateRecord, Recording
-from mbd.scope import Scope, Triple
 from mbd.tape.node import Scalar
 
 __all__ = ["ForcePlate", "all_plates", "loaded_model", "wrenches"]

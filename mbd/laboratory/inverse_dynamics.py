@@ -32,10 +32,10 @@ from mbd.laboratory.scatter import noise_remarks
 from mbd.notes import doubt
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
+from mbd.results.trajectory import Trajectory
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 from mbd.topology.plan import plan
-from mbd.trajectory import Trajectory
 
 __all__ = ["inverse_dynamics"]
 

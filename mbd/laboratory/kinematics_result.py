@@ -17,7 +17,7 @@ from mbd.laboratory.motion import derivatives
 from mbd.laboratory.nearest_posture import Postures, Problem
 from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
 from mbd.results.record import Record
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 __all__ = ["InverseKinematics", "stops_of"]
 

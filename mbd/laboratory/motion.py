@@ -25,7 +25,7 @@ from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
 from mbd.laboratory.recording import Recording
 from mbd.notes import doubt
 from mbd.results.record import Record
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 __all__ = ["Motion", "derivatives", "motion_of", "parameters_of", "record_of"]
 

@@ -17,7 +17,7 @@ from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
 from mbd.joints.losses import PinFriction
 from mbd.joints.losses.base import LossSum
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 __all__ = ["Pin", "pin_moments", "without_pins"]
 

@@ -13,13 +13,13 @@ from mbd.dataclass import dataclass
 from mbd.errors import MbdError, ModelError, TraceError, UnknownNameError
 from mbd.integrators import Integrator
 from mbd.optimization.points import Point, Source, failed, table_point
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.sensitivities import sensitivities
 from mbd.sensitivity.starts import unknown_name
 from mbd.state import State
 from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Tape
-from mbd.trajectory import Trajectory
 
 __all__ = ["RunSource"]
 

@@ -10,10 +10,10 @@ from mbd.bodies.values import name_of, number
 from mbd.constraints.measure import Measure
 from mbd.constraints.penalty import Penalty
 from mbd.constraints.rules import When
-from mbd.description import Description
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.joints.losses.base import Loss, loss_of
+from mbd.topology.description import Description
 
 __all__ = ["Stop", "added", "between", "check", "constrain_stop", "released", "sizes"]
 

@@ -10,8 +10,8 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError, UnknownNameError
 from mbd.results.columns import ModelColumns, asks_for_forces
 from mbd.results.record import Record
+from mbd.results.trajectory import Trajectory
 from mbd.state import State, malformed
-from mbd.trajectory import Trajectory
 
 __all__ = ["answered", "instant", "quantity"]
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.trivial_rows import DOUBTFUL, parts_of_row
 from mbd.compile.python import ArrayFunction, array_function
+from mbd.compile.trivial_rows import DOUBTFUL, parts_of_row
 from mbd.dataclass import dataclass
 from mbd.equal import REST_SPEED, ROUND_OFF_RTOL
 from mbd.equations import programs

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from mbd.compile.mechanism import Mechanism
+from mbd.results.trajectory import Trajectory
 from mbd.tape.node import Node
-from mbd.trajectory import Trajectory
 
 __all__ = ["identity", "identity_of_model"]
 

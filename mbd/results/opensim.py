@@ -20,7 +20,7 @@ from mbd.results.archive import named_file, write_whole
 from mbd.results.units import unit
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["storage_file", "write_storage"]
 

@@ -13,7 +13,7 @@ import numpy as np
 from mbd.results.ledger import Ledger
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["cost", "entries", "facts", "of_the_swing", "text"]
 

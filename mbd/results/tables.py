@@ -19,7 +19,7 @@ from mbd.results.long_names import long_name
 from mbd.results.units import unit
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["columns_of", "csv_file", "dataframe", "dataset", "library", "text_cell"]
 

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.outputs import with_sliding
 from mbd.sensitivity.passed import Passed
+from mbd.sensitivity.passing import tangent_run
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.starts import directions, programs_of, restitutions_of, start_tangent
-from mbd.sensitivity.tangent.passing import tangent_run
-from mbd.trajectory import Trajectory
 
 __all__ = ["Along", "along"]
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.passed import Passed
+from mbd.sensitivity.passing import tangent_run
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, Source
 from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
-from mbd.sensitivity.tangent.passing import tangent_run
-from mbd.trajectory import Trajectory
 
 __all__ = ["Differentiated", "final_state_derivative", "passed"]
 

@@ -16,13 +16,13 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.projection import project
 from mbd.bodies.values import is_number
 from mbd.errors import MbdError, OneSidedError
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, sided
 from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.state import State
 from mbd.tape.node import Node
-from mbd.trajectory import Trajectory
 
 __all__ = ["AT_ONCE", "refuse_sided_end", "refuse_sided_start", "sided_end", "with_both_sides"]
 

@@ -12,7 +12,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.notebook import table
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbd import integrators
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.manager import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, OneSidedError
@@ -19,8 +19,8 @@ from mbd.integrators.base import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.results.record import EventRecord, Record
 from mbd.results.stored_states import StoredStates
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode
-from mbd.trajectory import Trajectory
 
 __all__ = ["HELD", "RunRows", "Source", "refused", "sided"]
 

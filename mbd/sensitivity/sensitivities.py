@@ -10,6 +10,7 @@ from mbd.bodies.values import among, is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of, tunable_model
 from mbd.errors import ModelError, OneSidedError, UnknownNameError, nearest
 from mbd.integrators import Integrator
+from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
 from mbd.sensitivity.derivative import passed
 from mbd.sensitivity.functions import rates_of_parameters
@@ -22,7 +23,6 @@ from mbd.sensitivity.starts import restitution_names
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names, whole_names
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
-from mbd.trajectory import Trajectory
 
 __all__ = ["derivatives_of", "sensitivities", "with_inputs"]
 

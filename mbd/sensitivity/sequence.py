@@ -9,10 +9,10 @@ from typing import Any
 from mbd.assembly.projection import project
 from mbd.bodies.values import is_number, shown
 from mbd.errors import AssemblyError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.state import State
-from mbd.trajectory import Trajectory
 
 __all__ = ["amounts_of", "changed_sequences"]
 

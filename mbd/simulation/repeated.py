@@ -19,10 +19,10 @@ from mbd.errors import ModelError
 from mbd.integrators import Integrator
 from mbd.kernel import codes
 from mbd.results.record import EventRecord
+from mbd.simulation.many_runs import Ends, ManyRuns, may_be_many, start_line
+from mbd.simulation.marching import Run
 from mbd.simulation.run.begin import begin
 from mbd.simulation.run.late_resets import reset_ends
-from mbd.simulation.run.many import Ends, ManyRuns, may_be_many, start_line
-from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import REST_SPEED, laid_out, prepared
 from mbd.state import State
 

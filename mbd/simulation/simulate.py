@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mbd.assembly.given_state import fits
-from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.manager import manager_of
 from mbd.assembly.turns import directed
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
@@ -24,19 +24,20 @@ from mbd.integrators.extension import extension_of
 from mbd.later import later
 from mbd.notes import called_from_outside, doubt, is_heard, note
 from mbd.progress import run_bar
+from mbd.results.driving import driving_rows
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.arguments import check_arguments, end_of
 from mbd.simulation.capabilities import refusals
+from mbd.simulation.marching import Run
 from mbd.simulation.run.control import reset_faults
+from mbd.simulation.run.data import RunData
 from mbd.simulation.run.idle import keep_idle
-from mbd.simulation.run.run import Run
 from mbd.simulation.run.strategy import chosen
 from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
-from mbd.simulation.tolerance.driven import driving_rows
 from mbd.simulation.tolerance.judged import judged
 from mbd.simulation.tolerance.search import LARGEST
 from mbd.simulation.tolerance.trials import Trial
 from mbd.state import State, of_model
-from mbd.trajectory import Trajectory
 
 __all__ = ["REST_SPEED", "laid_out", "prepared", "simulate"]
 
@@ -213,7 +214,7 @@ class _Motion:
             run.observe(self.observers, bar)
             return run, *run.complete()
 
-    def to_tolerance(self, tol: float, tol_of: Sequence[str] | None) -> tuple[Run, Trajectory, str]:
+    def to_tolerance(self, tol: float, tol_of: Sequence[str] | None) -> tuple[RunData, Trajectory, str]:
         """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
         equations = mechanism_of(self.model, self.options["backend"], self.changed).equations
         names, scheme, driven = judged(equations, tol_of), self.scheme, bool(driving_rows(equations))
@@ -227,7 +228,7 @@ class _Motion:
             share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
             more = {"tol": tol, "tol_of": names, "driven": driven, "allowed": allowed, "longest": longest * share}
             run, trajectory, problem = self.run(INSTANT * min(length, 1.0), more, most)
-            return Trial(allowed, trajectory, problem, run, widest=share == LARGEST / LONGEST)
+            return Trial(allowed, trajectory, problem, run, run.room, widest=share == LARGEST / LONGEST)
 
         found = calibrated(trial, tol, first, finer, scheme.order(), names)
         trajectory = found.trial.run

@@ -11,13 +11,13 @@ import numpy as np
 
 import mbd
 from mbd.arrays import Matrix
+from mbd.bodies.scope import Scope
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, MbdError, ModelError
 from mbd.forces.base import Action, Force
 from mbd.integrators.base import Integrator
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.simulation.simulate import prepared
 from mbd.state import State
 from mbd.testing.findings import Findings, Verdict

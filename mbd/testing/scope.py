@@ -10,9 +10,9 @@ import numpy as np
 from mbd.bodies.algebra import axis_rotation, difference, product, rotate, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
+from mbd.bodies.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint
-from mbd.scope import FrameMotion, JointMotion, Rotation, Triple
 from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Scalar, Table, Tape
@@ -25,7 +25,7 @@ AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class FreeScope:
-    """`mbd.scope.Scope` in which each body has six coordinates: place, then turns about x, y, z.
+    """`mbd.bodies.scope.Scope` in which each body has six coordinates: place, then turns about x, y, z.
 
     Joints are read off their frames; `recorded` holds every parameter asked for, `asked` every body,
     `numbers` the inputs of `value`.

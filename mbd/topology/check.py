@@ -25,7 +25,7 @@ from mbd.topology.plan import cut_names, is_planar, plan
 if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
     from mbd.constraints.controller import Controller
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["faults", "parameter_check", "quantities", "require_valid", "rule_faults"]
 

@@ -14,8 +14,8 @@ from mbd.topology.plan import plan
 if TYPE_CHECKING:
     from mbd.bodies.base import Body
     from mbd.constraints.base import Constraint
-    from mbd.description import Description
     from mbd.joints.base import Joint
+    from mbd.topology.description import Description
 
 __all__ = ["described_constraint", "description", "in_html", "listed", "parts"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mbd.joints.base import Joint
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["disconnected", "graph_of", "links_of", "mobility", "spanning_tree"]
 

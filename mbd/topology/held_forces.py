@@ -9,7 +9,7 @@ from mbd.forces.base import Force
 from mbd.joints.base import Joint
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["OF_GAPS", "REACTIONS", "names_of_held_forces", "reactions_read"]
 

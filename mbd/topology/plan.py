@@ -19,7 +19,7 @@ from mbd.topology.graph import links_of, mobility, spanning_tree
 from mbd.topology.held_forces import reactions_read
 
 if TYPE_CHECKING:
-    from mbd.description import Description
+    from mbd.topology.description import Description
 
 __all__ = ["Plan", "plan", "uncut"]
 

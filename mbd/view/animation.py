@@ -10,7 +10,7 @@ from mbd.errors import ModelError
 from mbd.view.page import html
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Animation"]
 

@@ -12,7 +12,7 @@ from mbd.results.interpolation import Grid
 from mbd.results.polynomials import Index
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["curves", "extremes"]
 

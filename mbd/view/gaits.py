@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mbd.gait.branch import Branch
     from mbd.gait.cycle import LimitCycle
     from mbd.gait.follow import PointCurve
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["branch", "cycle", "point_curve"]
 

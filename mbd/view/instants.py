@@ -14,7 +14,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Moments, Trajectory
+    from mbd.results.trajectory import Moments, Trajectory
 
 __all__ = ["Instants"]
 

@@ -23,7 +23,7 @@ from mbd.view.template import filled, part, written
 from mbd.view.thinning import kept, motion
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["content", "write"]
 

@@ -26,7 +26,7 @@ from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, color, rules, tone
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait", "portrayed"]
 

@@ -11,8 +11,8 @@ from mbd.arrays import Matrix
 from mbd.bodies.ground import Ground
 from mbd.errors import ModelError
 from mbd.results.at_state import instant
+from mbd.results.trajectory import Trajectory
 from mbd.state import State
-from mbd.trajectory import Trajectory
 from mbd.view.camera import angles_of, camera
 from mbd.view.plots import drawing
 from mbd.view.posture_forces import draw_forces, with_forces

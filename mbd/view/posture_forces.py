@@ -15,8 +15,8 @@ from mbd.view.scene import Scene
 from mbd.view.style import INK, tone
 
 if TYPE_CHECKING:
+    from mbd.results.trajectory import Trajectory
     from mbd.state import State
-    from mbd.trajectory import Trajectory
 
 __all__ = ["draw_forces", "with_forces"]
 

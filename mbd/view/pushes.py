@@ -17,7 +17,7 @@ from mbd.view.instants import Instants
 from mbd.view.scenery import Scenery, plane_of_motion
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Push", "pushes"]
 

@@ -22,7 +22,7 @@ from mbd.results.summary import facts
 from mbd.view.beside import beside
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["draw", "machine", "made_with", "record", "versions", "write"]
 

@@ -20,7 +20,7 @@ from mbd.view.seen_once import once, solid_ones
 from mbd.view.solids import Hinge, Solid, Stop, hinges, limbs, solids, stops
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Instants", "Push", "Scene", "Touch", "scene"]
 

@@ -17,7 +17,7 @@ from mbd.tape.evaluate import evaluate_arrays
 from mbd.view.instants import Instants
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Ball", "Blade", "Deck", "Ground", "Sheet", "Scenery", "Wheel", "plane_of_motion", "scenery"]
 

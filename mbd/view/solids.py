@@ -15,7 +15,7 @@ from mbd.view.forms import Form, equal_inertia
 from mbd.view.instants import Instants
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Hinge", "Solid", "Stop", "hinges", "limbs", "quaternions", "rotations", "solids", "stops"]
 

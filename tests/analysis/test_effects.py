@@ -15,7 +15,7 @@ from mbd.analysis.effects.comparison import common
 from mbd.analysis.effects.contribution import Change
 from mbd.analysis.effects.scenes import Scene, reduced
 from mbd.errors import ModelError, UnknownNameError
-from mbd.trajectory import EventRecord
+from mbd.results.trajectory import EventRecord
 from tests.equations import mechanisms
 
 OUTPUTS = ("hip.angle", "knee.angle")

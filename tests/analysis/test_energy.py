@@ -11,7 +11,7 @@ import mbd
 from mbd.analysis.gait import gait, mirrored
 from mbd.equations.equations import Row
 from mbd.errors import UnknownNameError
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start, pendulum
 from tests.view.handmade_runs import Sheet, ball, oscillator, record, walker
 

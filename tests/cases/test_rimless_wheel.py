@@ -24,7 +24,7 @@ OTHER = RimlessWheel(spokes=11, length=0.7, gravity=3.5, slope=0.15, inertia=0.3
 """Another wheel, with inertia."""
 
 
-def touchdowns(run: mbd.Trajectory) -> list[mbd.trajectory.EventRecord]:
+def touchdowns(run: mbd.Trajectory) -> list[mbd.results.trajectory.EventRecord]:
     return [event for event in run.events if event.kind == "closed"]
 
 

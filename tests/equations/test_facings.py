@@ -136,7 +136,7 @@ def test_a_run_that_is_the_wrong_way_round_for_a_while_only_is_refused(monkeypat
         q[4:6, start.names.index("second.angle")] += np.pi
         return replace(record, q=q)
 
-    monkeypatch.setattr("mbd.simulation.run.run.whole_record", turned_over)
+    monkeypatch.setattr("mbd.simulation.marching.whole_record", turned_over)
     with pytest.raises(mbd.SimulationError, match=r"t = 0\.04 s: 'slide' was turned by half a turn"):
         mbd.simulate(model, start, **settings)
 

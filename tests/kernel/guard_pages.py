@@ -21,9 +21,10 @@ import numpy as np
 
 import mbd
 from mbd.kernel.records import TABLE
-from mbd.simulation.run import run, stepper
+from mbd.results.trajectory import Trajectory
+from mbd.simulation import marching
+from mbd.simulation.run import stepper
 from mbd.simulation.run.stepper import Stepper
-from mbd.trajectory import Trajectory
 from tests.kernel.test_room_to_log import sliders
 from tests.simulation.wild import wild_scene
 
@@ -93,7 +94,7 @@ if __name__ == "__main__":
     warnings.simplefilter("ignore")
     place, shortened, *seeds = sys.argv[1:]
     guard_every_call(place == "end", shortened)
-    stepper.EVENT_CAPACITY, run.ROWS_AT_ONCE = 1, 8  # a log and a store that are just large enough
+    stepper.EVENT_CAPACITY, marching.Run.rows_at_once = 1, 8  # a log and a store that are just large enough
     print(len(driven_sliders().events))
     for seed in seeds:
         print(seed, flush=True)

@@ -15,7 +15,7 @@ from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.tangent.printer import LANES, tangent_text
 from mbd.sensitivity.tangent.rules import own_rules
-from mbd.sensitivity.tangent.run import TangentRun
+from mbd.sensitivity.tangent_run import TangentRun
 from mbd.testing.mechanisms import random_scene
 from tests.gait.test_gaits_with_modes import walker as walker_with_modes
 from tests.sensitivity.differences import differences, off

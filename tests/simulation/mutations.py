@@ -24,9 +24,9 @@ import numpy as np
 
 import mbd
 from mbd.results import archive
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.run import remembered
 from mbd.state import Memory, State
-from mbd.trajectory import Trajectory
 
 __all__ = ["changed_file", "changed_memory", "outcome_of_file", "outcome_of_memory", "scene", "use"]
 

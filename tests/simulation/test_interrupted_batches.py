@@ -10,7 +10,7 @@ import pytest
 
 import mbd
 from mbd.kernel import codes
-from mbd.simulation.run.many import ManyRuns
+from mbd.simulation.many_runs import ManyRuns
 from tests.simulation.mechanisms import ball
 
 COUNT = 24

@@ -10,9 +10,9 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.kernel import codes
+from mbd.simulation.many_runs import ManyRuns, start_line
+from mbd.simulation.marching import Run
 from mbd.simulation.repeated import RepeatedRun
-from mbd.simulation.run.many import ManyRuns, start_line
-from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import REST_SPEED, laid_out
 from mbd.testing.mechanisms import random_scene
 from tests.cases.walkers import kneed, standing

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.assembly.trivial_rows import trivial_rows
 from mbd.compile.mechanisms import mechanism_of
+from mbd.compile.trivial_rows import trivial_rows
 
 ODD = np.array([1.0, 2.0, 2.0]) / 3.0
 SCHEMES = [

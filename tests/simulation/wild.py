@@ -16,7 +16,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 from tests.simulation.wild_shapes import SHAPES, Shape
 
 __all__ = ["WildScene", "wild_scene"]

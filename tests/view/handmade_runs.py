@@ -8,11 +8,11 @@ import numpy as np
 
 from mbd.equations.equations import Contact, Coordinate, Effect, Equations, Parameter, Row
 from mbd.errors import UnknownNameError, nearest
+from mbd.results.trajectory import EventRecord, Record, Trajectory
 from mbd.state import Mode, State
 from mbd.tape.derivatives import jvp
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Node, Scalar, Tape
-from mbd.trajectory import EventRecord, Record, Trajectory
 
 
 class Sheet:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 from mbd.view.page import packed
 from mbd.view.scene import Instants, scene, upright
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start

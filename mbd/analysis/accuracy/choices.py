@@ -25,7 +25,7 @@ from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Plan", "label", "plan"]
 

@@ -13,7 +13,7 @@ from mbd.equal import INSTANT_RTOL, ROUND_OFF_RTOL
 from mbd.results.matching import Matches, aligned, apart, matched
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Difference", "Matches", "aligned", "apart", "differences", "gaps", "matched", "ranges"]
 

@@ -22,7 +22,7 @@ from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["CLEAR", "Point", "Setting", "Subject", "measured"]
 

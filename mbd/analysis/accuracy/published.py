@@ -14,11 +14,11 @@ from mbd.arrays import Vector
 from mbd.bodies.values import is_number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
-from mbd.simulation.user_calls import call_user
+from mbd.simulation.run.user_calls import call_user
 
 if TYPE_CHECKING:
     from mbd.integrators import Integrator
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Known", "Published", "published", "table_of"]
 

@@ -12,7 +12,7 @@ from mbd.dataclass import dataclass
 from mbd.integrators import Integrator
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Setting", "is_high", "long_steps", "rounded", "steps_for", "steps_of", "tolerances"]
 

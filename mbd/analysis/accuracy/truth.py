@@ -12,7 +12,7 @@ import numpy as np
 from mbd.analysis.accuracy.compare import Difference, differences, ranges
 from mbd.analysis.accuracy.reference import Method, RungeKuttaReference
 from mbd.arrays import Vector
-from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.manager import manager_of
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError
@@ -22,7 +22,7 @@ from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["CLEAR", "INSTANTS", "Truth", "truth"]
 

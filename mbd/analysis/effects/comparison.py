@@ -14,7 +14,7 @@ from mbd.equal import INSTANT_RTOL
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
-    from mbd.trajectory import EventRecord, Trajectory
+    from mbd.results.trajectory import EventRecord, Trajectory
 
 __all__ = ["change", "common", "same_rows"]
 

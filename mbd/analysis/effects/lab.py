@@ -18,18 +18,18 @@ from mbd.analysis.effects.scenes import Element, Scene, elements, reduced
 from mbd.analysis.effects.timing import Pair, Timing, timed
 from mbd.bodies.values import is_number, names_given, shown
 from mbd.compile.mechanisms import mechanism_of
-from mbd.description import Description
 from mbd.equations.cost import cost
 from mbd.equations.derivation import FrontDoor
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.progress import Progress, share_bar
 from mbd.results.ledger import Ledger
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.run.memory import without_memory
 from mbd.simulation.simulate import simulate
 from mbd.state import State
-from mbd.trajectory import Trajectory
+from mbd.topology.description import Description
 
 __all__ = ["effects"]
 

@@ -19,7 +19,7 @@ from mbd.notebook import folded, paragraphs, table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["HEADS", "Effects", "cells"]
 

@@ -16,7 +16,7 @@ from mbd.equations.equations import Equations
 from mbd.state import Mode, State
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Element", "Scene", "elements", "reduced"]
 

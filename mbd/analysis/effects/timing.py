@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mbd.dataclass import dataclass
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Pair", "Timing", "timed"]
 

@@ -19,11 +19,11 @@ from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, 
 from mbd.integrators import Integrator
 from mbd.later import later
 from mbd.notebook import table
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.along import along
 from mbd.sensitivity.starts import unknown_name
 from mbd.simulation.simulate import simulate
 from mbd.state import State
-from mbd.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,7 @@ from mbd.equal import EQUAL_RTOL
 from mbd.results.interpolation import Side as When
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["PERCENT", "Curve", "angles_of", "curves_of", "forces_at", "grips_of"]
 

@@ -18,7 +18,7 @@ from mbd.results.interpolation import OneSide
 
 if TYPE_CHECKING:
     from mbd.results.impulses import Impulse
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["BOTH", "Measure", "Spent", "energy_of", "measures_of"]
 

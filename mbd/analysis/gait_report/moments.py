@@ -9,8 +9,8 @@ from mbd.arrays import Vector
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
+    from mbd.results.trajectory import Trajectory
     from mbd.tape.node import Node
-    from mbd.trajectory import Trajectory
 
 __all__ = ["Moments"]
 

@@ -21,7 +21,7 @@ from mbd.notebook import table
 from mbd.results.archive import named_file, write_whole
 from mbd.results.opensim import write_storage
 from mbd.results.tables import text_cell
-from mbd.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

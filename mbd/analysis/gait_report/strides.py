@@ -13,7 +13,7 @@ from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["ALL", "Interval", "Side", "Stride", "base_name", "of_side", "sides_of", "strides_between", "words_of"]
 

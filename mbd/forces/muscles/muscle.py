@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, name_of, number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -22,7 +23,6 @@ from mbd.forces.quantities import (
     scalar,
     value_parameters,
 )
-from mbd.scope import Scope
 from mbd.tape.functions import sin, sqrt, tanh
 from mbd.tape.node import Scalar
 

@@ -15,6 +15,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.algebra import Triple, difference, norm, rotate, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import number, shown, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -22,7 +23,6 @@ from mbd.forces.base import frame_of, joint_of
 from mbd.forces.muscles.wrapping import WrappingSurface, taut
 from mbd.forces.quantities import Mention, arguments_of, mentioned, triple_at, triple_of, value_parameters
 from mbd.joints.base import Joint
-from mbd.scope import Scope
 from mbd.tape.functions import where
 from mbd.tape.node import Scalar
 

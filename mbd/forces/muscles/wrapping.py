@@ -9,12 +9,12 @@ from typing import Any
 from mbd.bodies.algebra import Triple, cross, difference, dot, norm, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import Vector3, number, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.scope import Scope
 from mbd.tape.functions import atan2, cos, maximum, sign, sin, sqrt, where
 from mbd.tape.node import Scalar
 

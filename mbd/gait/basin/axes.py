@@ -14,7 +14,7 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.gait.return_map import ReturnMap
 from mbd.simulation.batch.starts import columns_of, places_of
-from mbd.simulation.user_calls import call_user
+from mbd.simulation.run.user_calls import call_user
 
 __all__ = ["Grid", "Study", "grid_of", "study_of"]
 

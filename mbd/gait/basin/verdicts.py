@@ -17,7 +17,7 @@ from mbd.kernel import codes
 from mbd.results.facts import Facts
 from mbd.simulation.batch.changes import Changes
 from mbd.simulation.batch.runner import Runner
-from mbd.simulation.run.many import Ends
+from mbd.simulation.many_runs import Ends
 
 __all__ = ["ARRIVES", "Verdicts"]
 

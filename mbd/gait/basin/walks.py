@@ -18,7 +18,7 @@ from mbd.gait.return_map import ReturnMap
 from mbd.kernel import codes
 from mbd.simulation.batch.changes import Changes
 from mbd.simulation.batch.runner import Runner
-from mbd.simulation.run.many import Ends, start_line
+from mbd.simulation.many_runs import Ends, start_line
 from mbd.state import State
 
 __all__ = ["Decided", "Walks"]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from mbd.bodies.domains import Domain, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
-from mbd.scope import Scope
 from mbd.tape.functions import maximum, sqrt
 from mbd.tape.node import Scalar
 

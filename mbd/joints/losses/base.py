@@ -9,9 +9,9 @@ from typing import Any, TypeAlias
 from mbd.bodies.algebra import derivatives_at
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.promises import called, scalar, title_of
+from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
-from mbd.scope import Scope
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["DissipationFunction", "Loss", "LossSum", "StateRates", "loss_of", "rates_of", "without_states"]

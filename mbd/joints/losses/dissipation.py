@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
+from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import DissipationFunction
-from mbd.scope import Scope
 from mbd.tape.node import Scalar, Tape
 from mbd.tape.tracing import traced_scalar
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mbd.bodies.scope import Scope
 from mbd.joints.losses.base import Loss, LossSum
 from mbd.joints.losses.viscous import Viscous
-from mbd.scope import Scope
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import DISSIPATES, Loss, StateRates
-from mbd.scope import Scope
 from mbd.tape.functions import exp
 from mbd.tape.node import Node, Scalar
 

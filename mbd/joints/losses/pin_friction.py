@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.dataclass import dataclass
 from mbd.joints.losses.base import Loss
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["PinFriction"]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import numbers
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
-from mbd.scope import Scope
 from mbd.tape.interpolation import Pieces, monotone
 from mbd.tape.node import Scalar
 

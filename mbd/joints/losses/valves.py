@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss, StateRates
-from mbd.scope import Scope
 from mbd.tape.functions import maximum, minimum
 from mbd.tape.node import Scalar
 

@@ -6,9 +6,9 @@ from dataclasses import field
 from typing import Any
 
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
 from mbd.joints.losses.base import DissipationFunction
-from mbd.scope import Scope
 from mbd.tape.node import Scalar
 
 __all__ = ["Viscous"]

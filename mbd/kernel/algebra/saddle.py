@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.kernel.algebra.islands import find_islands, gather_island, saddle_entry
 from mbd.kernel.algebra.linear import MOST_ROUND_OFF, eliminate, factor, round_off, sum_of_sizes
 from mbd.kernel.algebra.ordered import (
     LOSS_AT_ONCE,
@@ -19,7 +20,6 @@ from mbd.kernel.algebra.ordered import (
 )
 from mbd.kernel.algebra.redundancy import find_dependent, find_shares, sharing, spread, take_shares
 from mbd.kernel.codes import CONFLICT, DEPENDENT, EPS, NOT_FINITE
-from mbd.kernel.contact.islands import find_islands, gather_island, saddle_entry
 from mbd.kernel.records import Balance, DependentRows, Equations
 
 __all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_at", "solve_rows"]

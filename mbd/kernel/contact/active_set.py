@@ -28,7 +28,7 @@ class ActiveSetManager:
 
     Parameters
     ----------
-    trivial : numbers of rows that hold whatever the motion, and never act (see `mbd.assembly.trivial_rows`)
+    trivial : numbers of rows that hold whatever the motion, and never act (see `mbd.compile.trivial_rows`)
     """
 
     def __init__(self, equations: Equations, trivial: Collection[int] = ()) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.islands import find_islands
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import (
@@ -18,7 +19,6 @@ from mbd.kernel.codes import (
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import aim, follows, hold_directions, set_loose, set_sticking
 from mbd.kernel.contact.impact_solve import strikes
-from mbd.kernel.contact.islands import find_islands
 from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Sizes, Switching
 from mbd.kernel.stepping.restart import active_rows, capture, evaluate, row_speed, take_consistent
 

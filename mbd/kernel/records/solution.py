@@ -113,7 +113,7 @@ class LinearAlgebra(SchemeAbilities):
     columns: Integers = integers(lambda s: s.n_kkt)
     island: Integers = integers(
         lambda s: s.n_kkt
-    )  # number of the island of each unknown: see `mbd.kernel.contact.islands`
+    )  # number of the island of each unknown: see `mbd.kernel.algebra.islands`
     members: Integers = integers(lambda s: s.n_kkt)  # unknowns of one
     own_columns: Integers = integers(lambda s: s.n_kkt)  # `columns` of one
 

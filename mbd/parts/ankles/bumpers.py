@@ -8,11 +8,11 @@ from typing import Any
 from mbd.bodies.base import Frame
 from mbd.constraints.measures import extension, flexion
 from mbd.constraints.penalty import Penalty
-from mbd.description import Description
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check
+from mbd.topology.description import Description
 
 __all__ = ["bumper_ankle"]
 

@@ -6,12 +6,12 @@ from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number
-from mbd.description import Description
 from mbd.joints.losses.base import Loss
 from mbd.joints.losses.valves import Valves
 from mbd.joints.losses.viscous import Viscous
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import added, between, check
+from mbd.topology.description import Description
 
 __all__ = ["hydraulic_ankle"]
 

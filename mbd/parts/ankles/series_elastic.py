@@ -6,12 +6,12 @@ from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.bodies.rigid_body import RigidBody
-from mbd.description import Description
 from mbd.forces.motor import Motor
 from mbd.forces.potential import Potential
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check, sizes
+from mbd.topology.description import Description
 
 __all__ = ["series_elastic_ankle"]
 

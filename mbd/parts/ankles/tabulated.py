@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.base import Frame
-from mbd.description import Description
 from mbd.forces.tabulated_spring import TabulatedSpring
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check
+from mbd.topology.description import Description
 
 __all__ = ["tabulated_ankle"]
 

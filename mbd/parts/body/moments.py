@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.values import among, number
-from mbd.description import Description
 from mbd.errors import ModelError, nearest
 from mbd.forces.potential import Potential
 from mbd.joints.base import Joint
 from mbd.parts.arguments import check
 from mbd.tape.functions import exp
+from mbd.topology.description import Description
 
 __all__ = ["PASSIVE_MOMENTS", "PassiveEnergy", "passive_moment"]
 

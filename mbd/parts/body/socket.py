@@ -6,11 +6,11 @@ from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.bodies.values import triple
-from mbd.description import Description
 from mbd.forces.potential import Potential
 from mbd.joints.losses.viscous import Viscous
 from mbd.joints.planar import Planar
 from mbd.parts.arguments import between, check
+from mbd.topology.description import Description
 
 __all__ = ["elastic_socket"]
 

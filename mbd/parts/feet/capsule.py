@@ -7,10 +7,10 @@ from typing import Any
 from mbd.bodies.base import Frame
 from mbd.constraints.sphere_touchdown import sphere_touchdown
 from mbd.constraints.unilateral import Unilateral
-from mbd.description import Description
 from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
 from mbd.parts.arguments import between, check, released, sizes
+from mbd.topology.description import Description
 
 __all__ = ["capsule_foot"]
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.constraints.unilateral import Unilateral
-from mbd.description import Description
 from mbd.parts.arguments import between, check
 from mbd.parts.feet.point import point_foot
+from mbd.topology.description import Description
 
 __all__ = ["heel_and_toe"]
 

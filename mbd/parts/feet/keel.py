@@ -9,11 +9,11 @@ from mbd.bodies.base import Frame
 from mbd.bodies.inertia import rod
 from mbd.bodies.rigid_body import RigidBody
 from mbd.constraints.unilateral import Unilateral
-from mbd.description import Description
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check, sizes
 from mbd.parts.feet.heel_and_toe import heel_and_toe
+from mbd.topology.description import Description
 
 __all__ = ["CHARACTERISTIC_RADIUS", "keel_foot"]
 

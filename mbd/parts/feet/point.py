@@ -7,9 +7,9 @@ from typing import Any
 from mbd.bodies.base import Frame
 from mbd.constraints.touchdown import touchdown
 from mbd.constraints.unilateral import Unilateral
-from mbd.description import Description
 from mbd.joints.losses.base import Loss
 from mbd.parts.arguments import check, released
+from mbd.topology.description import Description
 
 __all__ = ["point_foot"]
 

@@ -7,8 +7,8 @@ from typing import Any
 from mbd.bodies.base import Frame
 from mbd.constraints.rolling_touchdown import profile_touchdown
 from mbd.constraints.unilateral import Unilateral
-from mbd.description import Description
 from mbd.parts.arguments import check, released
+from mbd.topology.description import Description
 
 __all__ = ["profile_foot"]
 

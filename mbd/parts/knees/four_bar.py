@@ -8,7 +8,6 @@ from mbd.bodies.base import Frame
 from mbd.bodies.rigid_body import RigidBody
 from mbd.constraints.measure import Measure
 from mbd.constraints.user_measure import measure
-from mbd.description import Description
 from mbd.forces.damper import Damper
 from mbd.forces.spring import Spring
 from mbd.joints.losses.affine_friction import AffineFriction
@@ -17,6 +16,7 @@ from mbd.joints.losses.valves import Valves
 from mbd.joints.revolute import Revolute
 from mbd.joints.weld import Weld
 from mbd.parts.arguments import Stop, between, check, constrain_stop
+from mbd.topology.description import Description
 
 __all__ = ["HEIGHT_3R60", "PIVOTS_3R60", "STANCE_3R60", "SWING_3R60", "four_bar_knee"]
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from mbd.bodies.base import Frame
-from mbd.description import Description
 from mbd.joints.losses.base import Loss
 from mbd.joints.losses.pin_friction import PinFriction
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import Stop, added, check
 from mbd.parts.knees.hinge import stop_knee
+from mbd.topology.description import Description
 
 __all__ = ["friction_brake_knee"]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from mbd.bodies.base import Frame
 from mbd.constraints.measures import flexion
-from mbd.description import Description
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import Stop, between, check, constrain_stop
+from mbd.topology.description import Description
 
 __all__ = ["stop_knee"]
 

@@ -6,13 +6,13 @@ from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number
-from mbd.description import Description
 from mbd.joints.losses.base import Loss
 from mbd.joints.losses.quadratic import Quadratic
 from mbd.joints.losses.valves import Valves
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import Stop, added, check, sizes
 from mbd.parts.knees.hinge import stop_knee
+from mbd.topology.description import Description
 
 __all__ = ["hydraulic_knee", "orifice"]
 

@@ -7,10 +7,10 @@ from typing import Any
 from mbd.bodies.base import Frame
 from mbd.constraints.measures import flexion
 from mbd.constraints.unilateral import Unilateral
-from mbd.description import Description
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check, released
+from mbd.topology.description import Description
 
 __all__ = ["locking_knee"]
 

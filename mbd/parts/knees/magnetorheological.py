@@ -8,13 +8,13 @@ from typing import Any
 from mbd.bodies.base import Frame
 from mbd.bodies.values import is_number, number
 from mbd.constraints.controller import Controller
-from mbd.description import Description
 from mbd.errors import ModelError
 from mbd.joints.losses.coulomb import Coulomb
 from mbd.joints.losses.viscous import Viscous
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import Stop, check
 from mbd.parts.knees.hinge import stop_knee
+from mbd.topology.description import Description
 
 __all__ = ["PHASES", "magnetorheological_knee", "phase"]
 

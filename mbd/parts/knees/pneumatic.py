@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 from mbd.bodies.base import Frame
-from mbd.description import Description
 from mbd.errors import ModelError
 from mbd.forces.potential import Potential
 from mbd.joints.losses.base import Loss
@@ -14,6 +13,7 @@ from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import Stop, check, sizes
 from mbd.parts.knees.hinge import stop_knee
 from mbd.tape.functions import exp, log
+from mbd.topology.description import Description
 
 __all__ = ["gas_energy", "pneumatic_knee"]
 

@@ -8,12 +8,12 @@ from mbd.bodies.base import Frame
 from mbd.bodies.rigid_body import RigidBody
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.user_measure import measure
-from mbd.description import Description
 from mbd.forces.dc_motor import DCMotor
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import Stop, check, sizes
 from mbd.parts.knees.hinge import stop_knee
+from mbd.topology.description import Description
 
 __all__ = ["powered_knee"]
 

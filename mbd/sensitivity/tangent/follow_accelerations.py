@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.islands import saddle_entry
 from mbd.kernel.algebra.linear import factor, solve
-from mbd.kernel.contact.islands import saddle_entry
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Kernel
 from mbd.kernel.stepping.restart import consistent, evaluate, fill_block

@@ -16,12 +16,12 @@ from mbd.errors import MbdError
 from mbd.kernel import codes
 from mbd.simulation.diagnostics.energy import TELLING, UNDRIVEN, kinds_of
 from mbd.simulation.interrupted import stopped
-from mbd.simulation.run.many import Ends
+from mbd.simulation.many_runs import Ends
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 if TYPE_CHECKING:
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["NAMES", "Alone", "made_alone", "needs_judgement"]
 

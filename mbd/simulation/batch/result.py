@@ -18,12 +18,12 @@ from mbd.results.columns import ModelColumns
 from mbd.results.record import Rows
 from mbd.simulation.batch.alone import NAMES, Alone
 from mbd.simulation.batch.starts import Starts
-from mbd.simulation.run.many import Ends
+from mbd.simulation.many_runs import Ends
 from mbd.state import State
 
 if TYPE_CHECKING:
+    from mbd.results.trajectory import Trajectory
     from mbd.simulation.batch.runner import Runner
-    from mbd.trajectory import Trajectory
 
 __all__ = ["Batch"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.trivial_rows import manager_of
+from mbd.assembly.manager import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.integrators import Integrator
@@ -18,9 +18,9 @@ from mbd.kernel import codes
 from mbd.simulation.batch.alone import Alone, made_alone, needs_judgement
 from mbd.simulation.batch.changes import Changes, telling_values
 from mbd.simulation.batch.workers import Interrupted, Workers
+from mbd.simulation.many_runs import Ends, may_be_many
+from mbd.simulation.marching import Run
 from mbd.simulation.run.late_resets import reset_ends
-from mbd.simulation.run.many import Ends, may_be_many
-from mbd.simulation.run.run import Run
 from mbd.simulation.simulate import laid_out
 from mbd.state import State
 

@@ -15,8 +15,8 @@ from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.kernel.contact.active_set import ActiveSetManager
-from mbd.simulation.run.many import start_line
-from mbd.simulation.run.run import Run
+from mbd.simulation.many_runs import start_line
+from mbd.simulation.marching import Run
 from mbd.state import State
 
 __all__ = ["Columns", "Starts", "columns_of", "given_starts", "places_of", "raise_for_turning", "starts_of"]

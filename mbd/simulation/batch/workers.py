@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
-from mbd.simulation.run.many import Ends, ManyRuns
-from mbd.simulation.run.run import Run
+from mbd.simulation.many_runs import Ends, ManyRuns
+from mbd.simulation.marching import Run
 
 __all__ = ["Interrupted", "Workers", "processors"]
 

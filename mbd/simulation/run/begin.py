@@ -14,9 +14,9 @@ from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture
 from mbd.errors import ModelError
 from mbd.kernel.stepping.begin_run import BELOW
-from mbd.simulation.parameters import residuals_now, violations_now
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of_end
+from mbd.simulation.run.parameters import residuals_now, violations_now
 from mbd.state import State
 
 __all__ = ["begin", "check_rank", "guard_values", "notify", "require_consistent", "set_side"]

@@ -14,10 +14,10 @@ from mbd.constraints.expressions import evaluated, is_expression
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
-from mbd.simulation.parameters import change_parameters, residuals_now, violations_now
 from mbd.simulation.run.boundaries import RESTARTS, without_sharing
 from mbd.simulation.run.data import RunData
-from mbd.simulation.user_calls import call_user
+from mbd.simulation.run.parameters import change_parameters, residuals_now, violations_now
+from mbd.simulation.run.user_calls import call_user
 
 PRESCRIBED_JUMP = (
     "t = {:.9g} s: a prescribed motion jumps there, which would need an infinite force: {}; let its value and its rate "

@@ -106,6 +106,8 @@ class RunData:
     """Whether a last step of the grid that ends with the run, but for round-off, ends there exactly."""
     repeats = False
     """Whether the same run has been made before, so that its parameters need not be judged."""
+    interrupted = False
+    cause: BaseException | None = None
 
     def __init__(
         self,

@@ -21,7 +21,7 @@ from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.stepping.mass_ratios import LOSS
 from mbd.kernel.stepping.restart import MAX_LOADS, fill_block, refresh_scales, take_consistent
 from mbd.simulation.run.shared_loads import shares
-from mbd.simulation.user_calls import call_user
+from mbd.simulation.run.user_calls import call_user
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 

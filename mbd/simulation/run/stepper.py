@@ -19,10 +19,10 @@ from mbd.kernel.contact.contact_modes import room_to_log
 from mbd.kernel.records import PROGRAMS, Kernel
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.kernel.translation.interpreted import InterpretedScheme
+from mbd.results.driving import driving_rows
 from mbd.simulation.run.call_table import CallTable
 from mbd.simulation.run.plain import MechanismSystem, PlainScheme, loads_act, row_units, unit_blocks
 from mbd.simulation.run.shelves import Shelves, plan_of
-from mbd.simulation.tolerance.driven import driving_rows
 from mbd.tape.derivatives import live
 
 __all__ = ["Stepper", "is_compiled"]

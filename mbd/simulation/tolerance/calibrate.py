@@ -10,7 +10,7 @@ import numpy as np
 from mbd.dataclass import dataclass
 from mbd.errors import MemoryLimitError
 from mbd.results.columns import asks_for_forces
-from mbd.simulation.tolerance.driven import drives_of, forces_told, is_wholly_driven
+from mbd.results.driving import drives_of, forces_told, is_wholly_driven
 from mbd.simulation.tolerance.foresight import LONG, foreseen
 from mbd.simulation.tolerance.search import CHECK, PILOT, REGULAR, WELL, Search
 from mbd.simulation.tolerance.trials import Trial, is_rounding, rounding
@@ -64,14 +64,14 @@ def calibrated(
     ratio = PILOT if regular else CHECK ** (1.0 / power)
     search = Search(tol, power, order, regular, ratio, names)
     first = run(PILOT * allowed, LONG) if regular else run(allowed)
-    if first.source.room.is_long:
+    if first.room.is_long:
         loose, refused = foreseen(run, first, tol, power, order, names)
         if refused or (loose and loose[-1].source.interrupted):
             return _given_up(loose, search, refused)
         first = run(PILOT * allowed)
     if not first.problem and first.run.stats["steps"] == 0:  # it ended where it began
         return _outcome([first], replace(first, error=0.0), search, "")
-    if first.source.interrupted or first.source.room.problem:
+    if first.source.interrupted or first.room.problem:
         return _outcome([first], first, search, first.problem)
     trials = [] if first.problem else [first]
     wanted: float | None = first.allowed / (ratio if trials else PILOT)
@@ -167,7 +167,7 @@ def _no_room(trials: Sequence[Trial], wanted: float, power: float, order: int) -
         return ""
     near = min(trials, key=lambda trial: trial.allowed)
     longer = (near.allowed / wanted) ** (power / order)
-    return near.source.room.refused(len(near.run.time) * longer, near.run.stats["wall_seconds"] * longer)
+    return near.room.refused(len(near.run.time) * longer, near.run.stats["wall_seconds"] * longer)
 
 
 def _coming_nearer(trials: Sequence[Trial], tol: float) -> bool:

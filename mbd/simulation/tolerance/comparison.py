@@ -17,15 +17,15 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL
 from mbd.results.dense import Restepping
+from mbd.results.driving import drives_of, share
 from mbd.results.matching import Matches, apart, matched
 from mbd.results.osculating import DOUBT, osculating
 from mbd.results.polynomials import Places, quintic
-from mbd.simulation.tolerance.driven import drives_of, share
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
     from mbd.results.record import Record
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["Gap", "gap"]
 
@@ -50,7 +50,7 @@ class Gap:
 
     size : [m, rad], or in its own unit that of a result that was compared in the place of coordinates
     same : whether both runs have the same events
-    moved : what coordinates alone differ by [m, rad], without the forces of drives (`tolerance.driven`)
+    moved : what coordinates alone differ by [m, rad], without the forces of drives (`mbd.results.driving`)
     """
 
     size: float

@@ -40,14 +40,14 @@ def foreseen(
     pilot : a run that was ended because so many rows were predicted
     power : κ of the errors; order : of the scheme; names : of the results that the tolerance holds for
     """
-    looser = (pilot.source.room.expected / 20_000) ** (order / power)  # steps of the finest of the first three, about
+    looser = (pilot.room.expected / 20_000) ** (order / power)  # steps of the finest of the first three, about
     allowed = pilot.allowed * FINER**2 * max(looser, NEAREST)
     trials: list[Trial] = []
     while allowed >= NEAREST * pilot.allowed:
         trials.append(run(allowed))
         allowed /= FINER
         ended = trials[-1].source
-        if ended.interrupted or ended.room.problem:
+        if ended.interrupted or trials[-1].room.problem:
             break
         if trials[-1].problem:  # too loose for this motion
             trials.clear()
@@ -55,9 +55,9 @@ def foreseen(
             continue
         steps, settled = _steps(trials, tol, power, order, names)
         last = trials[-1]
-        if steps > SURE * last.source.room.most:
+        if steps > SURE * last.room.most:
             stats = last.run.stats
-            return trials, last.source.room.refused(steps, steps / stats["steps"] * stats["wall_seconds"])
+            return trials, last.room.refused(steps, steps / stats["steps"] * stats["wall_seconds"])
         if settled:
             break
     return trials, ""

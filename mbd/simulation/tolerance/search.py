@@ -21,8 +21,8 @@ from time import perf_counter
 
 import numpy as np
 
+from mbd.results.driving import own_share
 from mbd.simulation.tolerance.comparison import Gap, gap
-from mbd.simulation.tolerance.driven import own_share
 from mbd.simulation.tolerance.trials import Trial, is_rounding, least_error, rounding, same_steps
 
 __all__ = ["CHECK", "LARGEST", "PILOT", "REGULAR", "WELL", "Search"]

@@ -10,8 +10,9 @@ from mbd.dataclass import dataclass
 from mbd.simulation.tolerance.comparison import Gap
 
 if TYPE_CHECKING:
-    from mbd.simulation.run.run import Run
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
+    from mbd.simulation.run.data import RunData
+    from mbd.simulation.run.room import Room
 
 __all__ = ["Trial", "is_rounding", "least_error", "rounding", "same_steps"]
 
@@ -30,7 +31,8 @@ class Trial:
     allowed: float
     run: Trajectory
     problem: str
-    source: Run
+    source: RunData
+    room: Room
     error: float = np.inf
     gap: Gap | None = None
     finest: bool = False

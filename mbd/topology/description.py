@@ -121,7 +121,7 @@ class Description:
         function : as of `mbd.measure`; or a measure; or the name of a result
         arguments : what it is called with, in order: names of results ('t', 'left hip.angle', 'left foot.force',
             observations before this one), frames (their positions), joints (their coordinates). Without them a
-            function is called with the `mbd.scope.Scope`, whose ``named`` knows all results
+            function is called with the `mbd.bodies.scope.Scope`, whose ``named`` knows all results
         unit : for tables and plots
 
         Raises

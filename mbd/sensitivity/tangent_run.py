@@ -21,8 +21,8 @@ from mbd.sensitivity.tangent.programs import (
     derivatives_of_programs,
 )
 from mbd.sensitivity.tangent.words import every_row_place
+from mbd.simulation.marching import Run
 from mbd.simulation.run.call_table import BOUND, PLACES
-from mbd.simulation.run.run import Run
 from mbd.simulation.run.stepper import Stepper
 
 __all__ = ["TangentRun", "TangentStepper"]

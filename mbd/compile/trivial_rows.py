@@ -21,11 +21,10 @@ from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.equations.equations import Equations, Row
 from mbd.equations.magnitudes import magnitudes
 from mbd.errors import ModelError
-from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 
-__all__ = ["DOUBTFUL", "manager_of", "parts_of_row", "trivial_rows"]
+__all__ = ["DOUBTFUL", "parts_of_row", "trivial_rows"]
 
 POSES = 3
 """Positions at which rows are looked at [-]."""
@@ -35,25 +34,9 @@ DOUBTFUL = 1e-6
 
 @dataclass
 class _Last:
-    """What was found last: values of the parameters on which rows depend with trivial rows and faults; the manager."""
+    """What was found last: values of the parameters on which rows depend, with trivial rows and faults."""
 
     found: tuple[Vector, tuple[frozenset[int], list[str]]] | None = None
-    manager: ActiveSetManager | None = None
-
-
-def manager_of(mechanism: Mechanism, parameters: Vector) -> ActiveSetManager:
-    """The active set of a mechanism in which the rows that are trivial with these parameters never act.
-
-    Raises
-    ------
-    ModelError
-        see `trivial_rows`.
-    """
-    trivial = trivial_rows(mechanism, parameters)
-    last = mechanism.kept(_Last, _Last)
-    if last.manager is None or last.manager.trivial != trivial:
-        last.manager = ActiveSetManager(mechanism.equations, trivial)
-    return last.manager
 
 
 def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:

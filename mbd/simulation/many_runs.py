@@ -12,9 +12,9 @@ from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.kernel import codes
 from mbd.kernel.stepping.many_runs import END_NUMBERS
+from mbd.simulation.marching import Run
 from mbd.simulation.run.late_resets import may_reset_late
 from mbd.simulation.run.plain import PlainScheme
-from mbd.simulation.run.run import Run
 from mbd.state import State
 
 __all__ = ["Ends", "ManyRuns", "may_be_many", "start_line"]

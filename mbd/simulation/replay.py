@@ -18,11 +18,11 @@ from mbd.integrators import Integrator
 from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.results.capsule import load
 from mbd.results.failure import Failure
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.diagnostics.residuals import residual_names
-from mbd.simulation.run.run import Run
+from mbd.simulation.marching import Run
 from mbd.simulation.simulate import prepared
 from mbd.state import State
-from mbd.trajectory import Trajectory
 
 __all__ = ["Iteration", "Replay", "Try", "replay"]
 

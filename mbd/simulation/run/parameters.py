@@ -11,8 +11,8 @@ from mbd.arrays import Vector
 from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.posture import Posture
-from mbd.assembly.trivial_rows import trivial_rows
 from mbd.compile.mechanism import Mechanism
+from mbd.compile.trivial_rows import trivial_rows
 from mbd.errors import ModelError, SimulationError
 from mbd.simulation.run.data import RunData
 from mbd.tape.derivatives import live

@@ -13,6 +13,7 @@ from mbd.equations.equations import Guard
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.kernel import codes
 from mbd.results.columns import ModelColumns
+from mbd.results.trajectory import EventRecord, Trajectory
 from mbd.simulation.arguments import MAX_WAIT
 from mbd.simulation.diagnostics.circular import circular_laws
 from mbd.simulation.diagnostics.energy import EnergyWatch
@@ -21,19 +22,18 @@ from mbd.simulation.diagnostics.fastest import stability
 from mbd.simulation.diagnostics.reach import out_of_reach
 from mbd.simulation.diagnostics.singular import at_singular_configuration
 from mbd.simulation.diagnostics.turning import first_reversed, overturned
+from mbd.simulation.outcome import trajectory_of
 from mbd.simulation.run.begin import begin, check_rank, notify
 from mbd.simulation.run.control import apply_reset, arrive, begin_controllers, call_controllers
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.ends import advance, call, close
 from mbd.simulation.run.memory import carry_on, take_up
-from mbd.simulation.run.outcome import trajectory_of
 from mbd.simulation.run.room import Room
 from mbd.simulation.run.savepoints import rewind, save
 from mbd.simulation.run.stored import whole_record
 from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated
-from mbd.simulation.user_calls import call_user
+from mbd.simulation.run.user_calls import call_user
 from mbd.state import State
-from mbd.trajectory import EventRecord, Trajectory
 
 __all__ = ["Run"]
 
@@ -51,9 +51,7 @@ class Run(RunData):
 
     energy: EnergyWatch
     room: Room
-    cause: BaseException | None = None
     gave_up: tuple[float, str] | None = None
-    interrupted = False
     observers: Sequence[Callable[[float, State], None]] = ()
     progress: Callable[[float, float], None] | None = None
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.diagnostics.notes import notes_of
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import ended_record
 from mbd.state import State
-from mbd.trajectory import Trajectory
 
 __all__ = ["trajectory_of"]
 

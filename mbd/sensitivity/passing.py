@@ -25,7 +25,7 @@ from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.resets import after_reset
 from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.sensitivity.tangent.margins import refuse_turning_points
-from mbd.sensitivity.tangent.run import DIRECTIONS, TangentRun
+from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
 from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.simulate import INSTANT

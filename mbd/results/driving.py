@@ -26,7 +26,7 @@ from mbd.tape.derivatives import live, substitute
 
 if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
-    from mbd.trajectory import Trajectory
+    from mbd.results.trajectory import Trajectory
 
 __all__ = ["drives_of", "driving_rows", "forces_told", "is_wholly_driven", "own_share", "share"]
 
