@@ -14,7 +14,7 @@ from mbd.equations.energy_description import EnergyDescription
 from mbd.equations.equations import Equations
 from mbd.equations.lagrangian_words import described, parts, word_faults
 from mbd.errors import ModelError, nearest
-from mbd.forces.quantities import INCREMENT
+from mbd.forces.quantities import INCREMENT_PREFIX
 from mbd.notebook import Faults, Text
 from mbd.topology.describe import in_html
 
@@ -152,6 +152,6 @@ def _name_faults(system: EnergyDescription) -> list[str]:
     faults += [
         nearest(name, system.parameters, "parameter", "There are")
         for name in system.tunable
-        if name not in system.parameters and not name.startswith(INCREMENT)
+        if name not in system.parameters and not name.startswith(INCREMENT_PREFIX)
     ]
     return faults

@@ -23,7 +23,7 @@ __all__ = ["LinearOscillator", "amplification_matrix", "oscillated"]
 SUPERPOSITION, ROUND_OFF = 1e-4, 4e-15
 """Difference of a step from the sum of its parts, relative, above which the scheme is not linear; and the part of it
 that round-off explains where accelerations are (ω dt)² times displacements [-]."""
-NEGLIGIBLE = 1e-13
+INFLUENCE_RTOL = 1e-13
 """Influence on the next step, relative to the largest, below which a number in the memory has none [-]."""
 
 MODE = Mode()
@@ -129,10 +129,10 @@ def _reduced(matrix: Matrix) -> Matrix:
     """
     while len(matrix):
         influence = np.max(np.abs(matrix), axis=0)
-        kept = influence > NEGLIGIBLE * np.max(influence)
+        kept = influence > INFLUENCE_RTOL * np.max(influence)
         matrix = matrix[np.ix_(kept, kept)]
         left, sizes, _ = np.linalg.svd(matrix)
-        rank = int(np.count_nonzero(sizes > NEGLIGIBLE * np.max(sizes, initial=0.0)))
+        rank = int(np.count_nonzero(sizes > INFLUENCE_RTOL * np.max(sizes, initial=0.0)))
         if rank == len(matrix):
             return matrix if rank else np.zeros((1, 1))
         matrix = left[:, :rank].T @ matrix @ left[:, :rank]

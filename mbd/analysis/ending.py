@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Summary", "ending", "summary"]
 
-REST = 1e-6
+REST_ENERGY_RATIO = 1e-6
 """Kinetic energy over its largest of the run, below which a mechanism rests [-]."""
 
 
-FALLEN = 0.5
+FALLEN_HEIGHT_RATIO = 0.5
 """Height over that of the start below which a mechanism has fallen [-]."""
 
 
@@ -89,7 +89,7 @@ def _rest(run: Trajectory) -> str:
     most, last = float(np.max(kinetic)), float(np.max(kinetic[run.time >= run.time[-1] - span]))
     if most == 0.0:
         return "at rest throughout"
-    if not last <= REST * most:
+    if not last <= REST_ENERGY_RATIO * most:
         return ""
     return (
         f"came to rest: kinetic energy below {last:.2g} J, {last / most:.1g} of its largest, for the last {span:.3g} s"
@@ -129,10 +129,10 @@ def _fall(run: Trajectory) -> str:
         return ""
     if sunk := _sunk(run, float(reach[0])):
         return sunk
-    if reach[-1] >= FALLEN * reach[0]:
+    if reach[-1] >= FALLEN_HEIGHT_RATIO * reach[0]:
         return ""
     top = points[int(np.argmax(height[:, 0]))]
-    when = float(run.time[np.argmax(reach < FALLEN * reach[0])])
+    when = float(run.time[np.argmax(reach < FALLEN_HEIGHT_RATIO * reach[0])])
     return (
         f"fell: it is {reach[-1]:.3g} m high, {reach[0]:.3g} m at the start with {top!r} on top; below half of that "
         f"from t = {when:.4g} s"

@@ -13,7 +13,7 @@ from mbd.equations.ports import PortTerms
 
 __all__ = ["not_finite"]
 
-BESIDE = "; linearize beside it, or make the function smooth there"
+ADVICE = "; linearize beside it, or make the function smooth there"
 """What to try."""
 
 
@@ -27,14 +27,14 @@ def not_finite(
     by_input = _columns(ports.r, ports.h, ports.rate, ports.change)
     names = [*states, *(each.name for each in inputs if each.node is not None)]
     lost = [name for name, bad in zip(names, (*by_place, *by_speed, *by_input), strict=True) if bad]
-    found = [f"forces or rows have no finite derivative by {name!r} at this state{BESIDE}" for name in lost]
+    found = [f"forces or rows have no finite derivative by {name!r} at this state{ADVICE}" for name in lost]
     of_output = (
         ports.place, ports.speed, ports.state, ports.acceleration, ports.state_rate, ports.multiplier, ports.through,
         ports.y[:, None],
     )  # fmt: skip
     bad_ones = _columns(*(part.T for part in of_output))
     lost = [each.name for each, bad in zip(outputs, bad_ones, strict=True) if bad]
-    return found + [f"the output {name!r} has no finite value or derivative at this state{BESIDE}" for name in lost]
+    return found + [f"the output {name!r} has no finite value or derivative at this state{ADVICE}" for name in lost]
 
 
 def _columns(*parts: Matrix) -> Matrix:

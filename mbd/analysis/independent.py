@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.dependence import NEGLIGIBLE
+from mbd.assembly.dependence import RANK_RTOL
 from mbd.dataclass import dataclass
 
 __all__ = ["Independent", "independent", "row_sizes"]
 
-LIGHTEST = 1e-6
+MIN_INERTIA_RATIO = 1e-6
 """Inertia, relative to the largest, below which coordinates count alike in the choice [-]."""
-VANISHES = 1e-10
+ROW_RTOL = 1e-10
 """Size of a row, relative to the largest, below which it acts on nothing [-]."""
-PREFERENCE = 1e-6
+ORDER_PREFERENCE = 1e-6
 """By how much an earlier coordinate is preferred to the next among equals [-]."""
 
 
@@ -49,11 +49,11 @@ def independent(M: Matrix, B: Matrix, turning: Matrix, velocity: Any, n_z: int =
     """
     n_v = len(M)
     inertia = np.abs(np.diag(M))
-    heaviness = np.sqrt(np.maximum(inertia, LIGHTEST * np.max(inertia, initial=0.0)) + 1e-300)
-    weights = heaviness * (1.0 + PREFERENCE * np.arange(n_v)[::-1])
+    heaviness = np.sqrt(np.maximum(inertia, MIN_INERTIA_RATIO * np.max(inertia, initial=0.0)) + 1e-300)
+    weights = heaviness * (1.0 + ORDER_PREFERENCE * np.arange(n_v)[::-1])
     size = row_sizes(B)[:, None]
     B, turning = B / size, turning / size
-    negligible = NEGLIGIBLE * float(np.max(np.abs(B / weights), initial=1e-300))
+    negligible = RANK_RTOL * float(np.max(np.abs(B / weights), initial=1e-300))
     by_place = _pivots(B[~velocity] / weights, negligible)
     places = [k for k in range(n_v) if k not in by_place]
     T = np.zeros((n_v, len(places)))
@@ -74,7 +74,7 @@ def independent(M: Matrix, B: Matrix, turning: Matrix, velocity: Any, n_z: int =
 def row_sizes(B: Matrix) -> Vector:
     """Largest entry of each row, 1 for rows that vanish beside the largest of all."""
     sizes = np.max(np.abs(B), axis=1, initial=0.0)
-    return np.where(sizes > VANISHES * np.max(sizes, initial=0.0), sizes, 1.0)
+    return np.where(sizes > ROW_RTOL * np.max(sizes, initial=0.0), sizes, 1.0)
 
 
 def _pivots(B: Matrix, negligible: float) -> list[int]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Linearization", "NaturalMode"]
 
-STEADY = 1e-6
+EQUILIBRIUM_RTOL = 1e-6
 """Acceleration, relative to what a unit displacement and the present speeds would cause, that counts as none [-]."""
 
 
@@ -190,7 +190,7 @@ class Linearization:
         count = len(self.picked)
         moved = np.abs(self.x[:count]) + [float(place < n_v) for place in self.picked]
         caused = np.abs(self.A[rates][:, :count]) @ moved
-        return bool(np.all(np.abs(self.drift[list(self.picked)][rates]) <= STEADY * np.maximum(caused, 1e-3)))
+        return bool(np.all(np.abs(self.drift[list(self.picked)][rates]) <= EQUILIBRIUM_RTOL * np.maximum(caused, 1e-3)))
 
     def rhs(self, t: float, y: Vector) -> Vector:
         """``ẏ`` of the nonlinear motion, y = (q, v, z), with the contacts of the state: for `solve_ivp`.

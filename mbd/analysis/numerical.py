@@ -32,7 +32,7 @@ GRID = tuple(float(turn) for turn in np.geomspace(1e-2, 1e3, 101))
 """ω dt at which criteria are measured unless others are asked for [rad]."""
 STIFF = (1e3, 1e4, 1e5)
 """ω dt from which the limit at infinity is extrapolated; farther out, round-off grows like ε (ω dt)² [rad]."""
-SEEN = 2.0
+MEASURED_PHASE = 2.0
 """ω t at which the error is measured for the order [rad]."""
 
 
@@ -164,11 +164,11 @@ def _spectra(integrator: Integrator, turns: Sequence[float], damping: float) -> 
 
 def _order(integrator: Integrator, damping: float) -> float:
     """log₂ of how the error at ω t = 2 falls from one halving of dt to the next, the finest above round-off."""
-    exact = LinearOscillator(SEEN, damping).exact(1.0) @ [1.0, 0.5]
+    exact = LinearOscillator(MEASURED_PHASE, damping).exact(1.0) @ [1.0, 0.5]
     errors = list[float]()
     for steps in (4, 8, 16, 32, 64, 128, 256):
-        state, _ = oscillated(integrator, SEEN / steps, damping, np.array([1.0, 0.5]), steps)[-1]
-        error = float(np.hypot(state.q[0] - exact[0], state.v[0] * steps / SEEN - exact[1]))
+        state, _ = oscillated(integrator, MEASURED_PHASE / steps, damping, np.array([1.0, 0.5]), steps)[-1]
+        error = float(np.hypot(state.q[0] - exact[0], state.v[0] * steps / MEASURED_PHASE - exact[1]))
         if error < ROUND_OFF_RTOL * steps and len(errors) >= 2:
             break
         errors.append(error)

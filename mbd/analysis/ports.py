@@ -12,7 +12,7 @@ from mbd.equations.equations import Equations, Row
 from mbd.equations.ports import PortTerms, enters, ports
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.motor import Motor
-from mbd.forces.quantities import INCREMENT
+from mbd.forces.quantities import INCREMENT_PREFIX
 from mbd.notes import doubt
 from mbd.results.facts import Facts
 from mbd.results.names import AXES
@@ -80,7 +80,7 @@ def input_names(model: Any, names: Any) -> tuple[InputNames, ...]:
         for ending, order in ORDERS.items():
             base = name.removesuffix(ending)
             if name.endswith(ending) and base in parameters | laws:
-                inner = base if base in parameters else f"{INCREMENT}{base}"
+                inner = base if base in parameters else f"{INCREMENT_PREFIX}{base}"
                 found.append(InputNames(name, base, inner, order))
                 break
         else:
@@ -217,7 +217,7 @@ def _node(equations: Equations, name: str, places: dict[str, int]) -> Node | Non
     try:
         return equations.output(name)
     except (UnknownNameError, KeyError):
-        for inner in (name, f"{INCREMENT}{name}"):
+        for inner in (name, f"{INCREMENT_PREFIX}{name}"):
             if inner in places:
                 return equations.tape.input("p", places[inner])
     return None

@@ -23,7 +23,7 @@ from mbd.integrators.base import Integrator
 
 __all__ = ["Spectrum", "argument_faults", "spectrum"]
 
-FARTHEST = 1e6
+MAX_OMEGA_DT = 1e6
 """Largest ω dt that can be told from round-off [rad]."""
 NYQUIST = float(np.pi)
 """ω dt beyond which two steps are longer than a period, so that neither period nor damping ratio means anything."""
@@ -88,8 +88,8 @@ def argument_faults(integrator: Any, turns: Sequence[float], damping: float) -> 
     if not isinstance(integrator, Integrator):
         faults.append(f"an integrator is expected, such as mbd.HHT(0.05), not {integrator!r}")
     several = isinstance(turns, list | tuple | range | np.ndarray) and len(turns) > 0
-    if not several or not all(is_number(turn) and 0.0 < turn <= FARTHEST for turn in turns):
-        faults.append(f"turns (ω dt) must be a list of numbers above 0 and up to {FARTHEST:g}, not {shown(turns)}")
+    if not several or not all(is_number(turn) and 0.0 < turn <= MAX_OMEGA_DT for turn in turns):
+        faults.append(f"turns (ω dt) must be a list of numbers above 0 and up to {MAX_OMEGA_DT:g}, not {shown(turns)}")
     if not is_number(damping) or not 0.0 <= damping < 1.0:
         faults.append(f"damping, the ratio of the oscillator, must lie in 0 ≤ ξ < 1, not {shown(damping)}")
     return faults

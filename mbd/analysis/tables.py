@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["criteria_table", "linear_html", "linear_table"]
 
-NAMED = 4
+MAX_NAMED = 4
 """Coordinates that are named in a line at most."""
-NULL = 3e-8
+ZERO_EIGENVALUE_RTOL = 3e-8
 """Eigenvalue, relative to the largest, that is reported as zero: double ones are known to √ε only [-]."""
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -33,7 +33,7 @@ def linear_table(linear: Linearization) -> str:
     if not linear.states:
         return f"{linear.model} at t = {linear.time:g} s: {size}\n  no states: rows determine the motion"
     lines = [f"{linear.model} at t = {linear.time:g} s, {kind}: {size}", f"  states: {', '.join(linear.states)}"]
-    zero = NULL * float(np.max(linear.frequencies, initial=0.0))
+    zero = ZERO_EIGENVALUE_RTOL * float(np.max(linear.frequencies, initial=0.0))
     still = int(np.count_nonzero(linear.frequencies <= zero))
     lines.append(f"  {'ω [rad/s]':>11} {'f [Hz]':>11} {'damping ζ':>10}  motion")
     for mode in linear.modes:
@@ -77,8 +77,8 @@ def _movers(shape: Mapping[str, complex]) -> str:
     """The coordinates that move most, those out of phase with a sign."""
     parts = sorted(shape.items(), key=lambda item: -round(abs(item[1]), 9))
     shown = [(name, part) for name, part in parts if abs(part) >= 0.1]  # a tenth of the largest is worth naming
-    words = [f"{'−' if part.real < 0.0 else ''}{name}" for name, part in shown[:NAMED]]
-    return ", ".join(words + (["…"] if len(shown) > NAMED else [])) or "no coordinate"
+    words = [f"{'−' if part.real < 0.0 else ''}{name}" for name, part in shown[:MAX_NAMED]]
+    return ", ".join(words + (["…"] if len(shown) > MAX_NAMED else [])) or "no coordinate"
 
 
 def criteria_table(found: Criteria) -> str:

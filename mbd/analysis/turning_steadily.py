@@ -12,7 +12,7 @@ from mbd.notes import doubt
 
 __all__ = ["doubt_of_turning"]
 
-CHANGED = 1e-5
+DERIVATIVE_RTOL = 1e-5
 """Change of the derivatives within that, over their size, that counts as one [-]."""
 
 
@@ -31,7 +31,7 @@ def doubt_of_turning(found: Instant, terms: LinearTerms) -> None:
     turned = np.where(np.isin(np.arange(len(names)), turning), state.v[: len(names)], 0.0)
     ahead = replace(found, state=replace(state, q=configuration.compose(state.q, step * turned))).terms()
     pairs = [(getattr(terms, name), getattr(ahead, name)) for name in ("M", "C", "K", "B")]
-    if all(np.max(np.abs(a - b), initial=0.0) <= CHANGED * np.max(np.abs(a), initial=0.0) for a, b in pairs):
+    if all(np.max(np.abs(a - b), initial=0.0) <= DERIVATIVE_RTOL * np.max(np.abs(a), initial=0.0) for a, b in pairs):
         return
     fastest = names[max(turning, key=lambda k: abs(state.v[k]))].partition(".")[0]
     doubt(

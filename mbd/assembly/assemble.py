@@ -21,7 +21,7 @@ from mbd.assembly.machines import first_anchors, hold, store_first, without_held
 from mbd.assembly.manager import manager_of
 from mbd.assembly.named_projection import nearest_positions, nearest_velocities
 from mbd.assembly.posture import (
-    TOLERANCE,
+    RESIDUAL_RTOL,
     Posture,
     capture,
     close_nearby,
@@ -37,14 +37,14 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
-from mbd.joints.orientations import ROUNDED
+from mbd.joints.orientations import ORTHONORMAL_ATOL
 from mbd.kernel.stepping.begin_run import BELOW
 from mbd.notes import doubt
 from mbd.state import State, of_model
 
 __all__ = ["assemble"]
 
-LIFTED = 1e-8
+OPEN_GAP = 1e-8
 """Height [m, rad] above which an open contact is armed from the start."""
 
 
@@ -242,21 +242,21 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     free = np.ones((2, equations.n_v), dtype=bool)
     _hold(free, held_q, held_v)
     misfit = close_positions(work, rows, free[0])
-    if project and np.max(np.abs(misfit), initial=0.0) > TOLERANCE and work.places and work.mechanism.vector:
+    if project and np.max(np.abs(misfit), initial=0.0) > RESIDUAL_RTOL and work.places and work.mechanism.vector:
         reached, work.q = work.q.copy(), q.copy()
         if nearest_positions(work, rows, named.q):
             misfit = np.zeros(len(misfit))
         else:
             work.q = reached
-    if np.max(np.abs(misfit), initial=0.0) <= TOLERANCE:
-        nearest_turns(work, rows, named.q, TOLERANCE)
+    if np.max(np.abs(misfit), initial=0.0) <= RESIDUAL_RTOL:
+        nearest_turns(work, rows, named.q, RESIDUAL_RTOL)
     never = infeasible(work, rows, q, misfit, model, named=bool(work.places or held_q))
     if never:
         return never
     capture(work)
     speed_misfit = close_velocities(work, free[1])
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
-    if project and np.max(np.abs(speed_misfit), initial=0.0) > TOLERANCE * speed and work.rates:
+    if project and np.max(np.abs(speed_misfit), initial=0.0) > RESIDUAL_RTOL * speed and work.rates:
         work.y = y.copy()
         if nearest_velocities(work, work.manager.active_rows(work.flags), named.v):
             speed_misfit = np.zeros(len(speed_misfit))
@@ -271,12 +271,12 @@ def _closed_as_named(work: Posture, named: _Named) -> bool:
     free = np.ones((2, work.equations.n_v), dtype=bool)
     _hold(free, held_q, held_v)
     choose_turns(trial, rows)
-    if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= TOLERANCE:
+    if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= RESIDUAL_RTOL:
         return False
-    nearest_turns(trial, rows, named.q, TOLERANCE)
+    nearest_turns(trial, rows, named.q, RESIDUAL_RTOL)
     capture(trial)
     speed = 1.0 + float(np.max(np.abs(trial.y[: work.equations.n_v]), initial=0.0))
-    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= TOLERANCE * speed:
+    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= RESIDUAL_RTOL * speed:
         return False
     capture(trial)
     work.q, work.y, work.anchors = trial.q, trial.y, trial.anchors
@@ -313,7 +313,7 @@ def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
         given, names = [k for k in own if k in named.q], ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
         if 0 < len(given) < len(own):
             faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
-    return faults or [f"position: {fault}" for fault in equations.configuration.misplaced(q, ROUNDED)]
+    return faults or [f"position: {fault}" for fault in equations.configuration.misplaced(q, ORTHONORMAL_ATOL)]
 
 
 def _gaps(work: Posture) -> Vector:
@@ -359,7 +359,7 @@ def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
     armed = set()
     values = _gaps(work)
     for c, contact in enumerate(work.manager.contacts):
-        lifted = values[c] > LIFTED
+        lifted = values[c] > OPEN_GAP
         trailing = bool(contact.when) or contact.name in opened
         if not work.flags[c] and (lifted or (not trailing and values[c] > -BELOW)):
             armed.add(contact.name)

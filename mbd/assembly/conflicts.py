@@ -30,7 +30,7 @@ LEVELS = {
     "acceleration": ("accelerations", "error", "/s²"),
 }
 """What cannot be satisfied, what its error is called, and what its unit gets, at each level."""
-HEAVY = 1e4
+HELD_ROW_WEIGHT = 1e4
 """Weight of rows that hold as the least error of another is looked for [-]."""
 
 
@@ -149,7 +149,7 @@ def linear_conflict(
     every = list(dict.fromkeys(members))
     least = irreducible(every, lambda chosen: solvable(B[rows(chosen)], right[rows(chosen)], tolerance))
     picked = rows(least)
-    weights = np.array([1.0 if members[k] == least[-1] else HEAVY for k in picked])
+    weights = np.array([1.0 if members[k] == least[-1] else HELD_ROW_WEIGHT for k in picked])
     left = np.abs(misfit(B[picked], right[picked], weights)) * (weights == 1.0)
     worst = picked[int(np.argmax(left))]
     return Conflict(level, tuple(least), float(np.max(left)), units[worst], least[-1])

@@ -9,14 +9,14 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.assembly.conflicts import loops_of
-from mbd.assembly.infeasibility import MOST_SETS, Held, named_conflict, position_conflicts, velocity_conflict
-from mbd.assembly.posture import TOLERANCE, Posture
+from mbd.assembly.infeasibility import MAX_CONFLICTING_SETS, Held, named_conflict, position_conflicts, velocity_conflict
+from mbd.assembly.posture import RESIDUAL_RTOL, Posture
 from mbd.dataclass import dataclass
 
 __all__ = ["Attempt", "contradictions", "infeasible"]
 
 
-PROJECT = ", or use assemble(..., project=True) to move all"
+PROJECT_ADVICE = ", or use assemble(..., project=True) to move all"
 """Advice to those who have not followed it yet."""
 
 
@@ -50,7 +50,7 @@ def infeasible(work: Posture, rows: Sequence[int], start: Vector, misfit: Vector
     misfit : what is left of the rows and of named positions
     named : whether values were held, so that the rows alone might close
     """
-    if np.max(np.abs(misfit), initial=0.0) <= TOLERANCE or not np.isfinite(misfit).all():
+    if np.max(np.abs(misfit), initial=0.0) <= RESIDUAL_RTOL or not np.isfinite(misfit).all():
         return []
     return [str(each) for each in position_conflicts(work, rows, start, loops_of(model), tried=not named)]
 
@@ -60,12 +60,12 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
     equations, rows, misfit, speed_misfit = work.equations, attempt.rows, attempt.misfit, attempt.speed_misfit
     active = list(work.manager.active_rows(work.flags))
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
-    fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > TOLERANCE * speed)
+    fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > RESIDUAL_RTOL * speed)
     if fast and np.isfinite(speed_misfit).all():
         conflict = velocity_conflict(work, loops_of(model))
         if conflict is not None:
             return [str(conflict)]
-    sets = _sets(work, attempt, bool(np.max(np.abs(misfit), initial=0.0) > TOLERANCE), fast, model)
+    sets = _sets(work, attempt, bool(np.max(np.abs(misfit), initial=0.0) > RESIDUAL_RTOL), fast, model)
     h = dict(zip(rows, misfit, strict=False))
     rate = dict(zip(active, speed_misfit, strict=False))
     wanted = [
@@ -76,7 +76,7 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
         f"{'' if condition.name.endswith('.rate') else which}{condition.name!r} = {condition.target:.9g} cannot be "
         f"reached: off by {off:.6g}; name fewer values" + sets.get(repr(condition.name), "")
         for which, condition, off in wanted
-        if not abs(off) <= TOLERANCE * speed
+        if not abs(off) <= RESIDUAL_RTOL * speed
     ]
     for k in active:
         row = equations.rows[k]
@@ -86,11 +86,11 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
                 f"{row.title} is not finite at the start: check roots, logarithms and divisions, and "
                 "whether a disk lies flat, which touches with all its edge"
             )
-        elif abs(position) > TOLERANCE or abs(velocity) > TOLERANCE * speed:
+        elif abs(position) > RESIDUAL_RTOL or abs(velocity) > RESIDUAL_RTOL * speed:
             place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
             found.append(
                 f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "
-                f"name fewer values{'' if attempt.projected else PROJECT}" + sets.get(repr(row.owner), "")
+                f"name fewer values{'' if attempt.projected else PROJECT_ADVICE}" + sets.get(repr(row.owner), "")
             )
     return found
 
@@ -103,7 +103,7 @@ def _sets(work: Posture, attempt: Attempt, off: bool, fast: bool, model: Any) ->
     levels += [(True, list(work.manager.active_rows(work.flags)), attempt.y, attempt.held_v)] if fast else []
     for speeds, rows, start, held in levels if finite else ():
         left = list(rows)
-        for _ in range(MOST_SETS):
+        for _ in range(MAX_CONFLICTING_SETS):
             names = named_conflict(work, left, start, held, loops, speeds)
             if not names:
                 break

@@ -11,9 +11,9 @@ from mbd.dataclass import dataclass
 
 __all__ = ["Dependence", "dependences", "rank_of"]
 
-NEGLIGIBLE = 1e-8
+RANK_RTOL = 1e-8
 """Singular value of the row-normalised B, relative to the largest, that counts as zero [-]."""
-ABSENT = 1e-7
+MIN_COEFFICIENT = 1e-7
 """Coefficient below which a row does not take part in a dependence [-]."""
 
 
@@ -58,7 +58,7 @@ def rank_of(B: Matrix) -> int:
     if not B.size:
         return 0
     sizes = np.linalg.svd(normalised(B), compute_uv=False)
-    return int(np.count_nonzero(sizes > NEGLIGIBLE * max(float(sizes[0]), 1e-300)))
+    return int(np.count_nonzero(sizes > RANK_RTOL * max(float(sizes[0]), 1e-300)))
 
 
 def dependences(B: Matrix, titles: Sequence[str]) -> tuple[Dependence, ...]:
@@ -82,13 +82,13 @@ def dependences(B: Matrix, titles: Sequence[str]) -> tuple[Dependence, ...]:
         left = row - basis.T @ (basis @ row)
         left = left - basis.T @ (basis @ left)
         size = float(np.linalg.norm(left))
-        if size > NEGLIGIBLE * max(float(np.linalg.norm(row)), 1e-300):
+        if size > RANK_RTOL * max(float(np.linalg.norm(row)), 1e-300):
             basis = np.vstack([basis, left / size])
             kept.append(k)
             continue
         parts = np.linalg.lstsq(B[kept].T, B[k], rcond=None)[0] if kept else np.zeros(0)
         share = parts * np.linalg.norm(B[kept], axis=1) / (float(np.linalg.norm(B[k])) or 1.0)
-        places = [place for place, part in enumerate(share) if abs(part) > ABSENT and row.any()]
+        places = [place for place, part in enumerate(share) if abs(part) > MIN_COEFFICIENT and row.any()]
         found.append(
             Dependence(
                 titles[k],

@@ -11,9 +11,9 @@ from mbd.tape.derivatives import gradient, live, substitute
 from mbd.tape.node import Node
 from mbd.topology.doubts import doubts
 
-__all__ = ["WIDE", "degrees", "doubtful"]
+__all__ = ["MAX_PLAUSIBLE_ANGLE", "degrees", "doubtful"]
 
-WIDE = 10.0
+MAX_PLAUSIBLE_ANGLE = 10.0
 """Angle above which a whole number may be one in degrees [rad]."""
 
 
@@ -69,5 +69,5 @@ def degrees(equations: Equations, position: Mapping[str, float]) -> list[str]:
         f"position: {name!r} is {value:g} rad, {value / math.tau:.1f} turns; angles are in radians, and {value:g}° is "
         f"math.radians({value:g}) = {math.radians(value):.4g}"
         for name, value in position.items()
-        if name in angles and abs(value) >= WIDE and float(value).is_integer()
+        if name in angles and abs(value) >= MAX_PLAUSIBLE_ANGLE and float(value).is_integer()
     ]

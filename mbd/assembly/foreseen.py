@@ -24,7 +24,7 @@ from mbd.topology.plan import Plan, plan
 
 __all__ = ["require_inertia", "weighted_velocities"]
 
-ROUND_OFF = 1e-16
+MIN_EIGENVALUE_RATIO = 1e-16
 """Smallest over largest eigenvalue of the scaled mass matrix below which no correction finds its inverse [-]."""
 
 
@@ -62,7 +62,7 @@ def require_inertia(model: Any, position: Mapping[str, float], changed: Mapping[
         return  # what no inertia resists at all is found, and named, with the equations
     _, values, right = np.linalg.svd(velocities / size, full_matrices=False)
     share = float((values[-1] / values[0]) ** 2)
-    if share < ROUND_OFF:
+    if share < MIN_EIGENVALUE_RATIO:
         worst = names[int(np.argmax(np.abs(right[-1] / size)))]
         raise AssemblyError([lost_sentence(worst, share)])
 

@@ -19,9 +19,9 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
-__all__ = ["LARGEST_ANGLE", "GivenState", "beyond_angles", "fits", "given_state"]
+__all__ = ["MAX_ANGLE", "GivenState", "beyond_angles", "fits", "given_state"]
 
-LARGEST_ANGLE = 1e12
+MAX_ANGLE = 1e12
 """Beyond this, neighbouring numbers differ by more than 1e-4 rad: poses, and what depends on them, are round-off."""
 
 
@@ -115,10 +115,10 @@ def _not_finite(start: State, equations: Equations) -> list[str]:
 
 def beyond_angles(equations: Equations, q: Vector) -> list[str]:
     """Which angles of a position (n_q,) are too large, one phrase each."""
-    if not (np.abs(q) > LARGEST_ANGLE).any():
+    if not (np.abs(q) > MAX_ANGLE).any():
         return []
     return [
         f"{coordinate.name!r} = {value:.6g} rad, where neighbouring numbers are {np.spacing(abs(value)):.2g} rad apart"
         for coordinate, value in zip(equations.coordinates, q, strict=True)
-        if coordinate.unit == "rad" and abs(value) > LARGEST_ANGLE
+        if coordinate.unit == "rad" and abs(value) > MAX_ANGLE
     ]

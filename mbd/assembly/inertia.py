@@ -16,11 +16,11 @@ from mbd.compile.mechanism import AccelerationTerms
 
 __all__ = ["lost_inertia", "lost_sentence", "undetermined"]
 
-SQUARED_ROUND_OFF = 1e-26
+ENERGY_RTOL = 1e-26
 """Kinetic energy of a motion, over what M adds up for it, below which it is that of round-off in velocities [-]."""
-LOST = 1e-17
+LOST_ENERGY_RTOL = 1e-17
 """The same below which not a digit of it is left in M, a tenth of the round-off in its entries [-]."""
-SUSPECT = 1e-12
+MIN_SINGULAR_RATIO = 1e-12
 """Smallest singular value of the equations, over the largest, above which no motion is asked for its energy [-]."""
 
 
@@ -46,8 +46,8 @@ def undetermined(work: Posture) -> list[str]:
             continue
         name = equations.velocity_names[int(np.argmax(weights[: equations.n_v]))].removesuffix(".rate")
         share = _share(work, motion[:n], terms.M)
-        if share > SQUARED_ROUND_OFF:
-            lost += [lost_sentence(name, share)] if share < LOST else []
+        if share > ENERGY_RTOL:
+            lost += [lost_sentence(name, share)] if share < LOST_ENERGY_RTOL else []
             continue
         faults.append(
             f"nothing determines the motion of {name!r}: no mass or inertia resists it and no constraint holds it; "
@@ -67,7 +67,7 @@ def lost_inertia(work: Posture) -> str:
     for size, motion in reversed(_weak_motions(matrix, n)):
         if np.max(np.abs(motion[:n_v]), initial=0.0) > 1e-6 * np.max(np.abs(motion)):
             name = work.equations.velocity_names[int(np.argmax(np.abs(motion[:n_v])))].removesuffix(".rate")
-            return lost_sentence(name, size) if _share(work, motion[:n], terms.M) > SQUARED_ROUND_OFF else ""
+            return lost_sentence(name, size) if _share(work, motion[:n], terms.M) > ENERGY_RTOL else ""
     return ""
 
 
@@ -85,11 +85,11 @@ def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
     for islands in alike_islands(scaled, n):
         _, sizes, right = np.linalg.svd(scaled[islands[:, :, np.newaxis], islands[:, np.newaxis]])
         largest = max(largest, float(np.max(sizes)))
-        for place, k in zip(*np.nonzero(sizes < len(matrix) * SUSPECT), strict=True):
+        for place, k in zip(*np.nonzero(sizes < len(matrix) * MIN_SINGULAR_RATIO), strict=True):
             motion = np.zeros(len(matrix))
             motion[islands[place]] = right[place, k]
             found.append((float(sizes[place, k]), motion / scale))
-    weak = [(size / largest, motion) for size, motion in found if size / largest < SUSPECT]
+    weak = [(size / largest, motion) for size, motion in found if size / largest < MIN_SINGULAR_RATIO]
     return sorted(weak, key=lambda each: -each[0])
 
 

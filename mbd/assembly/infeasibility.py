@@ -9,13 +9,13 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
-from mbd.assembly.conflicts import HEAVY, Conflict, Member, irreducible, linear_conflict, member_of, solvable
-from mbd.assembly.posture import TOLERANCE, Posture, close_positions, descend, descents
+from mbd.assembly.conflicts import HELD_ROW_WEIGHT, Conflict, Member, irreducible, linear_conflict, member_of, solvable
+from mbd.assembly.posture import RESIDUAL_RTOL, Posture, close_positions, descend, descents
 from mbd.dataclass import dataclass
 
 __all__ = ["Held", "acceleration_conflict", "named_conflict", "position_conflicts", "velocity_conflict"]
 
-MOST_SETS = 5
+MAX_CONFLICTING_SETS = 5
 """Conflicting sets that are reported at once."""
 
 
@@ -53,7 +53,7 @@ def position_conflicts(
     everywhere = np.ones(work.equations.n_v, dtype=bool)
     spent, found = work.iterations, dict[int, Conflict]()
     left = list(rows)
-    while left and len(found) < MOST_SETS:
+    while left and len(found) < MAX_CONFLICTING_SETS:
         members = {k: member_of(work.equations.rows[k], work.equations, loops) for k in left}
         if not tried and _closes(work, start, left, (), everywhere):
             break
@@ -85,7 +85,7 @@ def _conflict(work: Posture, start: Vector, rows: Sequence[int], loops: Loops, s
     """The conflict of rows that form an irreducible set: how far the last member misses as the others hold."""
     equations = work.equations
     members = [member_of(equations.rows[k], equations, loops) for k in rows]
-    weights = np.array([1.0 if member == members[-1] else HEAVY for member in members])
+    weights = np.array([1.0 if member == members[-1] else HELD_ROW_WEIGHT for member in members])
     missing, _ = _nearest(work, start, rows, (), np.ones(equations.n_v, dtype=bool), weights)
     sizes: dict[str, float] = {}
     for k, member, value in zip(rows, members, missing, strict=True):
@@ -99,7 +99,7 @@ def _conflict(work: Posture, start: Vector, rows: Sequence[int], loops: Loops, s
 def _closes(work: Posture, start: Vector, rows: Sequence[int], places: Sequence[Condition], free: Matrix) -> bool:
     """Whether positions satisfy some of the rows and named results."""
     trial = replace(work, q=start.copy(), places=tuple(places), anchors=work.anchors.copy())
-    return bool(np.max(np.abs(close_positions(trial, rows, free)), initial=0.0) <= TOLERANCE)
+    return bool(np.max(np.abs(close_positions(trial, rows, free)), initial=0.0) <= RESIDUAL_RTOL)
 
 
 def _nearest(
@@ -129,7 +129,7 @@ def velocity_conflict(work: Posture, loops: Loops) -> Conflict | None:
     y[: equations.n_v] = 0.0
     terms = work.mechanism.acceleration_terms(work.time, work.q, y, work.parameters, work.anchors)
     right = -terms.rate[active]
-    tolerance = TOLERANCE * (1.0 + float(np.max(np.abs(right), initial=0.0)))
+    tolerance = RESIDUAL_RTOL * (1.0 + float(np.max(np.abs(right), initial=0.0)))
     members = [member_of(equations.rows[k], equations, loops) for k in active]
     units = [equations.rows[k].unit for k in active]
     return linear_conflict(terms.B[active][:, : equations.n_v], right, members, units, "velocity", tolerance)
@@ -204,4 +204,4 @@ def _moves(work: Posture, y: Vector, rows: Sequence[int], wanted: Sequence[Condi
     unit = np.eye(n_v)[[k for each in held for k in each.moves]]
     right = np.concatenate([-rate, [each.value for each in held]])
     scale = 1.0 + float(np.max(np.abs(right), initial=0.0))
-    return solvable(np.vstack([B, unit]), right, TOLERANCE * scale)
+    return solvable(np.vstack([B, unit]), right, RESIDUAL_RTOL * scale)

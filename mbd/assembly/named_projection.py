@@ -16,14 +16,14 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
-from mbd.assembly.posture import TOLERANCE, Posture, close_nearby, close_positions, move
+from mbd.assembly.posture import RESIDUAL_RTOL, Posture, close_nearby, close_positions, move
 from mbd.equal import RANK_RTOL
 
 __all__ = ["nearest_positions", "nearest_velocities"]
 
-SMALL = 1e-10
+CHANGE_ATOL = 1e-10
 """Change [m, rad] below which it has arrived."""
-LEAST = 1e-6
+UNNAMED_WEIGHT = 1e-6
 """Weight of changes that no named value asks for, relative to those that one does [-]."""
 
 
@@ -38,7 +38,7 @@ def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, fl
     places, work.places = work.places, ()
     free = np.ones(work.equations.n_v, dtype=bool)
     try:
-        if np.max(np.abs(close_positions(work, rows, free)), initial=0.0) > TOLERANCE:
+        if np.max(np.abs(close_positions(work, rows, free)), initial=0.0) > RESIDUAL_RTOL:
             return False
         off, slopes = _off(work, places, named)
         damping = 1e-3
@@ -46,11 +46,11 @@ def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, fl
             q, anchors = work.q.copy(), work.anchors.copy()
             change = _step(_jacobian(work, rows), off, slopes, damping)
             move(work, change / max(1.0, 2.0 * float(np.max(np.abs(change), initial=0.0))))
-            closed = np.max(np.abs(close_nearby(work, rows, free)), initial=0.0) <= TOLERANCE
+            closed = np.max(np.abs(close_nearby(work, rows, free)), initial=0.0) <= RESIDUAL_RTOL
             new, new_slopes = _off(work, places, named)
             if closed and new @ new < off @ off:
                 off, slopes, damping = new, new_slopes, max(0.2 * damping, 1e-12)
-                if np.max(np.abs(change), initial=0.0) < SMALL:
+                if np.max(np.abs(change), initial=0.0) < CHANGE_ATOL:
                     break
                 continue
             work.q, work.anchors[:] = q, anchors
@@ -79,7 +79,7 @@ def nearest_velocities(work: Posture, rows: Sequence[int], named: Mapping[int, f
     work.y[:n_v] += first + free @ np.linalg.lstsq(slopes @ free, wanted, rcond=RANK_RTOL)[0]
     terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
     speed = 1.0 + float(np.max(np.abs(work.y[:n_v]), initial=0.0))
-    return bool(np.max(np.abs(terms.rate[list(rows)]), initial=0.0) <= TOLERANCE * speed)
+    return bool(np.max(np.abs(terms.rate[list(rows)]), initial=0.0) <= RESIDUAL_RTOL * speed)
 
 
 def _jacobian(work: Posture, rows: Sequence[int]) -> Matrix:
@@ -104,7 +104,7 @@ def _step(B: Matrix, off: Vector, slopes: Matrix, damping: float) -> Vector:
     if not free.shape[1]:
         return np.zeros(B.shape[1])
     reduced = slopes @ free
-    weight = np.sqrt(damping + LEAST**2) * np.eye(free.shape[1])
+    weight = np.sqrt(damping + UNNAMED_WEIGHT**2) * np.eye(free.shape[1])
     stacked = np.vstack([reduced, weight])
     return np.asarray(free @ np.linalg.lstsq(stacked, np.append(-off, np.zeros(free.shape[1])), rcond=None)[0])
 

@@ -12,11 +12,13 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.tape.derivatives import gradient
 
-__all__ = ["REVERSED", "faced", "facing_cosines", "reversed_joints"]
+__all__ = ["REVERSED_JOINT", "faced", "facing_cosines", "reversed_joints"]
 
-NEAR = 1e-3
+OPPOSITE_RTOL = 1e-3
 """(1 + cos θ)/2 below which a direction counts as opposite: within 4° of half a turn."""
-REVERSED = "{joint!r} is put together the wrong way round: its frames are {angle:.4g} rad from where it holds them"
+REVERSED_JOINT = (
+    "{joint!r} is put together the wrong way round: its frames are {angle:.4g} rad from where it holds them"
+)
 
 
 def _function(mechanism: Mechanism) -> ScalarFunction:
@@ -50,7 +52,7 @@ def reversed_joints(mechanism: Mechanism, time: float, q: Vector, parameters: Ve
     """A sentence for every cut joint that is put together the wrong way round."""
     cosines = facing_cosines(mechanism, time, q, parameters, anchors)
     return [
-        REVERSED.format(joint=facing.joint, angle=float(np.arccos(max(-1.0, min(1.0, cosine)))))
+        REVERSED_JOINT.format(joint=facing.joint, angle=float(np.arccos(max(-1.0, min(1.0, cosine)))))
         for facing, cosine in zip(mechanism.equations.facings, cosines, strict=True)
         if cosine < 0.0
     ]
@@ -74,7 +76,7 @@ def faced(work: Posture, rows: Sequence[int], h: Vector, B: Matrix) -> tuple[Vec
         half = 0.5 * (1.0 + float(cosine))
         if not picked or not np.isfinite(slope).all() or not np.isfinite(half):
             continue
-        if half < NEAR:
+        if half < OPPOSITE_RTOL:
             opposite = True
             h[picked] = np.where(h[picked] < 0.0, -1.0, 1.0) * np.maximum(np.abs(h[picked]), np.pi)
             continue

@@ -13,25 +13,25 @@ from mbd.assembly.pose import Posture
 from mbd.assembly.turns import choose_turns, hold_directions
 
 __all__ = [
-    "Posture", "TOLERANCE", "capture", "close_nearby", "close_positions", "close_velocities", "damped_step",
+    "Posture", "RESIDUAL_RTOL", "capture", "close_nearby", "close_positions", "close_velocities", "damped_step",
     "descend", "descents", "move", "position_rows",
 ]  # fmt: skip
 
-TOLERANCE = 1e-9
+RESIDUAL_RTOL = 1e-9
 """Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
 REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
-ACTS = 1e-14
+DERIVATIVE_ATOL = 1e-14
 """Derivative [m/rad, -] of a row below which a coordinate does not act on it: what cancellation leaves of zero."""
-LEVER = 2.0
+MAX_LEVER = 2.0
 """Derivative of a row over what rows are off, up to which it may come from that alone; √3 at most [1/rad]."""
-PATIENCE = 20
+MAX_STEPS_TO_HALVE = 20
 """Steps of Newton's method in which the largest residual of a start must come down to half [-]."""
 NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
 TRIES, DESCENT = 4, 400
 """Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
-CLOSE = 1e-3
+NEWTON_RANGE = 1e-3
 """Row residual [m, rad] at the end of a descent from which Newton's method may go on."""
 
 
@@ -51,7 +51,7 @@ def _involved(B: Matrix, free: Matrix, missing: float = 0.0) -> Any:
     missing : what the rows are off: a base that carries all they compare turns that along, and changes it by no more
     """
     size = float(np.max(np.abs(B), initial=0.0))
-    least = max(1e-12 * size, ACTS, LEVER * missing)
+    least = max(1e-12 * size, DERIVATIVE_ATOL, MAX_LEVER * missing)
     return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > least))
 
 
@@ -80,7 +80,7 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     start = work.q.copy()
     choose_turns(work, rows)
     misfit = _newton(work, rows, free, start)
-    if np.max(np.abs(misfit)) <= TOLERANCE:
+    if np.max(np.abs(misfit)) <= RESIDUAL_RTOL:
         return misfit
     first, angles, moved = work.q, _angles(work), work.equations.configuration.compose
     turns = np.random.default_rng(0).uniform(-1.5, 1.5, (12, len(free)))
@@ -88,15 +88,15 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
         work.q = moved(start, np.where(free & angles, turn, 0.0))
         choose_turns(work, rows)
         again = _newton(work, rows, free, start)
-        if np.max(np.abs(again)) <= TOLERANCE:
+        if np.max(np.abs(again)) <= RESIDUAL_RTOL:
             return again
     weights = np.ones(len(rows) + len(work.places))
-    for q in descents(work, start, free) if np.max(np.abs(misfit)) > TOLERANCE else ():
+    for q in descents(work, start, free) if np.max(np.abs(misfit)) > RESIDUAL_RTOL else ():
         work.q = q
         missing, _ = descend(work, rows, free, weights)
-        if np.max(np.abs(missing)) < CLOSE:
+        if np.max(np.abs(missing)) < NEWTON_RANGE:
             again = _newton(work, rows, free, work.q.copy())
-            if np.max(np.abs(again)) <= TOLERANCE:
+            if np.max(np.abs(again)) <= RESIDUAL_RTOL:
                 return again
     work.q = first
     return misfit
@@ -171,7 +171,7 @@ def move(work: Posture, x: Vector) -> None:
 def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> Vector:
     """Newton on the free coordinates, close to `start` at the end; the remaining residual of each row.
 
-    What has not come down to half in `PATIENCE` steps goes on without the pull to `start`, and then is given up.
+    What has not halved in `MAX_STEPS_TO_HALVE` steps continues without the pull to `start`, and then is given up.
     """
     n_v = work.equations.n_v
     before, picked = np.inf, list(rows)
@@ -186,13 +186,13 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             continue
         size = float(np.max(np.abs(h)))
         places = _involved(B, free)
-        if not len(places) and size > TOLERANCE and iteration < NUDGES:
+        if not len(places) and size > RESIDUAL_RTOL and iteration < NUDGES:
             _nudge(work, rows, free)
             continue
         if not np.isfinite(size) or not len(places):
             return h
         least, since = (size, 0) if size < 0.5 * least else (least, since + 1)
-        if since > PATIENCE and size > TOLERANCE:
+        if since > MAX_STEPS_TO_HALVE and size > RESIDUAL_RTOL:
             if astray:
                 return h
             least, since, astray = np.inf, 0, True

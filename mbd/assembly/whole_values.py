@@ -15,7 +15,7 @@ from mbd.joints.orientations import is_orientation, orientation_doubt, quaternio
 
 __all__ = ["as_given", "spelled_out", "three_of_four"]
 
-PARTS = "wxyz"
+QUATERNION_PARTS = "wxyz"
 EULER = re.compile(r"(.+)\.euler\.([xyz]{3})")
 
 
@@ -45,7 +45,7 @@ def spelled_out(model: Any, values: Any, what: str) -> tuple[Any, list[str], lis
                 continue
             sentence = orientation_doubt(value, f"position: {name!r}")
             doubts += [] if sentence is None else [sentence]
-            parts = {f"{name}.{part}": number for part, number in zip(PARTS, quaternion, strict=True)}
+            parts = {f"{name}.{part}": number for part, number in zip(QUATERNION_PARTS, quaternion, strict=True)}
         elif isinstance(name, str) and is_orientation(value) and len(np.atleast_1d(np.asarray(value, object))) == 3:
             angles = EULER.fullmatch(name)
             if angles is not None and f"{angles[1]}.orientation" in known:
@@ -92,7 +92,7 @@ def three_of_four(model: Any, values: Mapping[str, float]) -> dict[str, float]:
     """
     found = dict(values)
     for name in oriented(model):
-        own = [f"{name}.{part}" for part in PARTS]
+        own = [f"{name}.{part}" for part in QUATERNION_PARTS]
         if all(part in values for part in own):
             q = [values[part] for part in own]
             largest = next(k for k in range(4) if 4.0 * q[k] ** 2 > 0.9)  # the divisor of `of_rotation`

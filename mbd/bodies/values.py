@@ -20,7 +20,7 @@ Vector3: TypeAlias = tuple[float, float, float]
 """Three plain numbers, known when the model is described."""
 
 
-TURNING = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+DIRECTION_MARKS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 """Signs after which text runs the other way."""
 
 
@@ -39,7 +39,7 @@ def printable(name: str, what: str) -> str:
     >>> printable("left knee", "Revolute")
     'left knee'
     """
-    wrong = [sign for sign in name if unicodedata.category(sign) in ("Cc", "Cs", "Zl", "Zp") or sign in TURNING]
+    wrong = [sign for sign in name if unicodedata.category(sign) in ("Cc", "Cs", "Zl", "Zp") or sign in DIRECTION_MARKS]
     if wrong:
         raise ModelError(f"{what} {name!r}: a name holds no control characters such as {wrong[0]!r}; leave them out")
     return name

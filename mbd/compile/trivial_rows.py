@@ -24,11 +24,11 @@ from mbd.errors import ModelError
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 
-__all__ = ["DOUBTFUL", "parts_of_row", "trivial_rows"]
+__all__ = ["DERIVATIVE_ATOL", "parts_of_row", "trivial_rows"]
 
-POSES = 3
+SAMPLED_POSES = 3
 """Positions at which rows are looked at [-]."""
-DOUBTFUL = 1e-6
+DERIVATIVE_ATOL = 1e-6
 """Largest derivative of a row, beside 1 and those of others, above which no closer look is needed [m, rad, -]."""
 
 
@@ -75,7 +75,7 @@ def _found(mechanism: Mechanism, parameters: Vector) -> tuple[frozenset[int], li
         terms = [mechanism.terms_of(block, parameters) for block in blocks]
     B = np.abs(np.stack([each.B[:, :n_v] for each in terms]))
     largest = np.max(B, axis=(0, 2), initial=0.0)
-    bound = DOUBTFUL * max(1.0, float(np.max(largest, initial=0.0)))
+    bound = DERIVATIVE_ATOL * max(1.0, float(np.max(largest, initial=0.0)))
     normals = {contact.rows[0] for contact in equations.contacts if contact.rows}
     doubtful = [k for k in range(len(equations.rows)) if largest[k] <= bound and k not in normals]
     if not doubtful:
@@ -100,7 +100,7 @@ def _blocks(mechanism: Mechanism) -> list[Any]:
     equations, layout = mechanism.equations, mechanism.layout
     q = np.array([coordinate.default for coordinate in equations.coordinates], dtype=float)
     found, places = list[Any](), np.arange(1, equations.n_v + 1)
-    for number in range(POSES):
+    for number in range(SAMPLED_POSES):
         block = mechanism.block(0.37 * number, q, np.zeros(layout.n), np.zeros(layout.n_anchors))
         block[layout.x : layout.v] = 1.2 * np.sin(2.3 * places + 5.1 * number + 0.4)
         found.append(block)

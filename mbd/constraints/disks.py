@@ -13,7 +13,7 @@ from mbd.bodies.ground import Ground
 from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import Vector3, number, unit_vector
 from mbd.constraints.measure import Measure
-from mbd.constraints.round_on_surface import NO_PLACE, edge_on
+from mbd.constraints.round_on_surface import NO_CONTACT_POINT, edge_on
 from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.dataclass import dataclass
@@ -41,7 +41,7 @@ def to_edge(center: Frame, axis: Vector3, radius: Scalar, ground: Plane, scope: 
     return scaled(radius / sqrt(dot(across, across)), difference(scaled(dot(n, a), a), n))
 
 
-FLAT = "a disk that lies flat touches with all its edge (give it feet along the edge by mbd.touchdown to lie on)"
+FLAT_DISK = "a disk that lies flat touches with all its edge (give it feet along the edge by mbd.touchdown to lie on)"
 """What a row that is no number means."""
 
 
@@ -73,7 +73,7 @@ class DiskTouchdown(Measure):
     @property
     def undefined(self) -> str:
         """It lies flat, or a height function has no single place of contact."""
-        return f"{FLAT}, or {NO_PLACE}" if isinstance(self.ground, Surface) else FLAT
+        return f"{FLAT_DISK}, or {NO_CONTACT_POINT}" if isinstance(self.ground, Surface) else FLAT_DISK
 
     @property
     def has_slip_velocities(self) -> bool:

@@ -14,7 +14,7 @@ from mbd.constraints.base import Constraint
 from mbd.constraints.law import Closing, Hold, Law
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.penalty_parameters import largest_dt
-from mbd.constraints.restitution import KELVIN_VOIGT, LEAST_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
+from mbd.constraints.restitution import KELVIN_VOIGT, MIN_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
 from mbd.constraints.rubbing import rub, slip_velocities
 from mbd.constraints.rules import condition_details, condition_faults, condition_of, contacts_of, mentions_of
 from mbd.constraints.unilateral import measure_of
@@ -26,10 +26,10 @@ from mbd.tape.node import Scalar
 
 __all__ = ["Penalty"]
 
-SLOWEST = 1e-6
+MIN_APPROACH_SPEED = 1e-6
 """Least approach speed of the χ laws [m/s or rad/s], the default of 'name.slowest': a touch at rest divides by it."""
 
-CREEP = 1e-3
+CREEP_SPEED = 1e-3
 """Speed at which friction is 1/√2 of what it becomes, the default of 'name.creep' [m/s]."""
 
 NUMBERS = ("stiffness", "damping", "exponent", "friction", "creep")
@@ -75,7 +75,7 @@ class Penalty(Constraint):
     release: str = "gap"
     effective_mass: float | None = None
     friction: float = 0.0
-    creep: float = CREEP
+    creep: float = CREEP_SPEED
     only_while: str | Measure | None = None
 
     def __post_init__(self) -> None:
@@ -206,7 +206,7 @@ class Penalty(Constraint):
         chi = self.chi
         if chi is None:
             return k * self._power(-gap, scope) - scope.parameter(self.name, "damping", self.damper) * gap_rate
-        slowest = scope.parameter(self.name, "slowest", SLOWEST)
+        slowest = scope.parameter(self.name, "slowest", MIN_APPROACH_SPEED)
         loss = scope.parameter(self.name, "chi", chi) * gap_rate / maximum(approach, slowest)
         pushing: Scalar = maximum(1.0 - loss, 0.0)
         return k * self._power(-gap, scope) * pushing
@@ -251,7 +251,7 @@ class Penalty(Constraint):
     def parameters(self) -> dict[str, float]:
         """`stiffness`, `damping` or `chi` and `slowest`, `mu` and `creep` with friction; and those of its measure."""
         chi = self.chi
-        loss = {"damping": self.damper} if chi is None else {"slowest": SLOWEST, "chi": chi}
+        loss = {"damping": self.damper} if chi is None else {"slowest": MIN_APPROACH_SPEED, "chi": chi}
         friction = {"mu": self.friction, "creep": self.creep} if self.has_friction else {}
         own = {
             f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss, **friction}.items()
@@ -264,8 +264,8 @@ class Penalty(Constraint):
         if self.chi is None:
             domains["damping"] = at_least_zero("would feed energy in; give a value ≥ 0")
         else:
-            largest = chi_for(LEAST_RESTITUTION, law_of(self.law, self.name))
-            problem = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {LEAST_RESTITUTION:g}"
+            largest = chi_for(MIN_RESTITUTION, law_of(self.law, self.name))
+            problem = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {MIN_RESTITUTION:g}"
             domains |= {"chi": Domain(low=0.0, high=largest, problem=problem), "slowest": positive(unit="m/s")}
         if self.has_friction:
             domains["mu"] = Domain(low=0.0, problem="is negative; give 0 for none", called="friction")

@@ -19,11 +19,11 @@ from mbd.bodies.values import among
 from mbd.errors import ModelError, nearest
 
 __all__ = [
-    "KELVIN_VOIGT", "LEAST_RESTITUTION", "impact_integral", "chi_for", "damping_ratio_for", "law_of", "over_angle",
+    "KELVIN_VOIGT", "MIN_RESTITUTION", "impact_integral", "chi_for", "damping_ratio_for", "law_of", "over_angle",
     "restitution_of_chi", "restitution_of_ratio", "stored_work", "wanted",
 ]  # fmt: skip
 
-LEAST_RESTITUTION = 0.05
+MIN_RESTITUTION = 0.05
 """Below it a force law is nearly a dashpot: stiffer equations than those of an impact, for the same motion."""
 KELVIN_VOIGT = "kelvin-voigt"
 CLASSICS: dict[str, Callable[[float], float]] = {
@@ -35,10 +35,10 @@ CLASSICS: dict[str, Callable[[float], float]] = {
 """χ(e) as published: Hunt & Crossley 1975, J. Appl. Mech. 42:440; Lankarani & Nikravesh 1990, J. Mech. Des. 112:369;
 Flores, Machado, Silva & Martins 2011, Multibody Syst. Dyn. 25:357; Gonthier, McPhee, Lange & Piedbœuf 2004,
 Multibody Syst. Dyn. 11:209 (its first approximation). They are approximations: the restitution they give differs."""
-SMALL = 0.1
-"""Below this χ logarithms cancel, and series of `TERMS` terms are used."""
-TERMS = 18
-"""Terms of these series: at `SMALL` what is left out is below round-off."""
+SERIES_LIMIT = 0.1
+"""Below this χ logarithms cancel, and series of `SERIES_TERMS` terms are used."""
+SERIES_TERMS = 18
+"""Terms of these series: at `SERIES_LIMIT` what is left out is below round-off."""
 
 
 def law_of(name: str | None, owner: str) -> str:
@@ -54,10 +54,10 @@ def wanted(restitution: float, owner: str) -> float:
     """A restitution that a force law can give."""
     if not 0.0 <= restitution <= 1.0:
         raise ModelError(f"{owner}: restitution {restitution:g} is not between 0 and 1")
-    if restitution < LEAST_RESTITUTION:
+    if restitution < MIN_RESTITUTION:
         raise ModelError(
-            f"{owner}: restitution {restitution:g} is below {LEAST_RESTITUTION:g}, nearly a dashpot; use "
-            f"mbd.Unilateral(…, restitution={restitution:g}), or {LEAST_RESTITUTION:g} and more"
+            f"{owner}: restitution {restitution:g} is below {MIN_RESTITUTION:g}, nearly a dashpot; use "
+            f"mbd.Unilateral(…, restitution={restitution:g}), or {MIN_RESTITUTION:g} and more"
         )
     return restitution
 
@@ -99,8 +99,8 @@ def restitution_of_chi(chi: float) -> float:
 
 def _work(chi: float, w: float, u: float | None = None) -> float:
     """``∫_w¹ s/(1 + χ s) ds``, the work of the force until then over m δ̇₀²; u is −ln(1 + χ w) where it is known."""
-    if chi < SMALL:
-        return sum((-chi) ** k * (1.0 - w ** (k + 2)) / (k + 2) for k in range(TERMS))
+    if chi < SERIES_LIMIT:
+        return sum((-chi) ** k * (1.0 - w ** (k + 2)) / (k + 2) for k in range(SERIES_TERMS))
     known = -math.log1p(chi * w) if u is None else u
     return ((1.0 - w) * chi - math.log1p(chi) - known) / chi**2
 

@@ -25,9 +25,9 @@ from mbd.tape.derivatives import substitute
 from mbd.tape.functions import cos, sin, sqrt, where
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["NO_PLACE", "ball_on", "edge_on"]
+__all__ = ["NO_CONTACT_POINT", "ball_on", "edge_on"]
 
-NO_PLACE = (
+NO_CONTACT_POINT = (
     "the ground is narrower or steeper there than what is round can touch at one place, or its height is no "
     "number; take a smaller radius, a smoother height function, or points of its surface with mbd.touchdown"
 )
@@ -35,9 +35,9 @@ NO_PLACE = (
 
 NEWTON_STEPS = 6
 """Of Newton's method for the place of contact: from 0.4 of the radius of curvature it takes four [-]."""
-MISSED = 1e-6
+PLACE_RTOL = 1e-6
 """What it may miss of the radius, or of a radian, beside which there is no place [-]."""
-ROUNDEST = 0.02
+MIN_CURVATURE_MARGIN = 0.02
 """Least share of its curvature by which a ball or a disk is rounder than the valley [-]."""
 
 
@@ -128,7 +128,7 @@ def edge_on(surface: Surface, center: Triple, axle: Triple, radius: Scalar, scop
 
 def _where_found(gap: Scalar, missed: Scalar, radius: Scalar, share: Scalar) -> Scalar:
     """The gap where Newton's method has come to a place, and to a minimum; else no number."""
-    single: Scalar = where(share > ROUNDEST, gap, math.nan)
-    bound = MISSED * radius
+    single: Scalar = where(share > MIN_CURVATURE_MARGIN, gap, math.nan)
+    bound = PLACE_RTOL * radius
     found: Scalar = where(missed < bound * bound, single, math.nan)
     return found

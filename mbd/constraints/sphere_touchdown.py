@@ -14,7 +14,7 @@ from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import number
 from mbd.constraints.balls import Ball
 from mbd.constraints.measure import Measure
-from mbd.constraints.round_on_surface import NO_PLACE, ball_on
+from mbd.constraints.round_on_surface import NO_CONTACT_POINT, ball_on
 from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.dataclass import dataclass
@@ -52,7 +52,7 @@ class SphereTouchdown(Measure):
     @property
     def undefined(self) -> str:
         """On a height function: no single place of contact."""
-        return NO_PLACE if isinstance(self.ground, Surface) else ""
+        return NO_CONTACT_POINT if isinstance(self.ground, Surface) else ""
 
     @property
     def has_slip_velocities(self) -> bool:

@@ -18,7 +18,7 @@ from mbd.tape.node import Scalar
 
 __all__ = ["Cone", "Twist", "cone", "twist"]
 
-ALIGNED = 1e-24
+SQUARED_SINE_ATOL = 1e-24
 """Square of the sine of a tilt below which its direction is not asked for [-]."""
 
 
@@ -59,7 +59,7 @@ class Cone(_OfRotation):
         turned = rotate(self._rotation(scope), self.axis)
         across = cross(self.direction, turned)
         square = dot(across, across)
-        sine = where(square > ALIGNED, sqrt(where(square > ALIGNED, square, 1.0)), 0.0)
+        sine = where(square > SQUARED_SINE_ATOL, sqrt(where(square > SQUARED_SINE_ATOL, square, 1.0)), 0.0)
         tilt: Scalar = atan2(sine, dot(self.direction, turned))
         return self.limit - tilt
 

@@ -16,7 +16,7 @@ s = (1, 1), (1, 1, 0)  w = γ: opposite to the velocity as it changes within a s
 from __future__ import annotations
 
 from mbd.equations.equations import Equations
-from mbd.joints.losses.isotropic import LEAST_SQUARE
+from mbd.joints.losses.isotropic import MIN_SQUARED_SPEED
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
@@ -51,7 +51,7 @@ def cosine(equations: Equations, k: int) -> Node:
     lean = (2.0 - square) * (2.0 - square)
     w = [equations.frictions[each].rate + lean * tape.input("slip", each) for each in ordered(equations, k)]
     size = sum((each * each for each in w[1:]), w[0] * w[0])
-    return w[0] / tape.lift(sqrt(size + LEAST_SQUARE))
+    return w[0] / tape.lift(sqrt(size + MIN_SQUARED_SPEED))
 
 
 def ordered(equations: Equations, k: int) -> list[int]:

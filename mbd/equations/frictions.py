@@ -14,7 +14,7 @@ from mbd.equations.laws import Laws
 from mbd.equations.states import with_states
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
-from mbd.joints.losses.isotropic import LEAST_SQUARE
+from mbd.joints.losses.isotropic import MIN_SQUARED_SPEED
 from mbd.tape.derivatives import substitute
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
@@ -155,7 +155,7 @@ def _speed(scope: DerivationScope, views: Sequence[Node], first: int) -> Node:
 def _size(scope: DerivationScope, views: Sequence[Node]) -> Node:
     """‖γ‖ of these velocities."""
     rates = [scope.real(view) for view in views]
-    return scope.tape.lift(sqrt(sum((rate * rate for rate in rates), scope.tape.lift(LEAST_SQUARE))))
+    return scope.tape.lift(sqrt(sum((rate * rate for rate in rates), scope.tape.lift(MIN_SQUARED_SPEED))))
 
 
 def _pin_load(found: Laws, scope: DerivationScope, joint: Joint) -> Node:

@@ -10,7 +10,7 @@ from mbd.bodies.scope import Scope
 from mbd.equations.outputs import Outputs
 from mbd.joints.anatomy import System, angles_of, measured
 from mbd.joints.base import Joint
-from mbd.joints.euler import PLACES, SEQUENCES, euler_angles
+from mbd.joints.euler import ANGLE_SUFFIXES, SEQUENCES, euler_angles
 from mbd.joints.quaternions import rotation_of, rotation_vector
 from mbd.joints.reversed import Reversed
 from mbd.tape.node import Scalar
@@ -38,8 +38,8 @@ def offer_orientations(outputs: Outputs, scope: Scope, joints: Sequence[Joint]) 
         outputs.triple(f"{name}.rotation_vector", partial(_vector, scope, joint), listed=False)
         for sequence in SEQUENCES:
             euler = partial(_angles, scope, joint, sequence)
-            outputs.triple(f"{name}.euler.{sequence}", euler, PLACES, listed=False)
-            rates = [f"{place}.rate" for place in PLACES]
+            outputs.triple(f"{name}.euler.{sequence}", euler, ANGLE_SUFFIXES, listed=False)
+            rates = [f"{place}.rate" for place in ANGLE_SUFFIXES]
             outputs.triple(f"{name}.euler.{sequence}", partial(_rates, scope, euler), rates, listed=False)
 
 

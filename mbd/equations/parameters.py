@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from mbd.bodies.promises import line_of_user
 from mbd.equations.equations import Parameter
 from mbd.errors import ModelError
-from mbd.forces.quantities import INCREMENT
+from mbd.forces.quantities import INCREMENT_PREFIX
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["ParameterTable"]
@@ -56,7 +56,7 @@ class ParameterTable:
 
         It would be no parameter of the model: not listed, not judged by domains, and of the value that is asked here.
         """
-        if self._declared is None or self._declared.get(name) == value or name.startswith(INCREMENT):
+        if self._declared is None or self._declared.get(name) == value or name.startswith(INCREMENT_PREFIX):
             return
         owner, _, field = name.rpartition(".")
         asked = f"scope.parameter({owner!r}, {field!r}, {value:g}){line_of_user()} asks for a parameter that"
@@ -76,9 +76,9 @@ class ParameterTable:
 
     def increment(self, name: str) -> Scalar:
         """What is added to the law of that name: a run-time input where it is asked for, 0 otherwise."""
-        if f"{INCREMENT}{name}" not in self._tunable:
+        if f"{INCREMENT_PREFIX}{name}" not in self._tunable:
             return 0.0
-        return self.node(f"{INCREMENT}{name}", 0.0)
+        return self.node(f"{INCREMENT_PREFIX}{name}", 0.0)
 
     @property
     def found(self) -> tuple[Parameter, ...]:

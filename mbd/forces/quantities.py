@@ -21,11 +21,11 @@ from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "INCREMENT", "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_single", "law_names", "mentioned",
+    "INCREMENT_PREFIX", "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_single", "law_names", "mentioned",
     "quantity_of", "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
 ]  # fmt: skip
 
-INCREMENT = "+"
+INCREMENT_PREFIX = "+"
 """Before the name of a law among the tunable parameters: what is added to it is an input, see `law_names`."""
 
 Mention: TypeAlias = Frame | Joint | str

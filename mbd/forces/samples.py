@@ -31,7 +31,7 @@ MOTION = ("spline", "smooth")
 """Curves with an acceleration, which may drive a motion."""
 JUMPS = {"spline": 3, "smooth": 3, "monotone": 2, "linear": 1, "hold": 0}
 """The lowest derivative that jumps at the samples."""
-BEHIND = 64.0 * sys.float_info.epsilon
+END_RTOL = 64.0 * sys.float_info.epsilon
 """How far behind its last sample a curve still continues: a run that ends there ends on it, relative [-]."""
 
 
@@ -247,7 +247,7 @@ class Samples:
 
 def behind(first: float, last: float) -> float:
     """Just behind the last sample."""
-    return last + BEHIND * max(abs(first), abs(last))
+    return last + END_RTOL * max(abs(first), abs(last))
 
 
 def in_degrees(values: Sequence[float] | Vector) -> float:

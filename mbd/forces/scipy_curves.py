@@ -18,7 +18,7 @@ KIND = {"CubicSpline": "spline", "PchipInterpolator": "monotone", "Akima1DInterp
 """Kinds of curves that their class tells."""
 BY_JUMP = ("hold", "linear", "monotone", "spline", "spline")
 """Kinds of others by the lowest derivative that jumps."""
-TRY = "give the samples themselves, mbd.Samples(time, values), or a CubicSpline"
+ADVICE = "give the samples themselves, mbd.Samples(time, values), or a CubicSpline"
 
 
 class Curve(NamedTuple):
@@ -52,10 +52,10 @@ def curves_of(value: Any, what: str) -> list[Curve]:
     degree = len(rows) - 1
     if degree > 3:
         raise ModelError(
-            f"{what}: a {type(value).__name__} of degree {degree} is no table of cubics; take k=3, or {TRY}"
+            f"{what}: a {type(value).__name__} of degree {degree} is no table of cubics; take k=3, or {ADVICE}"
         )
     if np.any(np.diff(breaks) < 0.0):
-        raise ModelError(f"{what}: the breaks of the {type(value).__name__} do not increase; {TRY}")
+        raise ModelError(f"{what}: the breaks of the {type(value).__name__} do not increase; {ADVICE}")
     kept = np.diff(breaks) > 0.0
     rows = np.concatenate([rows[::-1], np.zeros((3 - degree, *rows.shape[1:]))])[:, kept].reshape(4, kept.sum(), -1)
     breaks = np.append(breaks[:-1][kept], breaks[-1])
@@ -110,5 +110,5 @@ def _polynomials(value: Any, what: str) -> tuple[Any, str]:
             raise ModelError(f"{what}: components of a {type(value).__name__} stand along its last axis; take axis=0")
         return value, outside
     name = type(value).__name__
-    cure = "give mbd.Samples(curve.x, curve.y, kind='linear')" if name == "interp1d" else TRY
+    cure = "give mbd.Samples(curve.x, curve.y, kind='linear')" if name == "interp1d" else ADVICE
     raise ModelError(f"{what}: {name} of scipy is no curve whose polynomials are known; {cure}")

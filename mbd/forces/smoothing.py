@@ -12,9 +12,9 @@ from mbd.errors import ModelError
 
 __all__ = ["smoothed"]
 
-FEWEST = 5
+MIN_SAMPLES = 5
 """Samples that generalized cross-validation needs at least."""
-EVEN = 1e-6
+SPACING_RTOL = 1e-6
 """How unevenly samples may be spaced for a filter, relative [-]."""
 
 
@@ -39,8 +39,8 @@ def smoothed(time: Sequence[float], values: Sequence[float], cutoff: float | Non
         for fewer samples than are needed, uneven ones with a cutoff, and a cutoff beyond half the sampling frequency.
     """
     t, y = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
-    if len(t) < FEWEST or np.any(np.diff(t) <= 0.0):
-        raise ModelError(f"Samples of kind 'smooth' need {FEWEST} samples at least, in order; got {len(t)}")
+    if len(t) < MIN_SAMPLES or np.any(np.diff(t) <= 0.0):
+        raise ModelError(f"Samples of kind 'smooth' need {MIN_SAMPLES} samples at least, in order; got {len(t)}")
     inside = slice(None)
     if periodic:
         n, period = len(t) - 1, t[-1] - t[0]
@@ -61,7 +61,7 @@ def _filtered(t: Vector, y: Vector, cutoff: float) -> Vector:
     from scipy.signal import butter, sosfiltfilt
 
     widths = np.diff(t)
-    if np.ptp(widths) > EVEN * widths.mean():
+    if np.ptp(widths) > SPACING_RTOL * widths.mean():
         raise ModelError(
             f"Samples with a cutoff must be evenly spaced, but their distances are {widths.min():.6g} to "
             f"{widths.max():.6g} s; resample them, or leave cutoff out"

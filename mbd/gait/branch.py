@@ -34,11 +34,11 @@ __all__ = ["Branch", "branch"]
 
 FIRST, LARGEST, SMALLEST = 0.02, 0.1, 1e-6
 """First, largest and least distance of two points in (c, p/σ) [-]."""
-SHORT = 1e-3
+MIN_DISTANCE_RATIO = 1e-3
 """Part of the first distance from which a test function that jumps is no reason for a shorter one [-]."""
-TURN = 0.3
+MAX_TURN = 0.3
 """Largest angle between the tangents of two points [rad]."""
-WITHOUT_EFFECT = 1e-13
+EFFECT_RTOL = 1e-13
 """Derivative of the map by a parameter over its range below which it changes nothing [-]."""
 
 
@@ -224,7 +224,7 @@ def branch(
         new, taken, quick = made
         beyond = (new.value - to) * toward >= 0.0
         between, complete = special_points(given, last, new, taken)
-        if not (complete or changed_events(last.events, new.events)) and taken > SHORT * FIRST:
+        if not (complete or changed_events(last.events, new.events)) and taken > MIN_DISTANCE_RATIO * FIRST:
             ds = 0.5 * taken
             continue
         if changed_events(last.events, new.events):
@@ -280,7 +280,7 @@ def _begun(
         return given, first
     zero = np.zeros(gait.chart.size)
     by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], levels=1, state=False)
-    if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= WITHOUT_EFFECT:
+    if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= EFFECT_RTOL:
         raise ModelError(f"parameter: {parameter!r} changes nothing of this gait")
     return given, first
 
@@ -302,7 +302,7 @@ def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoin
                 ds *= 0.5
                 continue
             cosine = float(given.lifted(given.whole(last), new.chart) @ new.tangent)
-            if cosine >= np.cos(TURN):
+            if cosine >= np.cos(MAX_TURN):
                 return new, ds, corrected.corrections <= QUICK
             why = "it turns too sharply"
         elif isinstance(corrected, Forbidden) and last.tangent[-1] * (corrected.value - last.value) > 0.0:

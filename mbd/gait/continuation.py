@@ -30,7 +30,7 @@ __all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected", "Forbidden", "wa
 
 CORRECTIONS, QUICK = 10, 4
 """Newton corrections of a point, and how many count as few."""
-SLOW = 0.2
+MAX_CONTRACTION = 0.2
 """Factor by which a correction must shrink the residual, else its matrix is made again [-]."""
 
 
@@ -229,7 +229,7 @@ class Continuation:
                 step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
                 uncertain = self.width * abs(float(step[-1]))
                 return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, uncertain)
-            if residual > SLOW * before:
+            if residual > MAX_CONTRACTION * before:
                 renewed = self.matrix_at(chart, u, value, found)
                 if renewed is None or residual > 4.0 * before:
                     break

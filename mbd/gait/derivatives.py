@@ -33,7 +33,7 @@ CLOSER, TRIES = 0.25, 9
 SURE, DOUBTFUL = 1e-8, 1e-5
 """Error estimate, relative to the derivative or to the change of the gait, at which it ends, and above which there is
 none [-]."""
-MEETING = 1e-7
+MULTIPLIER_GAP = 1e-7
 """``|wᴴ u|`` of left and right eigenvectors of length 1, or difference of two moduli relative to them, below which two
 multipliers meet and their largest has no derivative [-]."""
 
@@ -221,8 +221,8 @@ def _multiplier_change(gait: Any) -> tuple[Callable[[Matrix], float], float]:
     values, left, right = eig(P, left=True, right=True)
     k = int(np.argmin(np.abs(values - gait.stability_of.values[0])))
     w, u, size = left[:, k], right[:, k], float(abs(values[k]))
-    rivals = [z for j, z in enumerate(values) if j != k and abs(z - values[k].conj()) > MEETING * size]
-    if abs(w.conj() @ u) < MEETING or any(abs(abs(z) - size) <= MEETING * size for z in rivals):
+    rivals = [z for j, z in enumerate(values) if j != k and abs(z - values[k].conj()) > MULTIPLIER_GAP * size]
+    if abs(w.conj() @ u) < MULTIPLIER_GAP or any(abs(abs(z) - size) <= MULTIPLIER_GAP * size for z in rivals):
         raise GaitError(
             f"the largest multiplier has a derivative on one side only: two of modulus {size:.6g} meet here", gait
         )

@@ -26,7 +26,7 @@ from mbd.state import State
 
 __all__ = ["exact_derivative"]
 
-BESIDE = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Distance [m, rad] of the states from whose rows of velocities their change along the section follows."""
 
 
@@ -115,7 +115,7 @@ def _tangent(chart: Chart, state: State, parameters: Vector) -> Matrix:
     _, B = section.velocities(state.q, state.v, parameters, state.anchors)
 
     def slope(move: Vector) -> Vector:
-        one, two = ((rates(h * move) - rates(-h * move)) / (2.0 * h) for h in (BESIDE, 2.0 * BESIDE))
+        one, two = ((rates(h * move) - rates(-h * move)) / (2.0 * h) for h in (DIFFERENCE_STEP, 2.0 * DIFFERENCE_STEP))
         return np.asarray((4.0 * one - two) / 3.0)
 
     bends = np.array([slope(move) for move in moves.T]).reshape(moves.shape[1], len(B)).T

@@ -27,9 +27,9 @@ from mbd.state import State
 
 __all__ = ["Member", "across", "energy_of", "energy_slope", "floquet", "member_of"]
 
-LOSSLESS = 1e-3
+UNIT_MULTIPLIER_ATOL = 1e-3
 """Distance of a multiplier from 1 within which it may be that of energy that nothing takes [-]."""
-BESIDE = 1e-5
+DIFFERENCE_STEP = 1e-5
 """Distance [m, rad, m/s, rad/s] of the states from whose energies the slope of energy follows."""
 
 
@@ -72,7 +72,7 @@ class Member:
         if self.kind == "speed":
             return float(self.by_numbers(map_, found, column[:, np.newaxis])[0] / self.size)
         value = float(values[name])
-        h = BESIDE * max(1.0, abs(value))
+        h = DIFFERENCE_STEP * max(1.0, abs(value))
         ends = [{**values, name: value + sign * h} for sign in (1.0, -1.0)]
         high, low = (energy_of(map_, [chart.at(np.zeros(chart.size), map_.vector(end))], end)[0] for end in ends)
         return float((high - low) / (2.0 * h) / self.size)
@@ -125,9 +125,11 @@ def energy_of(map_: ReturnMap, states: Sequence[State], values: Values) -> Vecto
 def energy_slope(map_: ReturnMap, chart: Chart, values: Values) -> Vector:
     """∇(T + V) along the section."""
     parameters = map_.vector(values)
-    states = [chart.at(sign * BESIDE * unit, parameters) for unit in np.eye(chart.size) for sign in (1.0, -1.0)]
+    states = [
+        chart.at(sign * DIFFERENCE_STEP * unit, parameters) for unit in np.eye(chart.size) for sign in (1.0, -1.0)
+    ]
     total = energy_of(map_, states, values).reshape(-1, 2)
-    return np.asarray((total[:, 0] - total[:, 1]) / (2.0 * BESIDE))
+    return np.asarray((total[:, 0] - total[:, 1]) / (2.0 * DIFFERENCE_STEP))
 
 
 def across(map_: ReturnMap, chart: Chart, values: Values) -> Vector:
@@ -141,7 +143,7 @@ def floquet(map_: ReturnMap, chart: Chart, derivative: MapDerivative, values: Va
     """The multipliers of P, that of energy apart where nothing takes any."""
     P, error = derivative.matrix[: chart.size, : chart.size], derivative.error[: chart.size, : chart.size]
     found = multipliers_of(P, error)
-    if np.min(np.abs(found.values - 1.0), initial=1.0) > LOSSLESS:
+    if np.min(np.abs(found.values - 1.0), initial=1.0) > UNIT_MULTIPLIER_ATOL:
         return found
     w = across(map_, chart, values)
     return multipliers_of(P, error, w if np.any(w) else None)

@@ -17,7 +17,7 @@ from mbd.errors import AssemblyError, GaitError, MbdError, ModelError, UnknownNa
 from mbd.gait.arguments import Functions, check_arguments
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.family import Member, member_of
-from mbd.gait.limit_cycle import FIRST, map_of
+from mbd.gait.limit_cycle import FIRST_STEP, map_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, fallen_first, first_found, first_return, on_section
@@ -28,11 +28,11 @@ from mbd.state import State
 
 __all__ = ["GaitSearch", "Try", "find_gait"]
 
-SAME = 1e-6
+SAME_GAIT_ATOL = 1e-6
 """Difference of states and periods up to which two gaits are one [m, rad, s]."""
-FAR = 1.0
+MAX_PROJECTION = 1.0
 """Distance [m, rad] over which a start is moved onto the section."""
-MOST_TRIES = 1_000_000
+MAX_TRIES = 1_000_000
 """Tries of one search at most."""
 
 CURES = {
@@ -139,7 +139,7 @@ class _Hunt:
         given, dt = self.given, self.dt
         states: tuple[State, ...] = ()
         if given is not None:
-            near, dt = on_section(given.section, start, self.map.vector(all_values), FAR), given.map.dt
+            near, dt = on_section(given.section, start, self.map.vector(all_values), MAX_PROJECTION), given.map.dt
             states = () if near is None else (near,)
         if not states:
             begun = first_return(self.map, start, all_values)
@@ -157,7 +157,10 @@ class _Hunt:
         """The number of a gait, which is new where no other is the same."""
         for number, other in enumerate(self.found):
             ahead = other.chart.of(gait.state)
-            same = abs(other.period - gait.period) <= SAME and np.max(np.abs(ahead), initial=0.0) <= SAME
+            same = (
+                abs(other.period - gait.period) <= SAME_GAIT_ATOL
+                and np.max(np.abs(ahead), initial=0.0) <= SAME_GAIT_ATOL
+            )
             if same and other.parameters == gait.parameters:
                 return number
         self.found.append(gait)
@@ -233,7 +236,7 @@ def find_gait(
                 given, settings = {**draw["parameters"]}, {"dt": dt, "tol": tol, "longest": longest}
                 check_arguments(start, scheme, strides, settings, given, functions, (), "return")
                 kind = (section, mirror, strides)
-                map_ = map_of(model, start, scheme, dt or FIRST, kind, given, functions, modulo, longest, backend)
+                map_ = map_of(model, start, scheme, dt or FIRST_STEP, kind, given, functions, modulo, longest, backend)
                 hunt = _Hunt(map_, tol, dt, member=member)
                 for other in points if ranges else ():
                     hunt.map.require({**hunt.map.values, **_drawn(fixed, ranges, other)["parameters"]})
@@ -294,8 +297,8 @@ def _varied(groups: Mapping[str, Any], tries: Any, design: Any, seed: Any) -> tu
                     + ("" if group == "parameters" else ", or an orientation or a vector as a whole")
                     + f", not {shown(value)}"
                 )
-    if isinstance(tries, bool) or not isinstance(tries, int) or not 1 <= tries <= MOST_TRIES:
-        faults.append(f"tries must be a whole number from 1 to {MOST_TRIES}, not {shown(tries)}")
+    if isinstance(tries, bool) or not isinstance(tries, int) or not 1 <= tries <= MAX_TRIES:
+        faults.append(f"tries must be a whole number from 1 to {MAX_TRIES}, not {shown(tries)}")
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         faults.append(f"seed must be a whole number from 0 on, not {shown(seed)}")
     if not among(design, ("sobol", "latin hypercube")):

@@ -12,14 +12,14 @@ from mbd.dataclass import dataclass
 
 __all__ = ["Multipliers", "multipliers_of"]
 
-FORGOTTEN = 1e-7
-"""Singular value of P relative to its largest, or to `LARGE`, below which the map forgets a direction [-]."""
-LARGE = 100.0
+RANK_RTOL = 1e-7
+"""Singular value of P relative to its largest, or to `MAX_RANK_SCALE`, below which the map forgets a direction [-]."""
+MAX_RANK_SCALE = 100.0
 """Largest singular value beyond which the errors of P alone tell what a map forgets: strongly unstable gaits have
 large ones and, with them, small ones that are no zeros [-]."""
-ENERGY = 1e-6
+ENERGY_RTOL = 1e-6
 """Misfit of ``∇E P = ∇E`` relative to ∇E up to which energy is kept along the cycle [-]."""
-MARGINAL = 1e-6
+STABILITY_ATOL = 1e-6
 """Distance of the largest modulus from 1 within which stability is not decided [-]."""
 
 
@@ -45,7 +45,7 @@ class Multipliers:
     @property
     def stability(self) -> str:
         """'stable', 'unstable' or 'marginal'."""
-        doubt = max(MARGINAL, self.error if np.isfinite(self.error) else 0.0)
+        doubt = max(STABILITY_ATOL, self.error if np.isfinite(self.error) else 0.0)
         if abs(self.largest - 1.0) <= doubt:
             return "marginal"
         return "stable" if self.largest < 1.0 else "unstable"
@@ -64,14 +64,14 @@ def multipliers_of(P: Matrix, error: Matrix, energy: Matrix | None = None) -> Mu
     U, sizes, V = np.linalg.svd(P)
     errors = np.where(np.isfinite(error), error, 0.0)
     doubt, doubts = float(np.max(errors)), np.einsum("ik,ij,kj->k", np.abs(U), errors, np.abs(V))
-    rank = int(np.sum(sizes > np.maximum(FORGOTTEN * min(float(sizes[0]), LARGE), 10.0 * doubts)))
+    rank = int(np.sum(sizes > np.maximum(RANK_RTOL * min(float(sizes[0]), MAX_RANK_SCALE), 10.0 * doubts)))
     basis = U[:, :rank]
     values, vectors = np.linalg.eig(basis.T @ P @ basis)
     modes = basis @ vectors
     trivial: dict[str, tuple[float, ...]] = {}
     if rank < size:
         trivial["forgotten"] = (0.0,) * (size - rank)
-    if energy is not None and np.linalg.norm(energy @ P - energy) <= ENERGY * np.linalg.norm(energy):
+    if energy is not None and np.linalg.norm(energy @ P - energy) <= ENERGY_RTOL * np.linalg.norm(energy):
         kept = int(np.argmin(np.abs(values - 1.0)))
         trivial["energy"] = (float(values[kept].real),)
         values, modes = np.delete(values, kept), np.delete(modes, kept, axis=1)

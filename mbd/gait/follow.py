@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 __all__ = ["PointCurve", "follow"]
 
-BESIDE = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Distance along the tangent at which a test function is asked for a second time [-]."""
-BACK = 0.02
+LIMIT_DISTANCE = 0.02
 """Distance before a limit of events from which it is looked for [-]."""
 SECANTS, LOCATED = 12, 1e-12
 """Evaluations of a margin at most, and the distance at which it counts as zero [-]."""
@@ -176,11 +176,11 @@ def _next(given: Continuation, over: list[float], found: list[SpecialPoint], val
 def _tested(given: Continuation, near: BranchPoint, last: SpecialPoint) -> SpecialPoint | None:
     """The zero of the test function of a kind near a gait."""
     test = TESTS[last.kind]
-    corrected = given.corrected(near, near.tangent, BESIDE)
+    corrected = given.corrected(near, near.tangent, DIFFERENCE_STEP)
     if not isinstance(corrected, Corrected):
         return None
     here, beside = test(near), test(given.point(corrected, given.whole(near)))
-    slope = (beside - here) / BESIDE
+    slope = (beside - here) / DIFFERENCE_STEP
     if slope == 0.0:
         return None
     located = polished(given, near, -here / slope, slope, test)
@@ -210,7 +210,7 @@ def _margin(given: Continuation, near: BranchPoint, last: SpecialPoint) -> Speci
 
 def _secant(function: Callable[[float], float]) -> tuple[float, float]:
     """The zero of a function near 0, and its last change; NaN where it does not come to one."""
-    a, b = 0.0, BESIDE
+    a, b = 0.0, DIFFERENCE_STEP
     fa, fb = function(a), function(b)
     for _ in range(SECANTS):
         if not np.isfinite(fa + fb) or fa == fb:
@@ -234,13 +234,13 @@ def _limit(given: Continuation, last: SpecialPoint) -> SpecialPoint | None:
         ahead = given.corrected(inside, inside.tangent, ds)
         if isinstance(ahead, Corrected) and not changed_events(inside.events, ahead.found.arrival.events):
             continue
-        limit = limit_between(given, inside, ds, back=BACK)
+        limit = limit_between(given, inside, ds, back=LIMIT_DISTANCE)
         return limit if limit is not None and (limit.kind, limit.what) == (last.kind, last.what) else None
     return None
 
 
 def _growing() -> Iterator[float]:
-    ds = 0.25 * BACK
-    while ds < 10.0 * BACK:
+    ds = 0.25 * LIMIT_DISTANCE
+    while ds < 10.0 * LIMIT_DISTANCE:
         yield ds
         ds *= 1.5

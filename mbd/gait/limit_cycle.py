@@ -29,7 +29,7 @@ from mbd.state import State
 
 __all__ = ["limit_cycle", "map_of"]
 
-FIRST = 1e-2
+FIRST_STEP = 1e-2
 """Step of the first return where none is given [s]; later ones follow from its length."""
 
 
@@ -104,7 +104,8 @@ def limit_cycle(
     numbers = {"dt": dt, "tol": tol, "longest": longest}
     check_arguments(start, scheme, strides, numbers, parameters, functions, wrt, on_failure)
     begun, start = start.time, replace(start, time=0.0, memory=None)
-    map_ = map_of(model, start, scheme, dt or FIRST, (section, mirror, strides), parameters, functions, modulo, longest,
+    step = dt or FIRST_STEP
+    map_ = map_of(model, start, scheme, step, (section, mirror, strides), parameters, functions, modulo, longest,
                   backend)  # fmt: skip
     if len(start.anchors):
         start = replace(start, anchors=counted_from(map_.mechanism.equations, start.anchors, begun))

@@ -29,11 +29,11 @@ NEAR_ENOUGH, UNSEEN = 30.0, 1e-9
 """Factor by which what a parameter changes may differ from `STATE_STEP`, and the share of it that is no change [-]."""
 MAX_RESCALING, MAX_RESCALINGS, WIDEST = 1e5, 12, 1e15
 """Factor by which its difference changes at most at once, how often, and how wide it gets, over it or 1 [-]."""
-LEVELS = 3
+MAX_DIFFERENCES = 3
 """Differences of each direction at most: h, 2h, 4h."""
 ENOUGH, CLOSER = 1e-9, 0.125
 """Error estimate, relative to 1 or the derivative, above which smaller differences are tried, and how much smaller."""
-POOR = 1e-8
+DIFFERENCE_RTOL = 1e-8
 """Error estimate, relative to 1 or the derivative, above which they are tried once more [-]."""
 SHRINK, TRIES = 0.1, 4
 """Factor of h where a run beside the base does not arrive, and how often."""
@@ -90,7 +90,7 @@ def numbers_of(chart: Chart, arrival: Arrival) -> Measured:
 
 
 def map_derivative(
-    map_: ReturnMap, chart: Chart, c: Vector, values: Values, names: Sequence[str] = (), levels: int = LEVELS,
+    map_: ReturnMap, chart: Chart, c: Vector, values: Values, names: Sequence[str] = (), levels: int = MAX_DIFFERENCES,
     state: bool = True, base: Measured | None = None,
 ) -> MapDerivative:  # fmt: skip
     """The derivatives at c, by all coordinates of the section (unless `state` is False), then by parameters `names`.
@@ -182,7 +182,7 @@ class _Column:
         if last is None:
             good = not bool(np.any(found[1] > ENOUGH * limits))
         else:
-            good = not bool(np.any(found[1] > POOR * limits))
+            good = not bool(np.any(found[1] > DIFFERENCE_RTOL * limits))
         self.best = found
         self.step *= CLOSER
         self._tried(len(slopes) == 1 or good)

@@ -19,12 +19,12 @@ from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.return_map import ReturnMap, Values
-from mbd.gait.special_points import ITERATIONS, SpecialPoint
+from mbd.gait.special_points import MAX_EVALUATIONS, SpecialPoint
 from mbd.state import State
 
 __all__ = ["Margin", "Margins", "least_margins", "margin_points", "watched_feet"]
 
-NEIGHBOURS = 3
+NEIGHBOUR_ROWS = 3
 """Rows on each side of the smallest one through which a polynomial goes."""
 
 Margins = Mapping[tuple[str, str], float]
@@ -101,12 +101,12 @@ def _minima(map_: ReturnMap, margin: Margin, table: Matrix) -> Iterator[tuple[fl
 def _least(time: Vector, values: Vector) -> tuple[float, float | None]:
     """The least value of a smooth curve through points, and its instant; None at an end."""
     k = int(np.argmin(values))
-    if k in (0, len(values) - 1) or len(values) < 2 * NEIGHBOURS + 1:
+    if k in (0, len(values) - 1) or len(values) < 2 * NEIGHBOUR_ROWS + 1:
         return float(values[k]), None
-    first = min(max(k - NEIGHBOURS, 0), len(values) - 2 * NEIGHBOURS - 1)
-    picked = slice(first, first + 2 * NEIGHBOURS + 1)
+    first = min(max(k - NEIGHBOUR_ROWS, 0), len(values) - 2 * NEIGHBOUR_ROWS - 1)
+    picked = slice(first, first + 2 * NEIGHBOUR_ROWS + 1)
     width = time[k + 1] - time[k - 1]
-    polynomial = np.polynomial.Polynomial.fit((time[picked] - time[k]) / width, values[picked], 2 * NEIGHBOURS)
+    polynomial = np.polynomial.Polynomial.fit((time[picked] - time[k]) / width, values[picked], 2 * NEIGHBOUR_ROWS)
     roots = polynomial.deriv().roots()
     near = roots[np.abs(roots.imag) < 1e-9].real
     near = near[np.abs(near) <= 1.0]
@@ -146,7 +146,7 @@ def _located(
     fa, fb, b = bracket
     a, side, width = 0.0, 0, b
     corrected: Any = None
-    for _ in range(ITERATIONS):
+    for _ in range(MAX_EVALUATIONS):
         middle = b - fb * (b - a) / (fb - fa)
         try:
             corrected = given.corrected(one, one.tangent, middle)

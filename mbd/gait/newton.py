@@ -22,21 +22,21 @@ from mbd.state import State
 
 __all__ = ["FixedPoint", "fixed_point"]
 
-SHORTEST = 1.0 / 64.0
+MIN_DAMPING = 1.0 / 64.0
 """Least part of a Newton step that is tried [-]."""
-DECREASE = 0.25
+MIN_DECREASE = 0.25
 """Share of the decrease that the linear model promises which a step must reach [-]."""
 WALKS, AGAIN = 6, 3
 """Plain applications of the map where no part of a Newton step helps, and how often that is done [-]."""
-FAST = 0.2
+MAX_CONTRACTION = 0.2
 """Factor by which a step with a derivative of before must shrink the residual, else it is made again [-]."""
-FINE = 0.01
+FINAL_RESIDUAL_RATIO = 0.01
 """Residual over `tol` above which one more step is made at the end [-]."""
-FAMILY = 1e-3
+SINGULAR_RTOL = 1e-3
 """Singular value of 1 − P relative to its largest below which gaits near may form a family [-]."""
-KEPT = 1e-8
+ENERGY_RTOL = 1e-8
 """Relative change of the energy in one return up to which nothing takes or gives any [-]."""
-REST = 1e3
+REST_SPEED_OVER_TOL = 1e3
 """Speed over `tol` below which what repeats itself is rest [-]."""
 
 
@@ -139,9 +139,9 @@ def _energies(map_: ReturnMap, point: FixedPoint, start: State, values: Values, 
 
 def _polish(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> None:
     """One more step where the derivative is known and the residual not much below `tol`."""
-    if point.slope is None or point.found is None or point.residual <= FINE * tol:
+    if point.slope is None or point.found is None or point.residual <= FINAL_RESIDUAL_RATIO * tol:
         return
-    found = _damped(map_, point, point.gap, values, FAST, 1.0)
+    found = _damped(map_, point, point.gap, values, MAX_CONTRACTION, 1.0)
     if isinstance(found, Measured):
         point.found, point.gap = found, _gap(map_, point, np.zeros(point.chart.size), found, values)
         point.residual = float(np.max(np.abs(point.gap), initial=0.0))
@@ -173,10 +173,10 @@ def _alone(map_: ReturnMap, point: FixedPoint, values: Values) -> str:
     if point.slope is None or point.found is None or len(point.gap) == size:
         return ""
     before, after = energy_of(map_, [point.state, point.found.arrival.state], values)
-    if abs(after - before) <= KEPT * max(abs(before), abs(after)):
+    if abs(after - before) <= ENERGY_RTOL * max(abs(before), abs(after)):
         return ""
     sizes = np.linalg.svd(point.slope[:size], compute_uv=False)
-    if not size or sizes[-1] <= FAMILY * sizes[0]:
+    if not size or sizes[-1] <= SINGULAR_RTOL * sizes[0]:
         return ""
     return (
         f"no gait with {point.member} was found: the gaits near are isolated, none of their multipliers is 1. "
@@ -188,7 +188,7 @@ def _alone(map_: ReturnMap, point: FixedPoint, values: Values) -> str:
 def _stepped(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values) -> Measured | Outcome | None:
     """What the map gives after a step of Newton's method; None where no part of it leads nearer."""
     if point.slope is not None and not point.exact:
-        after = _damped(map_, point, point.gap, values, FAST, 1.0)
+        after = _damped(map_, point, point.gap, values, MAX_CONTRACTION, 1.0)
         if after is not None:
             return after
     point.slope, point.exact = _slope(map_, point, found, values), True
@@ -213,7 +213,7 @@ def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:
     """
     if map_.mechanism.equations.machines or point.chart.section.speeds:
         return None
-    if float(np.max(np.abs(point.state.v), initial=0.0)) > REST * tol:
+    if float(np.max(np.abs(point.state.v), initial=0.0)) > REST_SPEED_OVER_TOL * tol:
         return None
     return Outcome("rests", f"comes to rest at {map_.section!r}: nothing moves where it repeats itself")
 
@@ -246,7 +246,7 @@ def _slope(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values) 
 
 
 def _damped(
-    map_: ReturnMap, point: FixedPoint, gap: Vector, values: Values, needed: float = 1.0, shortest: float = SHORTEST
+    map_: ReturnMap, point: FixedPoint, gap: Vector, values: Values, needed: float = 1.0, shortest: float = MIN_DAMPING
 ) -> Measured | Outcome | None:
     """A part of Newton's step after which the residual is smaller, from where the next begins; None if there is none.
 
@@ -260,7 +260,7 @@ def _damped(
         found = _measure(map_, point.chart, c, values, point)
         if isinstance(found, Measured):
             left = _gap(map_, point, c, found, values)
-            if float(np.max(np.abs(left))) <= min(needed, 1.0 - DECREASE * part) * before:
+            if float(np.max(np.abs(left))) <= min(needed, 1.0 - MIN_DECREASE * part) * before:
                 point.slope += np.outer(gap - left - point.slope @ c, c) / float(c @ c)
                 point.exact = False
                 if part < 1.0:

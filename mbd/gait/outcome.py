@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.analysis.ending import FALLEN
+from mbd.analysis.ending import FALLEN_HEIGHT_RATIO
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 
@@ -59,7 +59,7 @@ def fall_of(run: Trajectory, stance: str) -> Outcome | None:
     top = int(np.argmax(height[:, 0]))
     place = next((contact.place for contact in run.facts.contacts if contact.name == stance), "")
     over = height[top] - run[place] @ (up / size) if place else np.ptp(height, axis=0)
-    low = np.flatnonzero(over < FALLEN * float(over[0]))
+    low = np.flatnonzero(over < FALLEN_HEIGHT_RATIO * float(over[0]))
     if named is None and not len(low):
         return None
     row = named.row if named is not None else int(low[0])

@@ -14,7 +14,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.trivial_rows import POSES
+from mbd.compile.trivial_rows import SAMPLED_POSES
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.joints.reflected import ACROSS, mirrored_signs
@@ -90,14 +90,14 @@ def _of_anchors(mechanism: Mechanism, partners: Any, signs: tuple[Vector, Vector
 def _stored(
     mechanism: Mechanism, partners: Any, signs: tuple[Vector, Vector], of_anchors: Vector, parameters: Vector
 ) -> tuple[Matrix, Matrix]:
-    """What would be stored (POSES, n_anchors) at some states, exchanged, and at their mirror images.
+    """What would be stored (SAMPLED_POSES, n_anchors) at some states, exchanged, and at their mirror images.
 
     Values are held where their signs are known.
     """
     layout, random = mechanism.layout, np.random.default_rng(11)
     configuration = mechanism.equations.configuration
     here, there = list[Vector](), list[Vector]()
-    for _ in range(POSES):
+    for _ in range(SAMPLED_POSES):
         q = configuration.compose(np.array(configuration.defaults), random.uniform(-0.4, 0.4, layout.n_v))
         v, z = random.uniform(-1.0, 1.0, layout.n_v), random.uniform(-1.0, 1.0, layout.n - layout.n_v)
         own = random.uniform(0.1, 0.5, layout.n_anchors) * (of_anchors != 0.0)

@@ -18,7 +18,7 @@ __all__ = ["free_samples", "explain_samples"]
 
 MAX_STRIDES, MAX_MISSING = 12, 0.03
 """Strides up to which a whole number of samples is looked for, and the part of one that may be missing [-]."""
-RETURNS = 8
+COUNTED_RETURNS = 8
 """Returns over which the samples of one are counted [-]."""
 
 
@@ -33,10 +33,10 @@ def explain_samples(outcome: Outcome, map_: ReturnMap, state: State, values: Val
     laws = free_samples(map_.model)
     if not laws or outcome.good:
         return outcome
-    arrival = map_(state, values, strides=RETURNS)
+    arrival = map_(state, values, strides=COUNTED_RETURNS)
     if not arrival.outcome.good:
         return outcome
-    lasts, texts = arrival.period / RETURNS, []
+    lasts, texts = arrival.period / COUNTED_RETURNS, []
     for law in laws:
         name = f"{law.name}.period"
         period = float({**getattr(map_.model, "parameters", {}), **map_.plain(values)}.get(name, law.period))

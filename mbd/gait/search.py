@@ -28,9 +28,9 @@ __all__ = ["Failed", "Search", "fallen_first", "first_found", "first_return", "g
 FIRST_STEPS, HALVINGS = 11.8, 9
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
 blur its instant; and how often they are halved until their error is below `tol`."""
-NEAR = 1e-2
+SECTION_DISTANCE = 1e-2
 """Distance [m, rad] within which the rows of the section hold a start that is taken as one on it."""
-RESOLVED = 0.1
+MAX_STEP_ERROR_RATIO = 0.1
 """Share of `tol` that the change with half the step may take [-]."""
 
 
@@ -81,7 +81,7 @@ def first_return(
     return section, (arrival.state,) if near is None else (near, arrival.state)
 
 
-def on_section(section: Section, start: State, parameters: Vector, near: float = NEAR) -> State | None:
+def on_section(section: Section, start: State, parameters: Vector, near: float = SECTION_DISTANCE) -> State | None:
     """The nearest state of the section, if the start is as near."""
     same = start.mode.closed == section.mode.closed and len(start.anchors) == section.mechanism.layout.n_anchors
     if not same or section.other_states(start):
@@ -116,7 +116,7 @@ def with_step(search: Search, start: State, values: Values, dt: float | None) ->
         now = np.append(chart.of(arrival.state), arrival.period) if arrival.outcome.good else None
         if now is not None and before is not None:
             error = float(np.max(np.abs(now - before)))
-            if error <= RESOLVED * search.tol:
+            if error <= MAX_STEP_ERROR_RATIO * search.tol:
                 return replace(search, map=coarser), error
         before, step = now, step / 2.0
     return replace(search, map=map_), error

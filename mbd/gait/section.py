@@ -37,9 +37,9 @@ from mbd.tape.derivatives import live
 
 __all__ = ["Chart", "Section", "section_of"]
 
-CLOSED = 1e-7
+GAP_ATOL = 1e-7
 """Gap of the section's event [m, rad] after a reset up to which it still holds."""
-SMALL = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Difference of velocities, relative to 1 or them, from which the gradient of what an event watches follows [-]."""
 CORRECTIONS, FINE = 12, 1e-14
 """Newton corrections of positions onto the section, and the residual [m, rad] at which they end."""
@@ -113,7 +113,7 @@ class Section:
         if not speeds:
             return terms.rate[picked], terms.B[picked][:, :n_v]
         v, z = y[:n_v], y[n_v:]
-        steps = SMALL * np.maximum(1.0, np.abs(v)) * np.eye(n_v)
+        steps = DIFFERENCE_STEP * np.maximum(1.0, np.abs(v)) * np.eye(n_v)
         guards = self._guards(q, z, parameters, anchors)
         ends = [[guards(v + sign * step)[speeds] for sign in (1.0, -1.0)] for step in steps]
         slopes = np.array([(high - low) / (2.0 * np.max(step)) for (high, low), step in zip(ends, steps, strict=True)])
@@ -267,7 +267,7 @@ def section_of(
              if contact.name == name and name not in after]  # fmt: skip
     pairs += [(4 * contacts + e, 4 * contacts + guards + e) for e, guard in enumerate(manager.guards)
               if guard.name == name]  # fmt: skip
-    touching = [pair for pair in pairs if abs(out[pair[0]]) <= CLOSED]
+    touching = [pair for pair in pairs if abs(out[pair[0]]) <= GAP_ATOL]
     watching = _watching_velocities(mechanism, contacts, name)
     gaps = tuple(pair for pair in touching if pair[0] not in watching)
     speeds = tuple(pair[0] for pair in touching if pair[0] in watching)

@@ -22,16 +22,16 @@ from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 
 __all__ = ["KINDS", "TESTS", "SpecialPoint", "polished", "special_points"]
 
-ITERATIONS = 40
+MAX_EVALUATIONS = 40
 """Evaluations of a test function or a margin between two points at most."""
 
 CLOSE, SECANTS = 1e-3, 8
 """Change of the parameter, over its range, from which on derivatives are found with least errors [-], and how often."""
-FINER = 1e-3
+RESIDUAL_RATIO = 1e-3
 """Residual of gaits at special points over that of others, where it is reached [-]."""
-VANISHED = 0.01
+ZERO_RTOL = 0.01
 """Value of a test function at its zero, over the smaller one at the ends of the bracket, at most [-]."""
-COMPLEX = 1e-7
+IMAGINARY_ATOL = 1e-7
 """Imaginary part from which on a pair of multipliers is complex [-]."""
 
 
@@ -99,7 +99,7 @@ def special_points(
             continue  # a direction was forgotten on the way, whose multiplier of 0 is a factor −1 of each pair
         if np.isfinite(ends).all() and ends[0] * ends[1] < 0.0:
             located = _located(given, one, other, ds, test)
-            if located is None or abs(test(located[0])) > VANISHED * min(map(abs, ends)):
+            if located is None or abs(test(located[0])) > ZERO_RTOL * min(map(abs, ends)):
                 complete = False
             elif _is_one(kind, located[0]):
                 found.append(SpecialPoint(kind, located[0].value, *located))
@@ -112,7 +112,7 @@ def _is_one(kind: str, point: BranchPoint) -> bool:
         return True
     values = point.multipliers.values
     at = int(np.argmin(np.abs(np.abs(values) - 1.0)))
-    return bool(abs(values[at].imag) > COMPLEX)
+    return bool(abs(values[at].imag) > IMAGINARY_ATOL)
 
 
 def _located(
@@ -124,7 +124,7 @@ def _located(
     """
     (a, fa), (b, fb) = (0.0, test(one)), (ds, test(other))
     side, value, slope = 0, other.value, (fb - fa) / ds
-    for _ in range(ITERATIONS):
+    for _ in range(MAX_EVALUATIONS):
         middle = b - fb * (b - a) / (fb - fa)
         found = _at(given, one, middle, 2)
         if found is None:
@@ -179,7 +179,7 @@ def _at(given: Continuation, one: BranchPoint, place: float, levels: int) -> tup
     """The point at a distance along the tangent of another one, with what is left of its equations in the parameter;
     None where there is none.
     """
-    for tol in (FINER * given.tol, given.tol):
+    for tol in (RESIDUAL_RATIO * given.tol, given.tol):
         try:
             corrected = replace(given, tol=tol).corrected(one, one.tangent, place)
             if isinstance(corrected, Corrected):

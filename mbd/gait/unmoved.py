@@ -18,7 +18,7 @@ __all__ = ["depends_on_time", "moving_on", "reset_names"]
 
 FAR, FAR_STATES = 20.0, 8
 """How far along a coordinate [m, rad], and at how many states, nothing may change where the tape cannot decide."""
-SAME = 1e-10
+ROW_ATOL = 1e-10
 """Change of a row along a coordinate that counts as none, its place of touchdown moved along [m, rad]."""
 
 
@@ -81,7 +81,9 @@ def _changes_nothing(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
         move[k] = random.uniform(-FAR, FAR)
         states = in_state(mechanism, number)
         here, there = numbers(q0, q, y, states), numbers(compose(q0, move), compose(q, move), y, states)
-        if not np.max(np.abs(there - here), initial=0.0) <= SAME * max(1.0, float(np.max(np.abs(here), initial=0.0))):
+        if not np.max(np.abs(there - here), initial=0.0) <= ROW_ATOL * max(
+            1.0, float(np.max(np.abs(here), initial=0.0))
+        ):
             return False
     return True
 
@@ -114,7 +116,7 @@ def _follows(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
         defaults = np.array(mechanism.equations.configuration.defaults)
         q0, q1 = (compose(defaults, end) for end in ends)
         h = [_rows(mechanism, parameters, *pair) for pair in ((q0, q1), (compose(q0, move), compose(q1, move)))]
-        if not np.max(np.abs(h[1] - h[0]), initial=0.0) <= SAME:
+        if not np.max(np.abs(h[1] - h[0]), initial=0.0) <= ROW_ATOL:
             return False
     return True
 

@@ -16,15 +16,15 @@ from mbd.joints.anatomy import ANATOMY
 from mbd.joints.losses.base import Loss, loss_of
 from mbd.tape.node import Scalar
 
-__all__ = ["AWAITED", "Joint", "JointLoss", "Label", "row_unit"]
+__all__ = ["AWAITED_ATTRIBUTE", "Joint", "JointLoss", "Label", "row_unit"]
 
 JointLoss = Loss | Mapping[str, Loss] | None
 """A loss on every coordinate of a joint, or by label of its coordinates."""
 
-DRIVES_AWAY = "is negative; give a value ≥ 0, or an mbd.TorsionSpring where it shall drive away from its rest"
+NEGATIVE_STIFFNESS = "is negative; give a value ≥ 0, or an mbd.TorsionSpring where it shall drive away from its rest"
 """What is wrong with the stiffness of a joint."""
 
-AWAITED = "_awaited"
+AWAITED_ATTRIBUTE = "_awaited"
 """Where a joint remembers the names of forces of which at least one is to come with it."""
 
 
@@ -219,7 +219,7 @@ class Joint(Parameterized, ABC):
 
     def domains(self) -> dict[str, Domain]:
         """The stiffness of its spring ≥ 0."""
-        domain = Domain(low=0.0, problem=DRIVES_AWAY, called="stiffness")
+        domain = Domain(low=0.0, problem=NEGATIVE_STIFFNESS, called="stiffness")
         return {f"{self.name} spring.stiffness": domain} if len(self.labels) == 1 else {}
 
     @property

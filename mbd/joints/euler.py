@@ -18,14 +18,14 @@ from mbd.joints.quaternions import quaternion_product
 from mbd.tape.functions import atan2, sqrt, where
 
 __all__ = [
-    "PLACES", "SEQUENCES", "euler_angles", "from_euler", "second_from_singular", "sequence_of",
+    "ANGLE_SUFFIXES", "SEQUENCES", "euler_angles", "from_euler", "second_from_singular", "sequence_of",
 ]  # fmt: skip
 
 SEQUENCES = tuple("".join(s) for s in every("xyz", repeat=3) if s[0] != s[1] != s[2])
 """The twelve sequences."""
-PLACES = "123"
+ANGLE_SUFFIXES = "123"
 """Endings of the names of three angles, in their order: 'hip.euler.zxy.1'."""
-SINGULAR = 1e-14
+SQUARED_COSINE_ATOL = 1e-14
 """Square of the cosine (or sine) of the second angle at which the other two are taken for one [-]."""
 
 
@@ -57,7 +57,7 @@ def euler_angles(R: Rotation, sequence: str) -> list[Any]:
     else:  # R_ik = e sin b, R_jk = −e sin a cos b, R_kk = cos a cos b, R_ij = −e cos b sin c, R_ii = cos b cos c
         square = R[i][i] * R[i][i] + R[i][j] * R[i][j]
         first, third = (-e * R[j][k], R[k][k]), (-e * R[i][j], R[i][i])
-    regular = square > SINGULAR
+    regular = square > SQUARED_COSINE_ATOL
     size = where(regular, sqrt(where(regular, square, 1.0)), 0.0)
     second = atan2(size, R[i][i]) if two else atan2(e * R[i][k], size)
     alone = atan2(e * R[k][j], R[j][j])  # of R_i(a) R_j(b)

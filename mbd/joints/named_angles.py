@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.joints.anatomy import angles_of
 from mbd.joints.base import Joint
-from mbd.joints.euler import PLACES, SEQUENCES
+from mbd.joints.euler import ANGLE_SUFFIXES, SEQUENCES
 
 __all__ = ["orientation_names"]
 
@@ -17,5 +17,5 @@ def orientation_names(joint: Joint) -> list[str]:
         return named
     vectors = ("angular_velocity.parent", "angular_velocity.ground", "rotation_vector")
     names = [f"{joint.name}.{vector}.{axis}" for vector in vectors for axis in "xyz"]
-    euler = [f"{joint.name}.euler.{sequence}.{place}" for sequence in SEQUENCES for place in PLACES]
+    euler = [f"{joint.name}.euler.{sequence}.{place}" for sequence in SEQUENCES for place in ANGLE_SUFFIXES]
     return names + named + euler + [f"{name}.rate" for name in euler]

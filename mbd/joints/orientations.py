@@ -13,15 +13,15 @@ from mbd.errors import ModelError
 from mbd.joints.euler import SEQUENCES, from_euler, second_from_singular, sequence_of
 from mbd.joints.quaternions import normalised, of_rotation
 
-__all__ = ["ROUNDED", "is_orientation", "orientation_doubt", "quaternion_of"]
+__all__ = ["ORTHONORMAL_ATOL", "is_orientation", "orientation_doubt", "quaternion_of"]
 
-ROUNDED = 1e-6
+ORTHONORMAL_ATOL = 1e-6
 """Most by which the length of a quaternion may be off 1, and the axes of a matrix off each other, by rounding [-]."""
-NEAR = 1e-6
+SINGULARITY_ATOL = 1e-6
 """Distance from the singularity of an Euler sequence within which a start is in doubt [rad]."""
 SMALL_TURN = math.cos(math.radians(15.0))
 """Scalar of the quaternion of a turn by 30° [-]."""
-FORMS = (
+ACCEPTED_FORMS = (
     "give a unit quaternion (w, x, y, z), scalar first, a scipy Rotation, a 3 × 3 rotation matrix, an axis with an "
     "angle such as ((0, 0, 1), 0.3), or Euler angles such as ('zxy', (0.1, 0.2, 0.3)), in radians"
 )
@@ -58,9 +58,9 @@ def quaternion_of(value: Any, what: str) -> tuple[float, ...]:
     if array.shape == (3, 3) and np.isfinite(array).all():
         return _of_matrix(array, what)
     if array.shape != (4,) or not np.isfinite(array).all():
-        raise ModelError(f"{what} must be an orientation, not {shown(value)}; {FORMS}")
+        raise ModelError(f"{what} must be an orientation, not {shown(value)}; {ACCEPTED_FORMS}")
     length = float(np.linalg.norm(array))
-    if not abs(length - 1.0) <= ROUNDED:
+    if not abs(length - 1.0) <= ORTHONORMAL_ATOL:
         near = f"; the nearest is ({', '.join(f'{x:.9g}' for x in array / length)})" if length > 0.0 else ""
         raise ModelError(f"{what} must be a quaternion of length 1, got {shown(value)} of length {length:.9g}{near}")
     return tuple(map(float, normalised(array.tolist())))
@@ -78,7 +78,7 @@ def _of_pair(value: Any, what: str) -> tuple[float, ...]:
         angles = [number(angle, f"{what}, angle about {axis!r}") for axis, angle in zip(sequence, rest, strict=True)]
         return tuple(from_euler(sequence, angles))
     if not is_number(rest):
-        raise ModelError(f"{what} must be an orientation, not {shown(value)}; {FORMS}")
+        raise ModelError(f"{what} must be an orientation, not {shown(value)}; {ACCEPTED_FORMS}")
     axis: Vector3 = unit_vector(head, f"axis of {what}")
     angle = number(rest, f"angle of {what}")
     return (math.cos(0.5 * angle), *(math.sin(0.5 * angle) * part for part in axis))
@@ -87,7 +87,7 @@ def _of_pair(value: Any, what: str) -> tuple[float, ...]:
 def _of_matrix(R: Vector, what: str) -> tuple[float, ...]:
     """Of a rotation matrix, whose columns are the child's axes in the parent's."""
     off = float(np.max(np.abs(R @ R.T - np.eye(3))))
-    if off > ROUNDED:
+    if off > ORTHONORMAL_ATOL:
         raise ModelError(
             f"{what} must be a rotation matrix, of columns of length 1 across each other; R Rᵀ is off 1 by {off:.3g}"
         )
@@ -132,7 +132,7 @@ def orientation_doubt(value: Any, what: str) -> str | None:
     if not (isinstance(value, list | tuple) and len(value) == 2 and isinstance(value[0], str)):
         return None
     sequence = sequence_of(value[0])
-    if sequence is None or second_from_singular(sequence, float(value[1][1])) > NEAR:
+    if sequence is None or second_from_singular(sequence, float(value[1][1])) > SINGULARITY_ATOL:
         return None
     return (
         f"{what}: the second angle of {value[0]!r} is {float(value[1][1]):.6g} rad, the singularity of that sequence, "

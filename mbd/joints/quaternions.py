@@ -26,11 +26,11 @@ __all__ = [
     "quaternion_product", "rotation_of", "rotation_vector",
 ]  # fmt: skip
 
-SMALL = 0.25
+SERIES_LIMIT = 0.25
 """θ² below which functions of it are their series [rad²]."""
-TERMS = 9
+SERIES_TERMS = 9
 """Terms of these series: what is left out is below round-off, in their second derivatives too."""
-SHARE = 0.9
+MIN_PIVOT = 0.9
 """4 times the square of a part of a quaternion above which it is a divisor; one of the four is 1 at least."""
 BERNOULLI = (1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600,
              3617 / 10670622842880000)  # fmt: skip
@@ -71,12 +71,12 @@ def of_rotation(R: Rotation) -> list[Any]:
     }  # fmt: skip
 
     def by(k: int) -> list[Any]:
-        root = sqrt(where(parts[k] > 0.5 * SHARE, parts[k], 1.0))
+        root = sqrt(where(parts[k] > 0.5 * MIN_PIVOT, parts[k], 1.0))
         return [0.5 * root if i == k else 0.5 * beside[min(i, k), max(i, k)] / root for i in range(4)]
 
     found = by(3)
     for k in (2, 1, 0):
-        found = [where(parts[k] > SHARE, a, b) for a, b in zip(by(k), found, strict=True)]
+        found = [where(parts[k] > MIN_PIVOT, a, b) for a, b in zip(by(k), found, strict=True)]
     return found
 
 
@@ -103,7 +103,7 @@ def rotation_vector(q: Four) -> list[Any]:
     small = s < 0.01 * w * w
     t = where(small, s / where(small, w * w, 1.0), 0.0)
     total: Any = 0.0
-    for n in reversed(range(TERMS)):
+    for n in reversed(range(SERIES_TERMS)):
         total = (-1.0) ** n / (2 * n + 1) + t * total
     a = sqrt(where(small, 1.0, s))
     k = where(small, 2.0 / where(small, w, 1.0) * total, 2.0 * atan2(a, w) / a)
@@ -150,12 +150,12 @@ def _square(x: Sequence[Any]) -> Scalar:
 
 def _taylor(first: int, factor: float = 1.0) -> list[float]:
     """(−factor)ⁿ/(first + 2n)!"""
-    return [(-factor) ** n / factorial(first + 2 * n) for n in range(TERMS)]
+    return [(-factor) ** n / factorial(first + 2 * n) for n in range(SERIES_TERMS)]
 
 
 def _by_series(s: Any, weights: Sequence[float], closed: Callable[[Any], Any]) -> Any:
-    """Σ weight sⁿ below SMALL, else closed(√s); s stays away from 0 in a branch that is not taken."""
+    """Σ weight sⁿ below SERIES_LIMIT, else closed(√s); s stays away from 0 in a branch that is not taken."""
     total: Any = weights[-1]
     for weight in reversed(weights[:-1]):
         total = weight + s * total
-    return where(s < SMALL, total, closed(sqrt(where(s < SMALL, 1.0, s))))
+    return where(s < SERIES_LIMIT, total, closed(sqrt(where(s < SERIES_LIMIT, 1.0, s))))

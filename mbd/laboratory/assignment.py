@@ -12,14 +12,14 @@ from mbd.bodies.base import Body, Frame
 from mbd.bodies.values import number, shown
 from mbd.errors import ModelError
 from mbd.laboratory.force_plate import ForcePlate
-from mbd.laboratory.recording import LOADED, PlateRecord, Recording
+from mbd.laboratory.recording import MIN_PLATE_LOAD, PlateRecord, Recording
 from mbd.notes import doubt, note
 
 __all__ = ["assign_plates"]
 
-REACH = 0.35
+MAX_PRESSURE_DISTANCE = 0.35
 """Farthest that a center of pressure lies from a point of the foot that stands there, along the ground [m]."""
-BRIEF = 0.03
+MIN_LOAD_TIME = 0.03
 """Loads that last less are taken for noise [s]."""
 
 
@@ -74,7 +74,7 @@ def assign_plates(
             mean = np.nanmean(distance, axis=1)
             best = int(np.argmin(mean))
             title = f"{plate.name} from {first:.3g} to {last:.3g} s"
-            if mean[best] > REACH:
+            if mean[best] > MAX_PRESSURE_DISTANCE:
                 doubt(f"{title}: no foot is nearer than {mean[best]:.2g} m to the center of pressure; left out")
                 continue
             nearest = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=0)
@@ -97,10 +97,10 @@ def assign_plates(
 
 
 def _loaded(plate: PlateRecord, threshold: float) -> list[tuple[float, float]]:
-    acts = np.concatenate([[0], (plate.force[:, 1] > max(threshold, LOADED * 0.1)).astype(int), [0]])
+    acts = np.concatenate([[0], (plate.force[:, 1] > max(threshold, MIN_PLATE_LOAD * 0.1)).astype(int), [0]])
     edges = np.flatnonzero(np.diff(acts))
     spans = [(float(plate.time[a]), float(plate.time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [(a, b) for a, b in spans if b - a >= BRIEF]
+    return [(a, b) for a, b in spans if b - a >= MIN_LOAD_TIME]
 
 
 def _distances(

@@ -16,7 +16,7 @@ from mbd.errors import TrajectoryError
 
 __all__ = ["check_parameters"]
 
-BLOCK = 512
+BLOCK_BYTES = 512
 PROCESSORS = {84: "<", 85: "<", 86: ">"}
 """Order of bytes by the kind of the processor: Intel, DEC, MIPS."""
 TYPES = (-1, 1, 2, 4)
@@ -32,9 +32,9 @@ def check_parameters(path: Path) -> None:
         for a section that has no end, or an entry that does not fit, with the place of its first byte.
     """
     data = path.read_bytes()
-    if len(data) < 2 * BLOCK or data[1] != 0x50:
+    if len(data) < 2 * BLOCK_BYTES or data[1] != 0x50:
         raise TrajectoryError(f"{path.name}: no .c3d, whose second byte is 80 and which has a header of 512 bytes")
-    first = (data[0] - 1) * BLOCK
+    first = (data[0] - 1) * BLOCK_BYTES
     if first < 0 or first + 4 > len(data) or data[first + 3] not in PROCESSORS:
         raise TrajectoryError(f"{path.name}: its parameters should begin in block {data[0]}, where none do")
     order, at = PROCESSORS[data[first + 3]], first + 4

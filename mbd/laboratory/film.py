@@ -17,7 +17,7 @@ from mbd.results.trajectory import Trajectory
 
 __all__ = ["film"]
 
-DOUBTFUL = 0.01
+MAX_MEAN_ERROR = 0.01
 """Mean error of what plates carry, over its mean size, above which it is in doubt: schemes err by less [-]."""
 
 
@@ -94,7 +94,7 @@ def _doubt_other_forces(seen: Any, plates: Sequence[PlateRecord]) -> None:
     ):
         acts = np.asarray(seen[f"external {what}"])
         off = np.abs(carried - acts)
-        if np.mean(off) > DOUBTFUL * np.mean(np.abs(acts)):
+        if np.mean(off) > MAX_MEAN_ERROR * np.mean(np.abs(acts)):
             k, axis = np.unravel_index(int(np.argmax(off)), off.shape)
             has, should = (round(float(each[k, axis]), 9) + 0.0 for each in (carried, acts))
             doubt(

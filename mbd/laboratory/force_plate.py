@@ -21,7 +21,7 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.forces.samples import Samples
-from mbd.laboratory.recording import LOADED, PlateRecord, Recording
+from mbd.laboratory.recording import MIN_PLATE_LOAD, PlateRecord, Recording
 from mbd.tape.node import Scalar
 
 __all__ = ["ForcePlate", "all_plates", "loaded_model", "wrenches"]
@@ -58,7 +58,7 @@ class ForcePlate(Force):
     recording: Any
     plate: Any = 1
     during: Any = None
-    threshold: float = LOADED
+    threshold: float = MIN_PLATE_LOAD
 
     def __post_init__(self) -> None:
         name_of(self.name, "ForcePlate")

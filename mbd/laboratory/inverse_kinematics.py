@@ -32,7 +32,7 @@ MIN_DISTANCE = 0.02
 """Distance of two markers on a body from which on their distances are compared with the model's [m]."""
 UNIT_RATIOS = (0.1, 10.0)
 """Distances of markers on a body over those of the model that may be in the same unit [-]."""
-FAR = 0.05
+MAX_MARKER_ERROR = 0.05
 """Distance of a marker from its place, more than skin moves over bones, above which names or units may differ [m]."""
 
 
@@ -203,14 +203,14 @@ def _far(found: InverseKinematics, weights: Mapping[str, float]) -> list[str]:
         for name, weight in weights.items()
         if weight >= 1.0 and np.isfinite(found.residual[name]).any()
     }
-    far = [name for name, size in away.items() if size > FAR]
+    far = [name for name, size in away.items() if size > MAX_MARKER_ERROR]
     if not far:
         return []
     worst = max(far, key=lambda name: away[name])
     return [
         f"inverse_kinematics: marker {worst!r} is {away[worst]:.2g} m from its place on the model (rms; {len(far)} of "
-        f"{len(away)} markers are beyond {FAR:g} m): names, units, sizes of segments or axes differ; up= and forward= "
-        "of mbd.read say how a file has them"
+        f"{len(away)} markers are beyond {MAX_MARKER_ERROR:g} m): names, units, sizes of segments or axes differ; "
+        "up= and forward= of mbd.read say how a file has them"
     ]
 
 

@@ -32,7 +32,7 @@ MIN_STANCE = 0.1
 """Loads that last less are no stance [s]."""
 MIN_LOAD = 20.0
 """Normal force of a plate of a recording from which on a foot stands on it [N]."""
-POINTS = 1000
+STRIDE_SAMPLES = 1000
 """Samples of a stride from which its impulse is taken."""
 
 
@@ -108,9 +108,9 @@ class MeasuredGait:
             if other is not side
             for c, d in other.stances
         ]
-        times = np.linspace(stride.begin, stride.end, POINTS)
+        times = np.linspace(stride.begin, stride.end, STRIDE_SAMPLES)
         forces = self.force(side.name, times)
-        normal, forward = (np.full(POINTS, np.nan),) * 2 if forces is None else forces
+        normal, forward = (np.full(STRIDE_SAMPLES, np.nan),) * 2 if forces is None else forces
         per, scale = ("", 1.0) if mass is None else ("/kg", 1.0 / mass)
         return {
             ("step length", "m"): step_length, ("step time", "s"): step_time, ("stride length", "m"): stride.length,

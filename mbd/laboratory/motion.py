@@ -29,7 +29,7 @@ from mbd.results.trajectory import Trajectory
 
 __all__ = ["Motion", "derivatives", "motion_of", "parameters_of", "record_of"]
 
-SECONDS_APART = 2.0
+MAX_FRAME_INTERVAL = 2.0
 """Time between frames above which it may be in milliseconds [s]."""
 
 
@@ -196,7 +196,7 @@ def _in_degrees(equations: Equations, columns: Mapping[str, _Column]) -> list[st
 def _in_milliseconds(time: Vector) -> list[str]:
     """A sentence on frames that are seconds apart, as those of cameras are in milliseconds."""
     apart = float(np.median(np.diff(time))) if len(time) > 2 else 0.0
-    if not apart > SECONDS_APART:
+    if not apart > MAX_FRAME_INTERVAL:
         return []
     return [f"motion: frames are {apart:g} s apart; times are in seconds, and {apart:g} ms is {apart / 1e3:g} s"]
 

@@ -9,7 +9,7 @@ from mbd.errors import ModelError
 
 __all__ = ["continuous", "quaternion_rates"]
 
-LENGTH = 1e-3
+UNIT_LENGTH_ATOL = 1e-3
 """How far from 1 the length of a given quaternion may be before it is refused [-]."""
 
 
@@ -20,7 +20,7 @@ def continuous(quaternions: Matrix, what: str) -> Matrix:
     [[0.6, 0.8], [0.6, 0.8]]
     """
     sizes = np.sqrt(np.einsum("ij,ij->i", quaternions, quaternions))
-    wrong = np.flatnonzero(np.abs(sizes - 1.0) > LENGTH)
+    wrong = np.flatnonzero(np.abs(sizes - 1.0) > UNIT_LENGTH_ATOL)
     if len(wrong):
         raise ModelError(
             f"{what!r} must be unit quaternions (w, x, y, z); that of frame {wrong[0]} has the length "

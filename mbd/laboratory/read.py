@@ -25,7 +25,7 @@ READERS: dict[str, tuple[Callable[[Path], Recording], str]] = {
     ".csv": (read_csv, "y"),
 }  # fmt: skip
 """Readers by the end of the name, and the axis that usually points up in such files."""
-FARTHEST = 50.0
+MAX_MARKER_DISTANCE = 50.0
 """Distance of markers from each other that no laboratory has [m]."""
 
 
@@ -84,7 +84,7 @@ def _plate(plate: PlateRecord, turn: np.ndarray) -> PlateRecord:
 def _doubt_units(recording: Recording) -> None:
     for name, track in recording.markers.items():
         seen = track[np.isfinite(track).all(axis=1)]
-        if len(seen) and np.ptp(seen, axis=0).max() > FARTHEST:
+        if len(seen) and np.ptp(seen, axis=0).max() > MAX_MARKER_DISTANCE:
             doubt(
                 f"{recording.name}: marker {name!r} moves over {np.ptp(seen, axis=0).max():.3g} m; the units of the "
                 "file are probably others than its header says"

@@ -19,7 +19,7 @@ from mbd.laboratory.measured_gait import MeasuredGait, gait_of_recording
 
 __all__ = ["PlateRecord", "Recording"]
 
-LOADED = 10.0
+MIN_PLATE_LOAD = 10.0
 """Force along the vertical below which a plate is taken to be unloaded by default [N]."""
 
 
@@ -49,7 +49,7 @@ class PlateRecord:
         ends = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
         return f"<PlateRecord {self.name!r}: {len(self.time)} samples{ends}, up to {most:.4g} N>"
 
-    def center(self, threshold: float = LOADED) -> Matrix:
+    def center(self, threshold: float = MIN_PLATE_LOAD) -> Matrix:
         """The center of pressure (A, 3) [m]: where on the surface the force has no moment but a vertical one.
 
         NaN where less than `threshold` [N] acts along the vertical.
@@ -60,7 +60,7 @@ class PlateRecord:
         z = (-M[:, 0] + self.height * F[:, 2]) / up
         return np.column_stack([x, np.where(np.isfinite(x), self.height, np.nan), z])
 
-    def free_moment(self, threshold: float = LOADED) -> Vector:
+    def free_moment(self, threshold: float = MIN_PLATE_LOAD) -> Vector:
         """The vertical moment about the center of pressure (A,) [N m]; 0 where nothing acts."""
         found = self.center(threshold)
         vertical = self.moment[:, 1] - (found[:, 2] * self.force[:, 0] - found[:, 0] * self.force[:, 2])
@@ -80,7 +80,7 @@ class PlateRecord:
             )
         level = height
         if level is None:
-            seen = place[np.isfinite(place[:, 1]) & (np.abs(force[:, 1]) > LOADED), 1]
+            seen = place[np.isfinite(place[:, 1]) & (np.abs(force[:, 1]) > MIN_PLATE_LOAD), 1]
             level = float(np.median(seen)) if len(seen) else 0.0
         free = np.broadcast_to(np.asarray(free_moment, dtype=float), time.shape)
         known = np.nan_to_num(place, nan=0.0)

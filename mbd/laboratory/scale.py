@@ -24,11 +24,11 @@ ENDS = {
     "left foot": ("heel", "toe"), "right foot": ("heel", "toe"),
 }  # fmt: skip
 """Points whose distance is the length of a segment that is no link."""
-STRAIGHT = 12.0
+MAX_STATIC_FLEXION = 12.0
 """Angle between thigh and shank of a static trial from which a knee counts as bent [°]."""
 PLAUSIBLE = (0.7, 1.4)
 """Factors of length outside of which a measured length is in doubt [-]."""
-RIGID = 0.02
+MAX_RIGID_SCATTER = 0.02
 """Scatter of the distance of two markers beyond which they do not lie on one rigid body [m]."""
 
 
@@ -120,7 +120,7 @@ def _bent_knees(lengths: Mapping[str, Any], recording: Recording | None) -> list
         thigh, shank = np.nanmedian(b - a, axis=0), np.nanmedian(d - c, axis=0)
         cosine = thigh @ shank / (np.linalg.norm(thigh) * np.linalg.norm(shank))
         bend = np.degrees(np.arccos(min(float(cosine), 1.0)))
-        if bend > STRAIGHT:
+        if bend > MAX_STATIC_FLEXION:
             found.append(
                 f"scale: the {side} knee is bent by {bend:.0f}° in the static trial; lengths between markers hold all "
                 "the same, but marker places that are taken from this posture do not: let the patient stand straight"
@@ -154,7 +154,7 @@ def _measured(name: str, given: Any, recording: Recording | None) -> float:
         apart = apart[np.isfinite(apart)]
         if not len(apart):
             raise ModelError(f"lengths: {given[0]!r} and {given[1]!r} of {name!r} are never seen together")
-        if np.std(apart) > RIGID:
+        if np.std(apart) > MAX_RIGID_SCATTER:
             doubt(
                 f"scale: the distance of {given[0]!r} and {given[1]!r} varies by {1e3 * np.std(apart):.0f} mm; do both "
                 f"lie on the {name}?"

@@ -17,15 +17,15 @@ __all__ = ["Scatter", "noise_remarks", "scatter_of"]
 
 FEWEST, MOST = 20, 600
 """Frames from which the scatter is estimated: of more, those in the middle."""
-EVEN = 0.01
+SPACING_RTOL = 0.01
 """How unevenly the frames may be spaced, relative [-]."""
 MIN_RATIO = 0.6
 """Scatter by fifth over that by fourth differences above which it is noise: 1 of noise, ω h of a smooth signal [-]."""
 MIN_SHARE = 0.05
 """Scatter of a moment over its range above which it is reported [-]."""
-SPLINE = 6.0
+SPLINE_NOISE_GAIN = 6.0
 """Standard deviation of h² s̈ at the knots of a cubic spline through white noise of deviation 1 [-]."""
-DIFFERENCES = {4: SPLINE * 13.676571703571772, 5: SPLINE * 26.64328436439567}
+DIFFERENCES = {4: SPLINE_NOISE_GAIN * 13.676571703571772, 5: SPLINE_NOISE_GAIN * 26.64328436439567}
 """Standard deviations of the kth differences of such h² s̈: √(1/π ∫ (6 (1 − cos θ)/(2 + cos θ))² (2 − 2 cos θ)ᵏ dθ), θ
 from 0 to π [-]."""
 
@@ -47,9 +47,9 @@ def scatter_of(time: Vector, coordinate: Vector, moment: Vector) -> Scatter | No
     part = slice(middle, middle + MOST)
     time, coordinate, moment = time[part], coordinate[part], moment[part]
     widths = np.diff(time)
-    if len(time) < FEWEST or np.ptp(widths) > EVEN * widths.mean():
+    if len(time) < FEWEST or np.ptp(widths) > SPACING_RTOL * widths.mean():
         return None
-    fourth, fifth = (_deviation(moment, order) * SPLINE / DIFFERENCES[order] for order in (4, 5))
+    fourth, fifth = (_deviation(moment, order) * SPLINE_NOISE_GAIN / DIFFERENCES[order] for order in (4, 5))
     if fifth < MIN_RATIO * fourth or fourth < MIN_SHARE * float(np.ptp(moment)) or fourth == 0.0:
         return None
     return Scatter(fourth, _deviation(coordinate, 4) / float(np.sqrt(comb(8, 4))))

@@ -20,9 +20,9 @@ from mbd.simulation.interrupted import stopped
 
 __all__ = ["FunctionSource", "GaitSource", "Point", "Source", "gait_numbers"]
 
-BESIDE = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Difference of an unknown, over its value or 1, at which numbers without derivatives are found again [-]."""
-CLOSER = 1e-5
+SMOOTH_DIFFERENCE_STEP = 1e-5
 """The same for a user's function of numbers alone."""
 
 
@@ -161,7 +161,7 @@ def _difference(gait: LimitCycle, number: str, name: str) -> float:
     """Of gaits found again beside this one, to the fourth order."""
     value, slopes = parameter_value(gait, name), []
     for factor in (1.0, 2.0):
-        h = factor * BESIDE * (abs(value) or 1.0)
+        h = factor * DIFFERENCE_STEP * (abs(value) or 1.0)
         ends = [gait_numbers(gait.at({name: value + sign * h}))[number] for sign in (1.0, -1.0)]
         slopes.append((ends[0] - ends[1]) / (2.0 * h))
     return float((4.0 * slopes[0] - slopes[1]) / 3.0)
@@ -209,7 +209,7 @@ class FunctionSource(Source):
     def _slopes(self, point: Point, name: str) -> Vector:
         slopes = []
         for unknown, value in point.values.items():
-            h = CLOSER * (abs(value) or self.scales[unknown])
+            h = SMOOTH_DIFFERENCE_STEP * (abs(value) or self.scales[unknown])
             ends = [float(self.function({**point.values, unknown: value + sign * h})[name]) for sign in (1.0, -1.0)]
             slopes.append((ends[0] - ends[1]) / (2.0 * h))
         return np.array(slopes)

@@ -16,7 +16,7 @@ from mbd.optimization.points import Point, Source, failed
 
 __all__ = ["Evaluated", "FailedTrial", "Limit", "Problem", "Trial", "TrialsSpent"]
 
-FEASIBLE = 1e-8
+FEASIBILITY_RTOL = 1e-8
 """Violation of a constraint, over its scale, that counts as none [-]."""
 
 
@@ -227,6 +227,6 @@ class Problem:
 
     def better(self, one: Evaluated, other: Evaluated) -> bool:
         """Whether one place is better: less violated, or as good there and a smaller objective."""
-        if max(one.violation, other.violation) > FEASIBLE:
+        if max(one.violation, other.violation) > FEASIBILITY_RTOL:
             return one.violation < other.violation
         return self.objective(one) < self.objective(other)

@@ -12,9 +12,9 @@ from mbd.optimization.problem import Evaluated, FailedTrial, Problem, TrialsSpen
 __all__ = ["METHODS", "searched"]
 
 METHODS = ("SLSQP", "trust-constr", "least_squares")
-AT_EDGE = 1e-6
+EDGE_RTOL = 1e-6
 """Distance from the edge of the box in which a step is looked for, over the box, that is on it [-]."""
-ROUNDS = 60
+MAX_BOXES = 60
 """Most boxes."""
 
 
@@ -26,7 +26,7 @@ def searched(problem: Problem, method: str, accuracy: float) -> tuple[bool, str]
     """
     assert problem.best is not None
     radius, may_grow, outcome = np.inf, True, ""
-    for _ in range(ROUNDS):
+    for _ in range(MAX_BOXES):
         best = problem.best
         try:
             converged, message, u = _round(problem, method, accuracy, radius)
@@ -38,13 +38,13 @@ def searched(problem: Problem, method: str, accuracy: float) -> tuple[bool, str]
             continue
         except TrialsSpent:
             return False, f"{problem.most} trials were made, the most allowed"
-        inside = np.max(np.abs(u - best.u)) < radius * (1.0 - AT_EDGE)
+        inside = np.max(np.abs(u - best.u)) < radius * (1.0 - EDGE_RTOL)
         if inside or np.isinf(radius):
             return converged, message
         if not problem.better(problem.best, best):
             return False, f"no better trial is found beside those that fail: {outcome}"
         radius, may_grow = (2.0 * radius if may_grow else radius), True
-    return False, f"{ROUNDS} rounds were made; the last trial that failed: {outcome}"
+    return False, f"{MAX_BOXES} rounds were made; the last trial that failed: {outcome}"
 
 
 def _round(problem: Problem, method: str, accuracy: float, radius: float) -> tuple[bool, str, Vector]:

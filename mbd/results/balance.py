@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.python import ArrayFunction, array_function
-from mbd.compile.trivial_rows import DOUBTFUL, parts_of_row
+from mbd.compile.trivial_rows import DERIVATIVE_ATOL, parts_of_row
 from mbd.dataclass import dataclass
 from mbd.equal import REST_SPEED, ROUND_OFF_RTOL
 from mbd.equations import programs
@@ -32,19 +32,19 @@ from mbd.tape.node import Node, Tape
 
 __all__ = ["Balance", "Held", "Solved", "put", "saddle", "weights"]
 
-DEPENDENCE = 1e-6
+RANK_RTOL = 1e-6
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-].
 
 The largest over some stored states counts: at one of them rows may depend on each other for an instant, and an error of
 1e-9 in positions leaves as much of a row that depends on others.
 """
-TELLING = 1e-5
+DIRECTION_RTOL = 1e-5
 """What is left of a row, over its length elsewhere, below which its direction is too much that of round-off [-]."""
-SAMPLES = 16
+MAX_SAMPLES = 16
 """Stored states at which the dependence of rows is judged, at most [-]."""
-LEAST_SIZE = -1e6
+SINGULAR_LOG_DETERMINANT = -1e6
 """Log |det| that stands for that of a singular matrix [-]."""
-SETTLED = 1e-13
+MULTIPLIER_RTOL = 1e-13
 """Relative change of multipliers at which that ends [-]."""
 
 Flags = NDArray[np.bool_]
@@ -133,7 +133,7 @@ class Balance:
             before, lam = lam, np.zeros_like(rows.lam)
             lam[:, held.every] = force if spread is None else (spread @ force[:, :, None])[:, :, 0]
             change = np.max(np.abs(lam - before), axis=1, initial=0.0)
-            if np.all((change <= SETTLED * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
+            if np.all((change <= MULTIPLIER_RTOL * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
                 break
         if slides:
             *_, rates, _, limits = self.terms_at(replace(rows, lam=lam))
@@ -195,7 +195,7 @@ class Balance:
         record = self.states.record
         same = np.all(record.closed == closed, axis=1) & np.all(record.phase == phase, axis=1)
         places = np.flatnonzero(same)
-        chosen = places[np.linspace(0, len(places) - 1, min(len(places), SAMPLES)).astype(np.intp)]
+        chosen = places[np.linspace(0, len(places) - 1, min(len(places), MAX_SAMPLES)).astype(np.intp)]
         there = self.states.rows.part(chosen)
         M, _, _, B, *_ = self.terms_at(there)
         every = self._acting(every, there, B)
@@ -206,7 +206,7 @@ class Balance:
     def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:
         """The rows whose Jacobian exceeds round-off of its parts; redundant ones of joints on one axis are not."""
         largest = np.max(np.abs(B), axis=(0, 2), initial=0.0)
-        bound = DOUBTFUL * max(1.0, float(np.max(largest, initial=0.0)))
+        bound = DERIVATIVE_ATOL * max(1.0, float(np.max(largest, initial=0.0)))
         doubtful = [k for k in every if largest[k] <= bound]
         if not doubtful:
             return every
@@ -274,7 +274,9 @@ def saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Mat
     sound = finite & (sign != 0.0)
     matrix[~sound] = np.eye(n + m)
     solved = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
-    size = np.where(sound, np.maximum(size, LEAST_SIZE), LEAST_SIZE) if m else np.zeros(count)
+    size = (
+        np.where(sound, np.maximum(size, SINGULAR_LOG_DETERMINANT), SINGULAR_LOG_DETERMINANT) if m else np.zeros(count)
+    )
     return np.asarray(solved[:, :n]), np.asarray(solved[:, n:]), np.asarray(size), np.asarray(sound)
 
 
@@ -292,9 +294,9 @@ def _independent(B: Any) -> list[int]:
             left = left - np.einsum("kbn,kb->kn", basis, np.einsum("kbn,kn->kb", basis, left))
         length = np.linalg.norm(left, axis=1)
         asked = telling if telling.any() else ~telling
-        if np.any((length > DEPENDENCE * size)[asked]):
-            telling &= length > TELLING * np.max(size)  # a row may vanish by itself there
-            there = (length > DEPENDENCE**2 * size)[:, None]
+        if np.any((length > RANK_RTOL * size)[asked]):
+            telling &= length > DIRECTION_RTOL * np.max(size)  # a row may vanish by itself there
+            there = (length > RANK_RTOL**2 * size)[:, None]
             unit = np.divide(left, length[:, None], out=np.zeros_like(left), where=there)
             basis = np.concatenate([basis, unit[:, None]], axis=1)
             kept.append(row)

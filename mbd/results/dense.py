@@ -24,7 +24,7 @@ from mbd.results.stored_states import StoredStates
 
 __all__ = ["Restepping"]
 
-NEAR_POSE = 0.2
+SINGULAR_DISTANCE_RATIO = 0.2
 """Distance of a stage from a singular configuration, over that of the farther row, below which it is not used [-]."""
 
 
@@ -68,7 +68,7 @@ class Restepping:
         before, after = self._rates(begin).size, self._rates(rows.part(places.upper[inside])).size
         far = np.maximum(before, after)  # the row of an event may lie at the pose itself
         least = np.minimum(np.minimum(least, 0.0) + before, end.size)
-        near[inside] = least - far < 2.0 * np.log(NEAR_POSE)
+        near[inside] = least - far < 2.0 * np.log(SINGULAR_DISTANCE_RATIO)
         near[inside] |= ~end.sound
         return self._smoothed(rows, places, found, near) if near.any() else found
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.results.dense import NEAR_POSE, Restepping
-from mbd.results.polynomials import AT_ONCE, Places, hermite, quintic
+from mbd.results.dense import SINGULAR_DISTANCE_RATIO, Restepping
+from mbd.results.polynomials import CHUNK, Places, hermite, quintic
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 
@@ -27,7 +27,7 @@ __all__ = ["LedSteps"]
 Index = NDArray[np.intp]
 
 NAMES = ("q", "v", "z", "a", "s", "lam")
-SHORT = 1e-9
+SHORT_STEP_RTOL = 1e-9
 """Difference of a cubic and a quintic over the way in an interval below which its step is short: ω h = 0.025 [-]."""
 
 
@@ -49,10 +49,10 @@ class LedSteps:
         inside = np.flatnonzero(places.step > 0.0)
         which = np.unique(places.lower[inside])
         rough, way = self._rough(rows, which)
-        which, rough = which[rough > SHORT * way], rough[rough > SHORT * way]
+        which, rough = which[rough > SHORT_STEP_RTOL * way], rough[rough > SHORT_STEP_RTOL * way]
         inside = inside[np.isin(places.lower[inside], which)]
         changed = {name: np.array(getattr(found, name)) for name in NAMES}
-        for part in np.array_split(inside, -(-len(inside) // AT_ONCE)) if len(inside) else ():
+        for part in np.array_split(inside, -(-len(inside) // CHUNK)) if len(inside) else ():
             mine, back = np.unique(places.lower[part], return_inverse=True)
             off, good = self._missed(rows, mine, rough[np.searchsorted(which, mine)])
             part, back = part[good[back]], back[good[back]]
@@ -99,4 +99,4 @@ class LedSteps:
                 np.max(np.abs(off[:, :n_v]), axis=1, initial=0.0),
                 np.max(step * np.abs(off[:, n_v : 2 * n_v]), axis=1, initial=0.0),
             )
-        return off, np.isfinite(off).all(axis=1) & (sizes < rough) & (least > 2.0 * np.log(NEAR_POSE))
+        return off, np.isfinite(off).all(axis=1) & (sizes < rough) & (least > 2.0 * np.log(SINGULAR_DISTANCE_RATIO))

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Equations, Row
-from mbd.results.balance import SAMPLES, Balance
+from mbd.results.balance import MAX_SAMPLES, Balance
 from mbd.results.record import Rows
 from mbd.tape.derivatives import live, substitute
 
@@ -140,7 +140,7 @@ def is_wholly_driven(run: Trajectory) -> bool:
     if equations is None or not drives_of(run):
         return False
     columns, bilateral = run._model_columns, list(equations.bilateral)
-    chosen = np.unique(np.linspace(0, len(run.time) - 1, SAMPLES).astype(np.intp))
+    chosen = np.unique(np.linspace(0, len(run.time) - 1, MAX_SAMPLES).astype(np.intp))
     M, _, _, B, *_ = columns.balance.terms_at(columns.rows.part(chosen))
     weight = np.sqrt(np.maximum(np.einsum("kii->ki", M), 0.0))[:, : equations.n_v]
     scaled: Matrix = B[:, bilateral, : equations.n_v] / np.where(weight > 0.0, weight, 1.0)[:, None]

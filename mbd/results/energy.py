@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 __all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
 
-ALIKE = 1e-14
+WORK_RTOL = 1e-14
 """Difference of two works of an interval, over the largest, that is round-off [-]."""
-RESOLVED = 0.05
+MAX_WORK_ERROR = 0.05
 """Error of the work of an impact, over its largest, up to which rows tell it [-]."""
-UNSURE = 10.0
+MIN_GAIN_OVER_ERROR = 10.0
 """Gain of a penalty contact of a user's own law over its error below which it is not told [-]."""
 
 
@@ -159,7 +159,7 @@ def never_giving(work: Vector, power: Vector, trapezoid: Vector) -> Vector:
 def _withheld_if_unsure(part: Part, doubt: float, least: float) -> Part:
     """A penalty contact of a law of the user's, withheld where it seems to give energy that may be an error."""
     gain = float(np.max(part.energy - part.energy[:1], initial=0.0))
-    if not least < gain <= UNSURE * doubt:
+    if not least < gain <= MIN_GAIN_OVER_ERROR * doubt:
         return part
     reason = (
         f"its power, added up over the rows, gives {gain:.3g} J, with an error of up to {doubt:.3g} J; impacts of so "
@@ -199,7 +199,7 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     allowed = ROUND_OFF_RTOL * size
     allowed[0] += held[0]
     np.add.at(allowed, episode[1:], np.maximum(put_in, 0.0))
-    is_known = (doubt <= RESOLVED * size) & (gain <= allowed)
+    is_known = (doubt <= MAX_WORK_ERROR * size) & (gain <= allowed)
     return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]], np.diff(direct), steps))])
 
 
@@ -236,7 +236,7 @@ def _long(
         plain += step**2 * (rate[:-1] - rate[1:]) / 12.0
     differ = np.where(known, np.abs(steps - plain), 0.0)
     if rate is None:
-        differ[known & (differ <= ALIKE * np.max(np.abs(work)))] = np.inf  # few rows: both are the trapezoid
+        differ[known & (differ <= WORK_RTOL * np.max(np.abs(work)))] = np.inf  # few rows: both are the trapezoid
     long = np.sort(np.argsort(-differ, kind="stable")[:20000])
     return np.asarray(long[differ[long] > least])
 

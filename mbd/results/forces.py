@@ -23,14 +23,14 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.equal import EQUAL_RTOL
 from mbd.results.balance import Balance, Flags, put
-from mbd.results.polynomials import AT_ONCE, Places
+from mbd.results.polynomials import CHUNK, Places
 from mbd.results.record import Rows
 
 __all__ = ["Forces"]
 
 POINTS = np.array([0.2, 0.5, 0.8])
 """Where in an interval both are compared [-]."""
-UNKNOWN = -1
+NOT_EVALUATED = -1
 """Of an interval that was not asked for yet."""
 
 
@@ -43,7 +43,7 @@ class Forces:
 
     def __init__(self, balance: Balance, rows: Rows, states: States) -> None:
         self.balance, self.rows, self.states = balance, rows, states
-        self._known = np.full(len(rows), UNKNOWN, dtype=np.int8)  # of each interval, by the row that begins it
+        self._known = np.full(len(rows), NOT_EVALUATED, dtype=np.int8)  # of each interval, by the row that begins it
 
     def at(self, places: Places) -> Rows:
         """The states at places, with accelerations and multipliers from the balance where these are the better ones."""
@@ -67,8 +67,8 @@ class Forces:
     def _serves(self, places: Places) -> Flags:
         """Whether the balance is better than polynomials in the interval of each place; false where it meets a row."""
         asked = np.unique(places.lower[places.step > 0.0])
-        fresh = asked[self._known[asked] == UNKNOWN]
-        for part in np.array_split(fresh, -(-len(fresh) // AT_ONCE)) if len(fresh) else ():
+        fresh = asked[self._known[asked] == NOT_EVALUATED]
+        for part in np.array_split(fresh, -(-len(fresh) // CHUNK)) if len(fresh) else ():
             self._known[part] = self._steadier(part)
         return np.asarray(self._known[places.lower] == 1)
 

@@ -13,9 +13,9 @@ from mbd.results.record import EventRecord
 
 __all__ = ["Matches", "aligned", "apart", "matched"]
 
-ALONE = 0.01
+UNMATCHED_COST = 0.01
 """What an event without a match costs, as a shift relative to the length of the run [-]."""
-MANY = 400
+MAX_ASSIGNED = 400
 """Events of one name above which the k-th is matched with the k-th."""
 
 
@@ -38,7 +38,7 @@ def matched(first: Sequence[EventRecord], second: Sequence[EventRecord], begin: 
     pairs: list[tuple[float, float]] = []
     alone: list[float] = []
     for key in ours.keys() | theirs.keys():
-        found, left = aligned(ours.get(key, []), theirs.get(key, []), ALONE * (end - begin))
+        found, left = aligned(ours.get(key, []), theirs.get(key, []), UNMATCHED_COST * (end - begin))
         pairs += found
         alone += left
     shift = max((abs(a - b) for a, b in pairs), default=0.0)
@@ -53,10 +53,10 @@ def aligned(first: list[float], second: list[float], price: float) -> tuple[list
     ([(1.0, 1.1), (3.0, 3.1)], [2.0])
     """
     if len(first) == len(second) and (
-        len(first) > MANY or sum(abs(a - b) for a, b in zip(first, second, strict=True)) <= 2.0 * price
+        len(first) > MAX_ASSIGNED or sum(abs(a - b) for a, b in zip(first, second, strict=True)) <= 2.0 * price
     ):
         return list(zip(first, second, strict=True)), []
-    if max(len(first), len(second)) > MANY:
+    if max(len(first), len(second)) > MAX_ASSIGNED:
         pairs = list(zip(first, second, strict=False))
         return pairs, first[len(pairs) :] + second[len(pairs) :]
     n, m = len(first), len(second)

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.joints.anatomy import Angle
-from mbd.joints.euler import PLACES, euler_angles, second_from_singular, sequence_of
+from mbd.joints.euler import ANGLE_SUFFIXES, euler_angles, second_from_singular, sequence_of
 from mbd.joints.quaternions import rotation_of, rotation_vector
 from mbd.notes import doubt
 
@@ -21,7 +21,7 @@ __all__ = ["ReadOff", "doubt_singular", "read_off"]
 
 VECTOR = re.compile(r"(.+)\.rotation_vector\.([xyz])")
 ANGLES = re.compile(r"(.+)\.euler\.([xyz]{3})(?:\.([123]))?")
-NEAR = 1e-4
+SINGULARITY_ATOL = 1e-4
 """Distance of the second angle from the singularity within which the other two are in doubt [rad]."""
 
 ReadOff = tuple[tuple[str, ...], Callable[[Sequence[Vector]], Vector]]
@@ -39,7 +39,7 @@ def read_off(name: str) -> ReadOff | None:
         place = "xyz".index(vector[2])
         return parts, lambda q: np.asarray(rotation_vector(q)[place])
     assert angles is not None
-    sequence, place = angles[2], PLACES.index(angles[3])
+    sequence, place = angles[2], ANGLE_SUFFIXES.index(angles[3])
     return parts, lambda q: np.asarray(euler_angles(rotation_of(q), sequence)[place])
 
 
@@ -57,11 +57,11 @@ def doubt_singular(name: str, values: Vector, facts: Facts | None, read: Callabl
     second = np.atleast_2d(values)[:, 1]
     off = second_from_singular(angles[2], second)
     worst = int(np.argmin(off))
-    if off[worst] < NEAR:
+    if off[worst] < SINGULARITY_ATOL:
         doubt(
-            f"{name!r}: its second angle comes to {second[worst]:.6g} rad, within {NEAR:g} rad of the singularity of "
-            f"{angles[2]!r}, where the first and the third turn about one axis and jump; use another sequence, or the "
-            f"quaternion {angles[1] + '.orientation'!r}"
+            f"{name!r}: its second angle comes to {second[worst]:.6g} rad, within {SINGULARITY_ATOL:g} rad of the "
+            f"singularity of {angles[2]!r}, where the first and the third turn about one axis and jump; "
+            f"use another sequence, or the quaternion {angles[1] + '.orientation'!r}"
         )
 
 
@@ -73,9 +73,10 @@ def _doubt_named(name: str, angle: Angle, values: Vector, read: Callable[[str], 
     second = np.atleast_1d(read(other))
     off = second_from_singular(angle.sequence, second)
     worst = int(np.argmin(off))
-    if off[worst] < NEAR:
+    if off[worst] < SINGULARITY_ATOL:
         doubt(
-            f"{name!r} is undetermined where {other!r} comes to {second[worst]:.6g} rad, within {NEAR:g} rad of the "
-            "singularity of its sequence: the first and the third angle turn about one axis there and jump; "
+            f"{name!r} is undetermined where {other!r} comes to {second[worst]:.6g} rad, within "
+            f"{SINGULARITY_ATOL:g} rad of the singularity of its sequence: "
+            "the first and the third angle turn about one axis there and jump; "
             "the orientation of the joint tells more"
         )

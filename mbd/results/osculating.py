@@ -19,15 +19,15 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.results.polynomials import Index, Places
-from mbd.results.quadrature import AT_ONCE, stretches
+from mbd.results.quadrature import CHUNK, stretches
 
-__all__ = ["DOUBT", "Osculation", "osculating"]
+__all__ = ["MAX_ERROR_RATIO", "Osculation", "osculating"]
 
-AGREE = 0.25
+MAX_SIDE_RATIO = 0.25
 """Difference of the two sides, over that from the quintic, below which they see the same motion [-]."""
-DOUBT = 0.05
+MAX_ERROR_RATIO = 0.05
 """Error of a polynomial over its difference from the one below, up to ω h = 2 [-]."""
-SHORT = 120.0
+SHORT_STEP_RATIO = 120.0
 """Difference of C and Q over that of Q and P, times (ω h)² [-]."""
 
 
@@ -56,7 +56,7 @@ def osculating(time: Vector, places: Places, known: Sequence[Matrix]) -> Osculat
     interval = np.flatnonzero(np.diff(time) > 0.0)
     bounds = stretches(time)
     asked = np.unique(places.lower[inside])
-    for part in np.array_split(asked, -(-len(asked) // AT_ONCE)):
+    for part in np.array_split(asked, -(-len(asked) // CHUNK)):
         mine = inside[(places.lower[inside] >= part[0]) & (places.lower[inside] <= part[-1])]
         at = np.searchsorted(interval, part)
         chosen, errors = _chosen(time, part, (bounds[0][at], bounds[1][at]), known)
@@ -92,7 +92,7 @@ def _chosen(
     both = np.isfinite(left) & np.isfinite(right)
     with np.errstate(invalid="ignore"):
         differ = np.sum(np.abs(_middle(sides[0]) - _middle(sides[1])), axis=1)
-        both &= differ <= AGREE * np.minimum(left, right)
+        both &= differ <= MAX_SIDE_RATIO * np.minimum(left, right)
     chosen = np.zeros((len(lower), degree, middle.shape[1]))
     if not fine.all():
         rest = _coefficients(time, lower[~fine], lower[~fine], 2, step[~fine], known)
@@ -102,8 +102,8 @@ def _chosen(
         chosen[mine] = side[mine]
     chosen[fine & both] = 0.5 * (sides[0] + sides[1])[fine & both]
     gained = np.max(np.abs(_middle(chosen) - middle), axis=1)
-    turned = SHORT * np.divide(gained, rough, out=np.ones_like(rough), where=rough > 0.0)  # (ω h)²
-    errors = DOUBT * np.where(fine, gained * np.minimum((turned / 4.0) ** 1.5, 1.0), rough)
+    turned = SHORT_STEP_RATIO * np.divide(gained, rough, out=np.ones_like(rough), where=rough > 0.0)  # (ω h)²
+    errors = MAX_ERROR_RATIO * np.where(fine, gained * np.minimum((turned / 4.0) ** 1.5, 1.0), rough)
     beside = np.pad(errors, 1, mode="edge")  # where the difference passes zero its neighbours tell
     return chosen, np.maximum(errors, np.maximum(beside[:-2], beside[2:]))
 

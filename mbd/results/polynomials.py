@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 
-__all__ = ["AT_ONCE", "Index", "Places", "hermite", "hermite_rate", "parabola", "quintic", "quintics", "theta_and_step"]
+__all__ = ["CHUNK", "Index", "Places", "hermite", "hermite_rate", "parabola", "quintic", "quintics", "theta_and_step"]
 
 Index = NDArray[np.intp]
 
-AT_ONCE = 1024
+CHUNK = 1024
 """Intervals of a run whose states, forces and steps are found together."""
 
 

@@ -26,9 +26,9 @@ from mbd.results.record import Rows
 
 __all__ = ["Projection"]
 
-LEAST_RANK = 0.05
+MIN_SINGULAR_VALUE = 0.05
 """Least singular value of rows, each over its largest length in the metric of inertia, from which they are followed."""
-SMALL = 1e-12
+CORRECTION_RTOL = 1e-12
 """Correction, of coordinates of size 1, that is no matter whatever the next one is [-]."""
 
 
@@ -70,9 +70,9 @@ class Projection:
         for _ in range(3):  # an error of 0.01 is round-off after the third
             x, sound = self._correction(kept, led, aim)
             size = np.max(np.abs(x), axis=1, initial=0.0)
-            good &= sound & ((size < 0.5 * before) | (size <= SMALL))
+            good &= sound & ((size < 0.5 * before) | (size <= CORRECTION_RTOL))
             led, before = replace(led, q=self._moved(led.q, x)), size
-            if np.all((size <= SMALL) | ~good):
+            if np.all((size <= CORRECTION_RTOL) | ~good):
                 break
         change, sound = self._correction(kept, led, aim_rate, rates=True)
         good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)
@@ -81,7 +81,7 @@ class Projection:
     def _has_rank(self, kept: list[int], rows: Rows) -> Flags:
         """Whether the rows are far from vanishing, and from depending on each other, at each state."""
         scaled = self._scaled(kept, rows) / self._lengths(kept)[:, None]
-        return np.asarray(np.linalg.svd(np.nan_to_num(scaled), compute_uv=False)[:, -1] > LEAST_RANK)
+        return np.asarray(np.linalg.svd(np.nan_to_num(scaled), compute_uv=False)[:, -1] > MIN_SINGULAR_VALUE)
 
     def _scaled(self, kept: list[int], rows: Rows) -> Any:
         """B (k, kept, n) in the metric of inertia."""

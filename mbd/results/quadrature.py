@@ -20,9 +20,9 @@ __all__ = ["cumulative", "cumulative_of_many", "stretches"]
 
 ROWS_WITH_RATES, ROWS_WITHOUT = 4, 8
 """Rows that the polynomial goes through: eight conditions either way."""
-EVEN = 8.0
+MAX_LENGTH_RATIO = 8.0
 """Neighbouring intervals whose lengths differ by more than this factor lie on no common polynomial [-]."""
-AT_ONCE = 4096
+CHUNK = 4096
 """Intervals whose weights are solved for together."""
 
 Index = NDArray[np.intp]
@@ -39,7 +39,7 @@ def stretches(time: Vector) -> tuple[Index, Index]:
     length = np.diff(time)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = length[1:] / length[:-1]
-    joined = (length[1:] > 0.0) & (length[:-1] > 0.0) & (ratio < EVEN) & (ratio > 1.0 / EVEN)
+    joined = (length[1:] > 0.0) & (length[:-1] > 0.0) & (ratio < MAX_LENGTH_RATIO) & (ratio > 1.0 / MAX_LENGTH_RATIO)
     group = np.concatenate([[0], np.cumsum(~joined)]) if len(length) else np.zeros(0)
     begin = np.flatnonzero(length > 0.0)
     first = np.searchsorted(group, group[begin], side="left")
@@ -90,7 +90,7 @@ def _rules(time: Vector, with_rates: bool) -> list[tuple[Index, Index, Matrix]]:
 
 
 def _alike(time: Vector, begin: Index, first: Index, last: Index, most: int) -> tuple[Index, Index]:
-    """First and last row of each interval's stretch within which no interval is `EVEN` times as long or as short.
+    """First and last row of each interval's stretch whose lengths differ by less than `MAX_LENGTH_RATIO`.
 
     Steps that become shorter each time, as friction comes to rest, lead out of any that is no longer like them.
     """
@@ -103,7 +103,7 @@ def _alike(time: Vector, begin: Index, first: Index, last: Index, most: int) -> 
             goes_on &= (other >= first) & (other < last)
             with np.errstate(divide="ignore", invalid="ignore"):
                 ratio = length[np.clip(other, 0, len(length) - 1)] / length[begin]
-            goes_on &= (ratio < EVEN) & (ratio > 1.0 / EVEN)
+            goes_on &= (ratio < MAX_LENGTH_RATIO) & (ratio > 1.0 / MAX_LENGTH_RATIO)
             bound[goes_on] += step
     return nearest, farthest
 
@@ -118,7 +118,7 @@ def _weights(time: Vector, begin: Index, rows: NDArray[np.intp], with_rates: boo
     for k in np.unique(offset[even]):
         found[even & (offset == k)] = _solved((np.arange(rows.shape[1]) - k)[None, :].astype(float), with_rates)
     odd = np.flatnonzero(~even)
-    for part in np.array_split(odd, max(1, -(-len(odd) // AT_ONCE))):
+    for part in np.array_split(odd, max(1, -(-len(odd) // CHUNK))):
         if len(part):
             found[part] = _solved(place[part], with_rates)
     found *= length[:, None]

@@ -74,7 +74,7 @@ class EventRecord:
         return Events([self])._repr_html_()
 
 
-SHOWN_EVENTS = 40
+MAX_SHOWN_EVENTS = 40
 """Events that a notebook shows; of more, the first and the last."""
 
 
@@ -83,7 +83,7 @@ class Events(list[EventRecord]):
 
     def _repr_html_(self) -> str:
         titles = ("time [s]", "name", "kind", "impulse [N s or N m s]", "energy loss [J]")
-        hidden, half = max(len(self) - SHOWN_EVENTS, 0), SHOWN_EVENTS // 2
+        hidden, half = max(len(self) - MAX_SHOWN_EVENTS, 0), MAX_SHOWN_EVENTS // 2
         shown = [*self[:half], *self[-half:]] if hidden else self
         rows = [
             (

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ONSET, LEAST = 1e-7, 1e-200
 """As in `contact.cones`: how much the direction of λ_T counts beside that of γ, and what stands for none of it."""
 
-ULPS = 8.0 * float(np.finfo(float).eps)
+END_RTOL = 8.0 * float(np.finfo(float).eps)
 """How far from the time of the next row a step ends that is taken again up to it, over the time [-]."""
 
 __all__ = ["StoredStates", "is_smooth"]
@@ -83,8 +83,8 @@ class StoredStates:
             known, beside = self.record.time, self.times_beside_jumps
             after = np.minimum(rows.source + 1, len(known) - 1)
             early = known[rows.source] - rows.time  # a little, where somebody asks for the side before the row
-            own = (early >= 0.0) & (early <= ULPS * np.abs(known[rows.source]))
-            ends = ~own & (np.abs(rows.time - known[after]) <= ULPS * np.abs(known[after]))
+            own = (early >= 0.0) & (early <= END_RTOL * np.abs(known[rows.source]))
+            ends = ~own & (np.abs(rows.time - known[after]) <= END_RTOL * np.abs(known[after]))
             there = np.where(early > 0.0, np.minimum(rows.time, beside[rows.source]), beside[rows.source])
             time = np.where(own, there, np.where(ends, beside[after], rows.time))
             inputs = {**inputs, "t": time}

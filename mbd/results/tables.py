@@ -28,7 +28,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 SIDES: dict[str, Side] = {"after": "right", "before": "left"}
 
-MOST = 10_000_000
+MAX_ROWS = 10_000_000
 """Most rows of a table that is asked for by a distance in time."""
 
 Reader = Callable[[Sequence[str]], list[Vector]]
@@ -172,9 +172,9 @@ def _every(time: Vector, dt: float) -> Vector:
     if not len(time):
         return np.zeros(0)
     steps = (time[-1] - time[0]) / dt
-    if steps > MOST:
+    if steps > MAX_ROWS:
         raise TrajectoryError(
-            f"at={dt:g} s would make {steps:.3g} rows of a run of {time[-1] - time[0]:g} s; at most {MOST}"
+            f"at={dt:g} s would make {steps:.3g} rows of a run of {time[-1] - time[0]:g} s; at most {MAX_ROWS}"
         )
     count = int(np.floor(steps * (1.0 + 1e-12) + 1e-9))
     return np.asarray(np.minimum(time[0] + dt * np.arange(count + 1), time[-1]))

@@ -5,7 +5,7 @@ one row to the next it changes by the multiple of 2π that brings it nearest to 
 
     Δ ≈ h (r₀ + r₁)/2
 
-Where the two differ by more than `SURE`, the count is a guess, which a note of the run tells.
+Where the two differ by more than `MAX_TURN`, the count is a guess, which a note of the run tells.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mbd.compile.python import ArrayFunction, array_function
 
 __all__ = ["counted", "doubtful", "function_of", "turns_to"]
 
-SURE = 1.0
+MAX_TURN = 1.0
 """Change beside that of the rate up to which turns are certain [rad]; it would be π in the middle of two."""
 
 
@@ -39,7 +39,7 @@ def counted(time: Vector, angle: Vector, rate: Vector) -> Vector:
 def doubtful(time: Vector, angle: Vector, rate: Vector) -> NDArray[np.bool_]:
     """Between which rows (R − 1,) the count of a counted angle is a guess."""
     change, expected = _changes(time, angle, rate)
-    return np.asarray(~(np.abs(change - expected) <= SURE))
+    return np.asarray(~(np.abs(change - expected) <= MAX_TURN))
 
 
 def turns_to(angle: Vector, wanted: Vector) -> Vector:

@@ -17,7 +17,7 @@ from mbd.arrays import Vector
 from mbd.results.charts import Charts
 from mbd.results.columns import asks_for_forces
 from mbd.results.dense import Restepping
-from mbd.results.polynomials import AT_ONCE, Places
+from mbd.results.polynomials import CHUNK, Places
 from mbd.results.stored_states import is_smooth
 
 if TYPE_CHECKING:
@@ -55,8 +55,8 @@ def within(columns: ModelColumns, asked: Sequence[tuple[Node, Index]]) -> list[V
     for forces in False, True:
         mine = [k for k, (power, lower) in enumerate(asked) if len(lower) and asks_for_forces([power]) is forces]
         union = np.unique(np.concatenate([asked[k][1] for k in mine])) if mine else np.zeros(0, dtype=np.intp)
-        for first in range(0, len(union), AT_ONCE):
-            part = union[first : first + AT_ONCE]
+        for first in range(0, len(union), CHUNK):
+            part = union[first : first + CHUNK]
             states = columns.between(_places(columns.record.time, part), forces)
             step = columns.record.time[part + 1] - columns.record.time[part]
             for k, power in zip(mine, columns.evaluate([asked[k][0] for k in mine], states), strict=True):

@@ -22,9 +22,9 @@ from math import inf
 from mbd.dataclass import dataclass
 from mbd.tape.node import Node, Tape
 
-__all__ = ["LOSS", "Factors", "Pivot", "factors"]
+__all__ = ["MIN_PIVOT_RATIO", "Factors", "Pivot", "factors"]
 
-LOSS = 1e-8
+MIN_PIVOT_RATIO = 1e-8
 """Part of its terms that a pivot must keep: less, and half of all digits are lost [-]."""
 
 
@@ -101,14 +101,15 @@ def factors(
     """Eliminate a matrix whose first rows and columns belong to coordinates, the others to rows and multipliers.
 
     None where the pivots named above do not suffice, a pivot being an exact zero, or where factors and one solution
-    take more than about so many operations. `loss` is the part of its terms that a pivot keeps, `LOSS` by default [-].
+    take more than about so many operations. `loss` is the part of its terms that a pivot
+    keeps, `MIN_PIVOT_RATIO` by default [-].
     """
     kinds = [[_kind(entry) for entry in line] for line in matrix]
     tries = (_order(kinds, coordinates, first, massless) for first in (False, True))
     found = [order for order in tries if order is not None]
     if not found or min(found)[0] > most:
         return None
-    work = _Elimination(matrix, coordinates, LOSS if loss is None else loss)
+    work = _Elimination(matrix, coordinates, MIN_PIVOT_RATIO if loss is None else loss)
     for row, column in min(found)[1]:
         if work.A[row][column].is_zero:
             return None

@@ -19,7 +19,7 @@ Ends: TypeAlias = Literal["not-a-knot", "natural", "clamped", "periodic"]
 
 Coefficients: TypeAlias = tuple[float, float, float, float]
 
-STEEPEST = 1e290
+MAX_COEFFICIENT = 1e290
 """Change over the cube of its width beyond which the coefficients of a cubic are no numbers [-]."""
 
 
@@ -169,7 +169,9 @@ def _checked_slopes(x: list[float], y: list[float], what: str) -> None:
     """Samples so close in time, or so far apart in value, that no number tells how steep they are."""
     for k in range(len(x) - 1):
         width, slope = x[k + 1] - x[k], abs(y[k + 1] - y[k])
-        if slope > 0.0 and not slope < STEEPEST * min(width, 1.0) ** 3:  # the last coefficient divides by the cube
+        if (
+            slope > 0.0 and not slope < MAX_COEFFICIENT * min(width, 1.0) ** 3
+        ):  # the last coefficient divides by the cube
             raise ModelError(
                 f"{what}: from number {k} to number {k + 1} the ordinate changes by {slope:.3g} over {width:.3g}, too "
                 "steep for numbers; check the units, or take samples further apart"

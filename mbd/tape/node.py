@@ -154,7 +154,7 @@ class Node:
 
 Scalar: TypeAlias = Node | float
 
-_NORMAL = 1e-290
+_MIN_FOLDED = 1e-290
 """Products of constants smaller than this, or larger than its inverse, are left to run time."""
 
 
@@ -324,7 +324,7 @@ class Tape:
             return self.neg(self.mul(a, b.args[0]))
         if b.op == "mul" and b.args[0].op == "const":
             product = factor * b.args[0].data
-            if _NORMAL < product < 1.0 / _NORMAL:
+            if _MIN_FOLDED < product < 1.0 / _MIN_FOLDED:
                 return self.mul(product, b.args[1])
         if b.op == "mul":
             for inner, other in (b.args, b.args[::-1]):
@@ -340,7 +340,7 @@ class Tape:
                 raise TraceError("a traced expression divides by an exact zero")
             if a.op == "const":
                 return self.constant(a.data / b.data)
-            if _NORMAL < abs(b.data) < 1.0 / _NORMAL:
+            if _MIN_FOLDED < abs(b.data) < 1.0 / _MIN_FOLDED:
                 return self.mul(1.0 / b.data, a)
         if a.op == "const":
             if a.data == 0.0:

@@ -105,14 +105,14 @@ def listing(outputs: Mapping[str, Node] | Sequence[Node], names: Mapping[Node, s
         depth[node.index] = 1 + max((depth[arg.index] for arg in node.args), default=-1)
         if node.index in known or not node.args:
             depth[node.index] = 0
-        elif uses[node.index] > 1 or depth[node.index] >= LONGEST:
-            formula = _write(node, known, LONGEST + 1)[0]
+        elif uses[node.index] > 1 or depth[node.index] >= MAX_DEPTH:
+            formula = _write(node, known, MAX_DEPTH + 1)[0]
             known[node.index] = f"w{len(lines)}"
             depth[node.index] = 0
             lines.append(f"{known[node.index]} = {formula}")
-    lines += [f"{name} = {_write(node, known, LONGEST + 1)[0]}" for name, node in named.items()]
+    lines += [f"{name} = {_write(node, known, MAX_DEPTH + 1)[0]}" for name, node in named.items()]
     return "\n".join(lines)
 
 
-LONGEST = 8
+MAX_DEPTH = 8
 """Depth of a formula at which a listing starts a new line."""

@@ -18,9 +18,9 @@ from mbd.testing.problems import PROBLEMS, Problem, broken, problem
 
 __all__ = ["check_integrator"]
 
-FLOOR = 1e-11
+ERROR_FLOOR = 1e-11
 """Errors below are round-off, of the scheme or of the reference."""
-WITHIN = 0.15
+ORDER_ATOL = 0.15
 """How near the observed order must come to the promised one."""
 MODE = Mode()
 
@@ -165,10 +165,10 @@ def _order(findings: Findings, scheme: Integrator, posed: Problem, dt: float, ha
                 memory = scheme.start(posed.system, state, MODE, step)
                 state, _ = _stepped(scheme, posed, state, memory, step, steps)
             errors.append(float(np.max(np.abs(_numbers(state) - posed.end))))
-        order = observed_order(errors, FLOOR)
+        order = observed_order(errors, ERROR_FLOOR)
         if np.isnan(order):
-            findings.note(f"{law} on {findings.where}: every error is below {FLOOR:g}; give a larger dt")
+            findings.note(f"{law} on {findings.where}: every error is below {ERROR_FLOOR:g}; give a larger dt")
             continue
         shown = ", ".join(f"{error:.3g}" for error in errors)
         sentence = f"promised {promised}, observed {order:.2f}; errors at dt = {dt:g}, dt/2, …: {shown}"
-        findings.holds(f"{law}: as promised, within {WITHIN}", abs(order - promised) <= WITHIN, sentence, hint)
+        findings.holds(f"{law}: as promised, within {ORDER_ATOL}", abs(order - promised) <= ORDER_ATOL, sentence, hint)

@@ -24,7 +24,7 @@ from mbd.testing.scope import FreeScope, Numbers, skew
 __all__ = ["check_joint"]
 
 EYE = np.eye(3)
-STEP = 1e-4
+DIFFERENCE_STEP = 1e-4
 SOMEWHERE = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 """Coordinates of a joint for questions about its words [m, rad, -]."""
 
@@ -103,9 +103,9 @@ def _transform_laws(findings: Findings, placed: Placed) -> None:
     if not findings.equal(law, "number of directions", len(subspace), len(joint.freedoms), hint):
         return
     for k, (label, (angular, linear)) in enumerate(zip(joint.freedoms, subspace, strict=True)):
-        shifts = [[side * STEP * (j == k) for j in range(len(subspace))] for side in (1.0, -1.0, 2.0, -2.0)]
+        shifts = [[side * DIFFERENCE_STEP * (j == k) for j in range(len(subspace))] for side in (1.0, -1.0, 2.0, -2.0)]
         sides = [placed.numbers(dict(zip(placed.q, _moved(joint, here, x), strict=True))) for x in shifts]
-        slopes = (8.0 * (sides[0] - sides[1]) - (sides[2] - sides[3])) / (12.0 * STEP)
+        slopes = (8.0 * (sides[0] - sides[1]) - (sides[2] - sides[3])) / (12.0 * DIFFERENCE_STEP)
         turn = R.T @ slopes[:3]
         spin = [turn[2, 1], turn[0, 2], turn[1, 0]]
         findings.equal(law, f"angular velocity of '{label.name}'", scope.value(*angular), spin, hint, 1e-8)
@@ -192,18 +192,18 @@ def _chart_laws(findings: Findings, joint: Joint, values: Numbers, rng: np.rando
     sides = (1.0, -1.0, 2.0, -2.0)
 
     def slope(points: list[Numbers]) -> Numbers:
-        return np.asarray((8.0 * (points[0] - points[1]) - (points[2] - points[3])) / (12.0 * STEP))
+        return np.asarray((8.0 * (points[0] - points[1]) - (points[2] - points[3])) / (12.0 * DIFFERENCE_STEP))
 
-    rates = slope([whole.compose(values, side * STEP * v) for side in sides])
+    rates = slope([whole.compose(values, side * DIFFERENCE_STEP * v) for side in sides])
     hint = "coordinate_rates(q, v) is ∂(q ⊕ x)/∂x · v at x = 0"
     findings.equal("q̇ = N(q) v is the rate of q ⊕ s v", "q̇", whole.rates(values, v), rates, hint, 1e-9)
     moving = whole.increment_rates(x, v)
-    points = [whole.difference(there, whole.compose(values, x + side * STEP * moving)) for side in sides]
+    points = [whole.difference(there, whole.compose(values, x + side * DIFFERENCE_STEP * moving)) for side in sides]
     hint = "increment_rates(x, v) is ẋ of the motion q ⊕ x(t) with velocities v"
     findings.equal("ẋ = D(x)⁻¹ v moves q ⊕ x with v", "v", slope(points), v, hint, 1e-9)
     hint = "increment_velocities is the inverse of increment_rates"
     findings.equal("v = D(x) ẋ", "v", whole.increment_velocities(x, moving), v, hint, 1e-12)
-    bent = slope([whole.increment_rates(side * STEP * v, v) for side in sides])
+    bent = slope([whole.increment_rates(side * DIFFERENCE_STEP * v, v) for side in sides])
     hint = "ẋ = v + ½ [x, v] + O(x²), skew in x and v; else schemes of second order lose one"
     findings.equal("the part of D⁻¹ that is linear in x is skew", "d/ds D(s v)⁻¹ v at s = 0", bent, 0.0, hint, 1e-9)
 

@@ -15,7 +15,7 @@ from mbd.testing.scope import FreeScope
 
 __all__ = ["check_loss"]
 
-OWNER = "knee loss"
+LOSS_NAME = "knee loss"
 
 Numbers = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -57,21 +57,21 @@ def force_at(loss: Loss, rate: float) -> float:
     """F(v) as a number [N or N m]."""
     scope = FreeScope()
     v = scope.tape.input("v", 0)
-    return scope.value(loss.force(v, scope, OWNER), given={v: rate})[0]
+    return scope.value(loss.force(v, scope, LOSS_NAME), given={v: rate})[0]
 
 
 def dry_at(loss: Loss, load: float) -> float:
     """What truly sticks, at a force in the joint [N or N m]."""
     scope = FreeScope()
     value = scope.tape.input("lam", 0)
-    return scope.value(loss.dry(value, scope, OWNER), given={value: load})[0]
+    return scope.value(loss.dry(value, scope, LOSS_NAME), given={value: load})[0]
 
 
 def sliding_at(loss: Loss, speed: float) -> float:
     """The same while it slides at a speed, without a force in the joint."""
     scope = FreeScope()
     v = scope.tape.input("v", 0)
-    return scope.value(loss.sliding(0.0, v, scope, OWNER), given={v: speed})[0]
+    return scope.value(loss.sliding(0.0, v, scope, LOSS_NAME), given={v: speed})[0]
 
 
 def _dry(findings: Findings, loss: Loss, rng: np.random.Generator) -> None:
@@ -103,15 +103,15 @@ def _dry(findings: Findings, loss: Loss, rng: np.random.Generator) -> None:
 
 def _declared(findings: Findings, loss: Loss) -> None:
     scope = FreeScope()
-    loss.force(scope.tape.input("v", 0), scope, OWNER)
-    loss.dry(scope.tape.input("lam", 0), scope, OWNER)
-    loss.sliding(scope.tape.input("lam", 0), scope.tape.input("v", 1), scope, OWNER)
-    _ = loss.rates(scope.tape.input("v", 0), scope, OWNER), loss.elastic(scope, OWNER)
+    loss.force(scope.tape.input("v", 0), scope, LOSS_NAME)
+    loss.dry(scope.tape.input("lam", 0), scope, LOSS_NAME)
+    loss.sliding(scope.tape.input("lam", 0), scope.tape.input("v", 1), scope, LOSS_NAME)
+    _ = loss.rates(scope.tape.input("v", 0), scope, LOSS_NAME), loss.elastic(scope, LOSS_NAME)
     law = "parameters are declared before they are used"
     hint = "fields() must name every scope.parameter(owner, field, value) with the same value"
-    declared = loss.parameters(OWNER)
+    declared = loss.parameters(LOSS_NAME)
     findings.holds(law, scope.recorded == declared, f"used {scope.recorded}, declared {declared}", hint)
-    faults = loss.faults(OWNER)
+    faults = loss.faults(LOSS_NAME)
     findings.holds("it finds no fault with itself", not faults, "; ".join(faults), "its own faults() complains")
 
 
@@ -126,7 +126,7 @@ def _power(findings: Findings, loss: Loss, rate: float, fastest: float) -> None:
     )
     scope = FreeScope()
     v = scope.tape.input("v", 0)
-    turned = scope.value(loss.force(-v, scope, OWNER), given={v: rate})[0]
+    turned = scope.value(loss.force(-v, scope, LOSS_NAME), given={v: rate})[0]
     hint = "write the force for any scalar, not for an input: a rate may arrive as −v, or as a number"
     findings.equal("any scalar may be the rate", "F(−v)", turned, force_at(loss, -rate), hint, 1e-12)
     nearby = force_at(loss, rate + 1e-8 * fastest)
@@ -143,8 +143,8 @@ def _memory(findings: Findings, loss: Loss, fastest: float, rng: np.random.Gener
     """
     scope = FreeScope()
     v = scope.tape.input("v", 0)
-    pairs = [(z, scope.tape.lift(rate)) for z, rate in loss.rates(v, scope, OWNER)]
-    force, stored = scope.tape.lift(loss.force(v, scope, OWNER)), scope.tape.lift(loss.elastic(scope, OWNER))
+    pairs = [(z, scope.tape.lift(rate)) for z, rate in loss.rates(v, scope, LOSS_NAME)]
+    force, stored = scope.tape.lift(loss.force(v, scope, LOSS_NAME)), scope.tape.lift(loss.elastic(scope, LOSS_NAME))
     missing = [name for name, node in scope.states.items() if all(node is not z for z, _ in pairs)]
     law = "every state has a rate"
     findings.holds(law, not missing, f"without a rate: {', '.join(missing)}", "list it in what rates() returns")
@@ -176,7 +176,7 @@ def _tangent(findings: Findings, loss: Loss, rate: float) -> None:
     scope = FreeScope()
     v = scope.tape.input("v", 0)
     scope.numbers[v] = rate
-    (slope,) = scope.value(*jvp([scope.tape.lift(loss.force(v, scope, OWNER))], {v: 1.0}))
+    (slope,) = scope.value(*jvp([scope.tape.lift(loss.force(v, scope, LOSS_NAME))], {v: 1.0}))
     step = 1e-5 * max(abs(rate), 1e-2)
     right, left = ((force_at(loss, rate + side * step) - force_at(loss, rate)) / (side * step) for side in (1.0, -1.0))
     if abs(right - left) <= 1e-2 * (1.0 + abs(slope)):  # no kink here
@@ -195,6 +195,6 @@ def _dissipation(loss: DissipationFunction, rate: float) -> tuple[float, float, 
     """D(v), D(0), ∂D/∂v."""
     scope = FreeScope()
     v = scope.tape.input("v", 0)
-    lost = scope.tape.lift(loss.dissipation(v, scope, OWNER))
+    lost = scope.tape.lift(loss.dissipation(v, scope, LOSS_NAME))
     value, slope = scope.value(lost, *jvp([lost], {v: 1.0}), given={v: rate})
     return value, scope.value(lost, given={v: 0.0})[0], slope

@@ -12,10 +12,10 @@ from mbd.testing.findings import Findings
 
 __all__ = ["run_laws"]
 
-ROUND_OFF = 1e-8
-FRICTION = 1e-6
+MULTIPLIER_RTOL = 1e-8
+FRICTION_RTOL = 1e-6
 """What the multipliers of a step may miss of the law of friction, relative to the largest of that instant."""
-LEDGER = 1e-2
+LEDGER_RTOL = 1e-2
 """Largest share of the energy's swing that the books may miss at the step of a check; a missing work is of size 1."""
 
 
@@ -48,28 +48,28 @@ def _complementarity(findings: Findings, run: Any, contact: Contact, closed: Any
     size = 1.0 + float(np.max(np.abs(force), initial=0.0))
     if contact.kind == "penalty":
         if contact.opens_on == "pull":
-            row = _instant(findings, where, run, force < -ROUND_OFF * size)
+            row = _instant(findings, where, run, force < -MULTIPLIER_RTOL * size)
             sentence = f"{title} pulls: expected p ≥ 0, found {force[row]:.6g} N at a gap of {gap[row]:.3g}"
             hint = "a stop pushes; with release='pull' it must open as its force falls to zero"
-            findings.holds("a penalty pushes", bool(np.all(force >= -ROUND_OFF * size)), sentence, hint)
+            findings.holds("a penalty pushes", bool(np.all(force >= -MULTIPLIER_RTOL * size)), sentence, hint)
         return
     if contact.only_while is None and not contact.when:
-        row = _instant(findings, where, run, gap < -ROUND_OFF)
+        row = _instant(findings, where, run, gap < -MULTIPLIER_RTOL)
         sentence = f"{title} is penetrated: expected g ≥ 0, found {gap[row]:.6g} {contact.unit}"
         hint = "gap() must be continuous and fall through zero as the contact closes"
-        findings.holds("complementarity: gap ≥ 0", bool(np.all(gap >= -ROUND_OFF)), sentence, hint)
+        findings.holds("complementarity: gap ≥ 0", bool(np.all(gap >= -MULTIPLIER_RTOL)), sentence, hint)
     if contact.opens_on == "pull":
-        row = _instant(findings, where, run, force < -ROUND_OFF * size)
+        row = _instant(findings, where, run, force < -MULTIPLIER_RTOL * size)
         sentence = f"{title} pulls: expected p ≥ 0, found {force[row]:.6g}"
         hint = "a contact that would attract must open"
-        findings.holds("complementarity: force ≥ 0", bool(np.all(force >= -ROUND_OFF * size)), sentence, hint)
-    wrong = (np.abs(gap) > ROUND_OFF) & (np.abs(force) > ROUND_OFF * size)
+        findings.holds("complementarity: force ≥ 0", bool(np.all(force >= -MULTIPLIER_RTOL * size)), sentence, hint)
+    wrong = (np.abs(gap) > MULTIPLIER_RTOL) & (np.abs(force) > MULTIPLIER_RTOL * size)
     row = _instant(findings, where, run, wrong)
     sentence = f"{title}: gap {gap[row]:.3g} and force {force[row]:.3g} at once"
     findings.holds("complementarity: gap × force = 0", not wrong.any(), sentence, "only a closed contact pushes")
-    row = _instant(findings, where, run, closed & (np.abs(gap) > ROUND_OFF))
+    row = _instant(findings, where, run, closed & (np.abs(gap) > MULTIPLIER_RTOL))
     sentence = f"{title} is closed with a gap of {gap[row]:.6g} {contact.unit}"
-    stays = bool(np.all(np.abs(gap[closed]) <= ROUND_OFF))
+    stays = bool(np.all(np.abs(gap[closed]) <= MULTIPLIER_RTOL))
     findings.holds("a closed contact stays closed", stays, sentence, "the rows must hold the gap at zero")
 
 
@@ -82,12 +82,12 @@ def _friction(findings: Findings, run: Any, friction: Friction, where: str) -> N
     on = record.closed[:, friction.contact].astype(bool) if friction.contact >= 0 else np.ones(len(along), dtype=bool)
     size = 1.0 + np.max(np.abs(record.lam), axis=1, initial=0.0)
     limit = np.where(on, limit, 0.0)
-    wrong = np.abs(along) > limit + FRICTION * size
+    wrong = np.abs(along) > limit + FRICTION_RTOL * size
     row = _instant(findings, where, run, wrong)
     sentence = f"'{friction.name}' resists with {along[row]:.6g} of at most {limit[row]:.6g}"
     hint = "the friction of a contact is at most μ times its force, and none where it is open"
     findings.holds("friction stays within its limit", not wrong.any(), sentence, hint)
-    wrong = along * rate < -FRICTION * size
+    wrong = along * rate < -FRICTION_RTOL * size
     row = _instant(findings, where, run, wrong)
     sentence = f"'{friction.name}' drives with {-along[row] * rate[row]:.6g} W at a speed of {rate[row]:.6g}"
     findings.holds(
@@ -102,9 +102,11 @@ def _impacts(findings: Findings, run: Any, contact: Contact, where: str) -> None
         findings.where = f"t = {event.time:.6g} s of the run from {where}"
         push = float(event.impulse[0])
         sentence = f"'{contact.name}' takes an impulse of {push:.6g}; expected ≥ 0"
-        findings.holds("impact: impulses push", push >= -ROUND_OFF, sentence, "the gap grows away from the surface")
+        findings.holds(
+            "impact: impulses push", push >= -MULTIPLIER_RTOL, sentence, "the gap grows away from the surface"
+        )
         sentence = f"'{contact.name}' gives {-event.energy_loss:.6g} J in an impact; expected ≤ 0"
-        slack = -ROUND_OFF * (1.0 + abs(event.energy_loss))
+        slack = -MULTIPLIER_RTOL * (1.0 + abs(event.energy_loss))
         hint = "restitution lies between 0 and 1"
         findings.holds("impact: no energy is made", event.energy_loss >= slack, sentence, hint)
 
@@ -126,10 +128,10 @@ def _energy(findings: Findings, run: Any, equations: Equations) -> None:
         hint = "a stop that compresses must push more than one that opens: damping ≥ 0"
         if part.kind == "penalty" and part.name in acting and run[f"{part.name}.force"][0] == 0.0:
             law = "passivity: a penalty gives back no more than it took"
-            findings.holds(law, worst <= LEDGER * swing, sentence, hint)
+            findings.holds(law, worst <= LEDGER_RTOL * swing, sentence, hint)
         elif part.kind in SPENT and part.kind != "penalty":
             law = f"passivity: a{'n' if part.kind == 'impact' else ''} {part.kind} takes energy along the run"
             findings.holds(law, worst <= 1e-6 * (1.0 + swing), sentence, "its power on the mechanism is ≤ 0")
     hint = "an effect does work that neither its power nor its potential tells"
     missing = float(np.max(np.abs(ledger.numerical), initial=0.0)) / (swing + float(np.ptp(ledger.potential)))
-    findings.equal("energy books close", "energy unaccounted for, of the swing", missing, 0.0, hint, LEDGER)
+    findings.equal("energy books close", "energy unaccounted for, of the swing", missing, 0.0, hint, LEDGER_RTOL)

@@ -27,25 +27,25 @@ __all__ = ["check_scheme"]
 
 WITHIN, HIGH = 0.15, 0.75
 """How near the observed order must come to the promised one, and so above 5, where few halvings reach round-off."""
-FLOOR = 1e-12
+ERROR_FLOOR = 1e-12
 """Errors below are round-off, of the scheme or of the reference."""
-UNTIL = 0.6
+RUN_LENGTH = 0.6
 """Length of the runs [s]."""
 STEPS = {1: 0.01, 2: 0.01, 4: 0.04, 5: 0.06}
-"""The largest step by the promised order [s]; `LARGE` for higher ones."""
-LARGE = 0.2
-PLAIN = 0.05
+"""The largest step by the promised order [s]; `LARGE_STEP` for higher ones."""
+LARGE_STEP = 0.2
+PYTHON_STEP = 0.05
 """Step of the runs in Python [s]."""
-TWIN = 1e-6
+TWIN_ATOL = 1e-6
 """What Newton's iterations in Python and in machine code may leave in steps of that size."""
 TOLERANCES = (1e-3, 1e-5)
-OVER = 2.0
+MAX_ERROR_OVER_TOL = 2.0
 """Factor by which the error of a run may exceed the tolerance that it was given."""
-BETWEEN = 0.5
+MAX_ERROR_BETWEEN_ROWS = 0.5
 """The same between rows and at events, where errors of several signs meet."""
-MORE = 3
+MORE_HALVINGS = 3
 """More halvings, where the order is not reached yet."""
-LOOKS = 8
+MAX_INSTANTS = 8
 """Times between rows at which a run is looked at, at most."""
 PARTS = ("time", "q", "v", "z", "a", "s", "lam")
 HELD = ("q", "y", "rate", "lam", "anchors", "aux", "slope", "lam_slope", "shift", "shift_change", "past_stages")
@@ -85,7 +85,7 @@ def check_scheme(
     if not isinstance(scheme, Integrator):
         raise ModelError(f"check_scheme takes an integrator or a function that makes one, not {scheme!r}")
     findings = Findings(f"scheme {scheme!r}")
-    largest = dt if dt is not None else STEPS.get(scheme.order(), LARGE)
+    largest = dt if dt is not None else STEPS.get(scheme.order(), LARGE_STEP)
     scenes = [tree(), rows(), stopped()]
     for scene in scenes:
         refusal = scheme.check(scene.rows) if scene.rows else None
@@ -122,12 +122,12 @@ class Scene:
         """A fine run of another scheme than the one that is checked: of order 8, or 5 for one of high order."""
         if high not in self.exact:
             other = mbd.RadauIIA(1e-13) if high else mbd.RungeKutta853()
-            self.exact[high] = self.run(other, dt=UNTIL / (1200 if high else 120))
+            self.exact[high] = self.run(other, dt=RUN_LENGTH / (1200 if high else 120))
         return self.exact[high]
 
     def run(self, scheme: Integrator, **settings: Any) -> Any:
         """A run of the scene."""
-        return mbd.simulate(self.model, self.start, scheme, **{"until": UNTIL, **settings})
+        return mbd.simulate(self.model, self.start, scheme, **{"until": RUN_LENGTH, **settings})
 
 
 @dataclass(frozen=True)
@@ -206,23 +206,23 @@ def _orders(findings: Findings, scheme: Integrator, scene: Scene, dt: float, hal
     exact, promised = scene.reference(scheme.order() > 5), scheme.order(_prepared(scene, scheme, dt).stepper.system)
     errors: list[tuple[float, float, float]] = []
     within = HIGH if promised > 5 else WITHIN
-    for k in range(halvings + 1 + MORE):
+    for k in range(halvings + 1 + MORE_HALVINGS):
         errors.append(_errors(findings, scene.run(scheme, dt=dt / 2**k), exact, 2**k))
-        order = observed_order([each[0] for each in errors], FLOOR)
-        if k >= halvings and not (abs(order - promised) > within and errors[-1][0] > 1e3 * FLOOR):
+        order = observed_order([each[0] for each in errors], ERROR_FLOOR)
+        if k >= halvings and not (abs(order - promised) > within and errors[-1][0] > 1e3 * ERROR_FLOOR):
             break
     hint = "order() must tell what the scheme reaches; check its start, its formula and Newton's tolerance"
     for place, what, least, most in (
         (0, "order as promised", promised - within, promised + within),
-        (1, "order between rows, as promised up to 4", min(promised, 4) - BETWEEN, np.inf),
-        (2, "order of the instants of events", promised - BETWEEN, np.inf),
+        (1, "order between rows, as promised up to 4", min(promised, 4) - MAX_ERROR_BETWEEN_ROWS, np.inf),
+        (2, "order of the instants of events", promised - MAX_ERROR_BETWEEN_ROWS, np.inf),
     ):
-        law, found = f"{what}: within {BETWEEN if place else within}", [each[place] for each in errors]
-        order = observed_order(found, FLOOR if place == 0 else 10.0 * FLOOR)
+        law, found = f"{what}: within {MAX_ERROR_BETWEEN_ROWS if place else within}", [each[place] for each in errors]
+        order = observed_order(found, ERROR_FLOOR if place == 0 else 10.0 * ERROR_FLOOR)
         if place == 2 and not scene.events:
             continue
         if np.isnan(order):
-            findings.note(f"{law}, on {scene.title}: every error is below {FLOOR:g}; give a larger dt")
+            findings.note(f"{law}, on {scene.title}: every error is below {ERROR_FLOOR:g}; give a larger dt")
             continue
         shown = ", ".join(f"{error:.3g}" for error in found)
         sentence = f"promised {promised}, observed {order:.2f}; errors at dt = {dt:g}, dt/2, …: {shown}"
@@ -232,7 +232,7 @@ def _orders(findings: Findings, scheme: Integrator, scene: Scene, dt: float, hal
 def _errors(findings: Findings, run: Any, exact: Any, every: int) -> tuple[float, float, float]:
     """Of the state at some rows or behind events, of coordinates between some rows, of the instants of events."""
     starts = np.flatnonzero(np.diff(run.time) > 0.0)
-    starts = starts[:: -(-len(starts) // LOOKS)]
+    starts = starts[:: -(-len(starts) // MAX_INSTANTS)]
     moments = 0.5 * (run.time[starts] + run.time[starts + 1])
     here, there = run.at(moments), exact.at(moments)
     apart = [here[each.name] - there[each.name] for each in run.columns.equations.coordinates]
@@ -247,7 +247,7 @@ def _errors(findings: Findings, run: Any, exact: Any, every: int) -> tuple[float
     return float(np.sqrt(np.mean(off**2))), float(np.max(np.abs(apart))), float(late)
 
 
-def _prepared(scene: Scene, scheme: Integrator, dt: float, backend: str = "auto", until: float = UNTIL) -> Any:
+def _prepared(scene: Scene, scheme: Integrator, dt: float, backend: str = "auto", until: float = RUN_LENGTH) -> Any:
     options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": 1e-6}
     return prepared(scene.model, scene.start, scheme, dt, until, {}, {**options, "backend": backend})
 
@@ -260,7 +260,7 @@ def _bits(findings: Findings, scheme: Integrator, scene: Scene, dt: float) -> No
     places = {len(whole.time) // 2, *(event.row for event in whole.events[:1])}
     for row in sorted(places):
         first = scene.run(scheme, dt=dt, until=float(whole.time[row]))
-        second = mbd.simulate(scene.model, first.final, scheme, dt=dt, until=UNTIL)
+        second = mbd.simulate(scene.model, first.final, scheme, dt=dt, until=RUN_LENGTH)
         law = "restart: a run that is cut in two is the same to the bit"
         _same(findings, law, whole, len(whole.time) - len(second.time), second, hint)
 
@@ -298,7 +298,7 @@ def _twice(findings: Findings, stepper: Any) -> Callable[[Any, float, float], in
 
 def _in_python(findings: Findings, scheme: Integrator, scene: Scene) -> Any:
     """A run of some steps in Python, each taken twice; None where it fails."""
-    run = _prepared(scene, scheme, PLAIN, "python", _few(scene))
+    run = _prepared(scene, scheme, PYTHON_STEP, "python", _few(scene))
     run.stepper.scheme.step = _twice(findings, run.stepper)
     with np.errstate(all="ignore"):
         plain, problem = run.complete()
@@ -307,19 +307,19 @@ def _in_python(findings: Findings, scheme: Integrator, scene: Scene) -> Any:
 
 
 def _few(scene: Scene) -> float:
-    return (8.0 if scene.events else 4.0) * PLAIN
+    return (8.0 if scene.events else 4.0) * PYTHON_STEP
 
 
 def _compiled(findings: Findings, scheme: Integrator, scene: Scene, plain: Any) -> None:
     """Machine code and Python have the same numbers."""
-    fast = scene.run(scheme, dt=PLAIN, until=_few(scene))
+    fast = scene.run(scheme, dt=PYTHON_STEP, until=_few(scene))
     if not fast.stats["compiled"]:
         findings.note("machine code: there is none here (llvmlite is not installed)")
         return
     law, hint = "machine code and Python agree", "its step in Python and its entry are one scheme; see backend='python'"
     for name in ("time", "q", "v", "z"):
         found, expected = getattr(fast.record, name), getattr(plain.record, name)
-        findings.equal(law, f"'{name}' of all rows", found, expected, hint, TWIN)
+        findings.equal(law, f"'{name}' of all rows", found, expected, hint, TWIN_ATOL)
 
 
 def _tolerance(findings: Findings, scheme: Integrator, scene: Scene) -> None:
@@ -336,7 +336,7 @@ def _tolerance(findings: Findings, scheme: Integrator, scene: Scene) -> None:
         error = float(np.max(np.abs(run.record.q[-1] - exact.record.q[-1])))
         sentence = f"tol = {tol:g}: error of a coordinate at the end {error:.3g}"
         hint = "`error` of its entry must leave the local error of x and (v, z) in K.error, and error_order() its power"
-        findings.holds("a tolerance is kept", error <= OVER * tol, sentence, hint)
+        findings.holds("a tolerance is kept", error <= MAX_ERROR_OVER_TOL * tol, sentence, hint)
 
 
 def _failure(findings: Findings, scheme: Integrator, dt: float) -> None:
@@ -349,7 +349,7 @@ def _failure(findings: Findings, scheme: Integrator, dt: float) -> None:
     start = mbd.assemble(model, position={"hinge.angle": 0.9})
     sentence = "the run ended as if nothing had been wrong"
     try:
-        run = mbd.simulate(model, start, scheme, dt=dt, until=UNTIL)
+        run = mbd.simulate(model, start, scheme, dt=dt, until=RUN_LENGTH)
         found = bool(np.isfinite(_states(run)[-1]).all())
         sentence += "" if found else ", in a state that is no number"
     except MbdError:

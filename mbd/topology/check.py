@@ -14,7 +14,7 @@ from mbd.bodies.marker import Marker
 from mbd.bodies.point_mass import PointMass
 from mbd.errors import MbdError, ModelError, nearest
 from mbd.forces.base import Force
-from mbd.forces.quantities import INCREMENT
+from mbd.forces.quantities import INCREMENT_PREFIX
 from mbd.joints.base import Joint
 from mbd.joints.named_angles import orientation_names
 from mbd.joints.screw import Screw
@@ -128,7 +128,7 @@ def _unknown(model: Description, name: str, known: Iterable[str]) -> str:
     return nearest(name, known, "quantity", beside=names_of_held_forces(model))
 
 
-AGAIN = "; where the cell of a notebook was run twice, let it begin with model = mbd.Model(…)"
+NOTEBOOK_ADVICE = "; where the cell of a notebook was run twice, let it begin with model = mbd.Model(…)"
 """The cure of words that are added to a model again."""
 
 
@@ -137,7 +137,7 @@ def name_faults(model: Description) -> list[str]:
     """Two things of one name."""
     bodies = _bodies_by_name(model)
     found = [
-        f"{len(several)} different bodies are named '{name}'; rename them, or use one object{AGAIN}"
+        f"{len(several)} different bodies are named '{name}'; rename them, or use one object{NOTEBOOK_ADVICE}"
         for name, several in bodies.items()
         if len(several) > 1
     ]
@@ -155,7 +155,7 @@ def name_faults(model: Description) -> list[str]:
         if counts.total() > 1 and not _apart(model, name, counts):
             several_kinds = ", ".join(f"{count} × {kind}" for kind, count in counts.items())
             other = "'ground' is the body that does not move; " if name == model.ground.name else ""
-            again = AGAIN if max(counts.values()) > 1 else ""
+            again = NOTEBOOK_ADVICE if max(counts.values()) > 1 else ""
             found.append(
                 f"the name '{name}' is used {counts.total()} times ({several_kinds}); {other}give each its own name"
                 f"{again}"
@@ -352,7 +352,7 @@ def choice_faults(model: Description) -> list[str]:
     found = [
         "tunable: " + nearest(name, parameters, "parameter", "There are")
         for name in model.tunable
-        if name not in parameters and not name.startswith(INCREMENT)
+        if name not in parameters and not name.startswith(INCREMENT_PREFIX)
     ]
     try:
         cut_names(model)

@@ -11,22 +11,22 @@ from mbd.bodies.link import Link
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.spring_leg import SpringLeg
 from mbd.forces.samples import Samples, in_degrees
-from mbd.joints.base import AWAITED, Joint
+from mbd.joints.base import AWAITED_ATTRIBUTE, Joint
 from mbd.topology.graph import links_of, spanning_tree
 
 __all__ = ["doubts"]
 
-LONG = 50.0
+MAX_LENGTH = 50.0
 """Length of a body of less than a ton above which it may be given in millimetres [m]."""
-HEAVY = 200.0
+MAX_LINK_MASS = 200.0
 """Mass of a link above which it may be given in grams [kg]."""
-DENSE = 22_600.0
+MAX_DENSITY = 22_600.0
 """Density of osmium, which no body exceeds: that of a link in the cube of its length [kg/m³]."""
-GRIPPING = 10.0
+MAX_FRICTION = 10.0
 """Coefficient of friction above which it may be given in percent [-]."""
 
 
-SLOWEST_SAMPLING = 2.0
+MAX_SAMPLE_TIME = 2.0
 """Time between samples of a controller above which it may be a frequency [s]."""
 
 
@@ -50,7 +50,7 @@ def _lengths(model: Any) -> list[str]:
     for body in getattr(model, "bodies", {}).values():
         parameters = body.parameters()
         length = parameters.get(f"{body.name}.length", 0.0)
-        if abs(length) > LONG and 0.0 < parameters.get(f"{body.name}.mass", 0.0) < 1000.0:
+        if abs(length) > MAX_LENGTH and 0.0 < parameters.get(f"{body.name}.mass", 0.0) < 1000.0:
             found.append(
                 f"'{body.name}' is {length:g} m long; lengths are in metres, and {length:g} mm is {length / 1e3:g}"
             )
@@ -64,7 +64,7 @@ def _masses(model: Any) -> list[str]:
         if not isinstance(link, Link) or not link.length > 0.0 or not link.mass > 0.0:
             continue
         name, mass, length, center = link.name, link.mass, link.length, link.center_distance
-        if mass > HEAVY and mass > DENSE * length**3:
+        if mass > MAX_LINK_MASS and mass > MAX_DENSITY * length**3:
             found.append(
                 f"'{name}' has {mass:g} kg in {length:g} m, more than any metal; masses are in kg, and {mass:g} g is "
                 f"{mass / 1e3:g} kg"
@@ -112,7 +112,7 @@ def _grips(model: Any) -> list[str]:
     return [
         f"friction of '{contact.name}' is {contact.friction:g}; a coefficient is a ratio of forces, rubber has about 1"
         for contact in getattr(model, "constraints", ())
-        if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > GRIPPING
+        if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > MAX_FRICTION
     ]
 
 
@@ -152,19 +152,21 @@ def _periods(model: Any) -> list[str]:
         f"'{word.name}' samples once in {period:g} s; period is the time between samples, and {period:g} Hz is "
         f"period={1.0 / period:.3g}"
         for word in words
-        if (period := getattr(word, "period", None)) is not None and period > SLOWEST_SAMPLING
+        if (period := getattr(word, "period", None)) is not None and period > MAX_SAMPLE_TIME
     ] + [
         f"'{word.name}' puts its outputs out {delay:g} s after each sample; delay is in seconds, and {delay:g} ms is "
         f"{delay / 1e3:g}"
         for word in words
-        if (delay := getattr(word, "delay", 0.0)) > SLOWEST_SAMPLING
+        if (delay := getattr(word, "delay", 0.0)) > MAX_SAMPLE_TIME
     ]
 
 
 def _awaited(model: Any) -> list[str]:
     """Passive moments of a person that were asked for, and of which the model has none."""
     forces = {getattr(force, "name", "") for force in getattr(model, "forces", ())}
-    wanted = {vars(joint).get(AWAITED, ()) for joint in getattr(model, "joints", ()) if isinstance(joint, Joint)}
+    wanted = {
+        vars(joint).get(AWAITED_ATTRIBUTE, ()) for joint in getattr(model, "joints", ()) if isinstance(joint, Joint)
+    }
     return [
         f"human(passive=True): the model has none of the passive moments of its joints, such as {names[0]!r}; "
         "model.apply(*person.moments) brings them, passive=False leaves them out"

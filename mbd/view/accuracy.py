@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["clear", "frontier", "height", "work_precision"]
 
-MARKERS = "osD^vP*X"
+SCHEME_MARKERS = "osD^vP*X"
 """Of the schemes in turn."""
 WIDE, HIGH = 36.0, 8.0
 """Room for the label of a step [points]."""
@@ -67,7 +67,11 @@ def work_precision(found: Accuracy, path: str | Path | None = None) -> Figure:
 
 def _scheme(axes: Any, number: int, scheme: str, points: list[Point]) -> None:
     """Two lines of one color: through its steps, and dashed through its tolerances."""
-    style = {"marker": MARKERS[number % len(MARKERS)], "color": tone(CYCLE[number % len(CYCLE)]), "alpha": 0.9}
+    style = {
+        "marker": SCHEME_MARKERS[number % len(SCHEME_MARKERS)],
+        "color": tone(CYCLE[number % len(CYCLE)]),
+        "alpha": 0.9,
+    }
     fixed = [point for point in points if point.tol is None]
     to_tolerance = [point for point in points if point.tol is not None]
     for line, dashes, size in ((fixed, "-", 4.5), (to_tolerance, "--", 3.0)):

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Animation"]
 
-LEAST = 200
+MIN_HEIGHT = 200
 """Height that has room for the mechanism [pixels]."""
 
 
@@ -28,8 +28,8 @@ class Animation:
     """
 
     def __init__(self, run: Trajectory, height: int) -> None:
-        if not is_number(height) or not LEAST <= height < 1e5:
-            raise ModelError(f"height of an animation must be a number of pixels from {LEAST} on, not {height!r}")
+        if not is_number(height) or not MIN_HEIGHT <= height < 1e5:
+            raise ModelError(f"height of an animation must be a number of pixels from {MIN_HEIGHT} on, not {height!r}")
         self.run, self.height = run, int(height)
 
     def __repr__(self) -> str:

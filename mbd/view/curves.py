@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 __all__ = ["curves", "extremes"]
 
-SMOOTH = 600
+CURVE_POINTS = 600
 """Points of a curve that look smooth over the width of a plot [-]."""
 
-INTERVALS = 1000
+PLOT_INTERVALS = 1000
 """Intervals of time of which a plot shows the first, last, least and largest value: finer than its pixels [-]."""
 
 
@@ -43,9 +43,9 @@ def curves(run: Trajectory, names: Sequence[str]) -> tuple[Vector, dict[str, Vec
 def _between(time: Vector) -> Vector:
     """Places inside the intervals of the rows, evenly over the run; none where rows are many."""
     lower, length = time[:-1], np.diff(time)
-    if len(time) >= SMOOTH or not np.any(length > 0.0):
+    if len(time) >= CURVE_POINTS or not np.any(length > 0.0):
         return np.zeros(0)
-    counts = np.ceil(length / (time[-1] - time[0]) * SMOOTH).astype(int)
+    counts = np.ceil(length / (time[-1] - time[0]) * CURVE_POINTS).astype(int)
     steps = [a + h * np.arange(1, n) / n for a, h, n in zip(lower, length, counts, strict=True) if n > 1]
     found = np.concatenate(steps) if steps else np.zeros(0)
     return np.setdiff1d(found, time)
@@ -54,15 +54,15 @@ def _between(time: Vector) -> Vector:
 def extremes(time: Vector, *values: Vector) -> Index:
     """Indices (k,), ascending, of the rows that a plot can tell apart: all of them where rows are few.
 
-    The span of time is divided into `INTERVALS` equal parts; of each part the first and last row are kept and, for
+    The span of time is divided into `PLOT_INTERVALS` equal parts; of each part the first and last row are kept and, for
     each curve, the row of its least and of its largest value, so that no peak is lost.
 
     time : (n,) ascending [s]
     values : (n,) each, of one or more curves
     """
-    if len(time) <= 4 * INTERVALS:
+    if len(time) <= 4 * PLOT_INTERVALS:
         return np.arange(len(time))
-    part = np.floor((time - time[0]) * (INTERVALS / (time[-1] - time[0])))
+    part = np.floor((time - time[0]) * (PLOT_INTERVALS / (time[-1] - time[0])))
     last = np.append(np.flatnonzero(np.diff(part)), len(time) - 1)
     first = np.append(0, last[:-1] + 1)
     kept = [first, last]

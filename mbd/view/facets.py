@@ -15,14 +15,14 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.view.forms import mesh
 from mbd.view.scene import Scene
-from mbd.view.scenery import PATCH
+from mbd.view.scenery import SURFACE_LINES
 from mbd.view.solids import rotations
 from mbd.view.style import INK, NEUTRAL, PAPER, color, tone
 
 __all__ = ["Facets", "facets", "shaded", "size_of", "surfaces"]
 
 
-FINEST = 0.035
+MAX_FACET_EDGE = 0.035
 """Longest edge of a facet, over the size of the mechanism [-]."""
 
 
@@ -57,7 +57,7 @@ def surfaces(picture: Scene) -> Facets | None:
     """Grounds of given height at the first instant."""
     found = []
     for sheet in picture.around.sheets:
-        at = sheet.lines[0, :PATCH]
+        at = sheet.lines[0, :SURFACE_LINES]
         a, b, c, d = at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]
         both = np.concatenate([np.stack(way, axis=2).reshape(-1, 3, 3) for way in ((a, c, b), (a, d, c))])
         found.append(both[np.all(np.isfinite(both), axis=(1, 2))])

@@ -14,13 +14,13 @@ __all__ = ["first_view"]
 
 OBLIQUE = np.deg2rad(np.arange(-45.0, -66.0, -5.0))
 """Yaws tried, from halfway between the side and the front to nearly the front [rad]."""
-RAISED = 0.3
+FIRST_PITCH = 0.3
 """Pitch of a walker's first view [rad]."""
 QUANTILE = 0.2
 """Part of the time in which the sides may be nearer to each other than what is compared."""
-NEAR = 0.01
+DISTANCE_WEIGHT = 0.01
 """Weight of the distance of a pair, over the largest one, beside how much it changes [-]."""
-ENOUGH = 0.9
+MIN_DISTANCE_RATIO = 0.9
 """Part of the largest distance between the sides at which the least turned view is taken [-]."""
 
 
@@ -40,7 +40,7 @@ def first_view(picture: Scene) -> tuple[float, float]:
     apart = picture.positions[rows][:, pairs[:, 1]] - picture.positions[rows][:, pairs[:, 0]]  # from left to right
     length = np.linalg.norm(apart, axis=-1)
     usual = np.maximum(length.mean(axis=0), 1e-9)
-    steadiest = int(np.argmin(np.std(length, axis=0) / usual + NEAR * usual / usual.max()))
+    steadiest = int(np.argmin(np.std(length, axis=0) / usual + DISTANCE_WEIGHT * usual / usual.max()))
     level = apart[0, steadiest] * [1.0, 0.0, 1.0]
     size = float(np.linalg.norm(level))
     if size < 1e-9:
@@ -49,7 +49,7 @@ def first_view(picture: Scene) -> tuple[float, float]:
     forward = np.array([sideways[2], 0.0, -sideways[0]])
     yaws = [_yaw(forward, sideways, angle) for angle in OBLIQUE]
     scores = np.array([_distance(apart, yaw) for yaw in yaws])
-    return yaws[int(np.argmax(scores >= ENOUGH * scores.max()))], RAISED
+    return yaws[int(np.argmax(scores >= MIN_DISTANCE_RATIO * scores.max()))], FIRST_PITCH
 
 
 def _pairs(picture: Scene) -> NDArray[np.intp]:
@@ -72,5 +72,5 @@ def _yaw(forward: Vector, sideways: Vector, angle: float) -> float:
 
 def _distance(apart: NDArray[np.float64], yaw: float) -> float:
     """How far partners are apart across the picture, but for `QUANTILE` of the time [m]."""
-    across = np.abs(apart @ camera(yaw, RAISED)[0])
+    across = np.abs(apart @ camera(yaw, FIRST_PITCH)[0])
     return float(np.quantile(across, QUANTILE, axis=0).mean())

@@ -18,10 +18,10 @@ from mbd.dataclass import dataclass
 
 __all__ = ["Form", "Mesh", "equal_inertia", "mesh"]
 
-EQUAL = 1e-6
+MOMENT_RTOL = 1e-6
 """Moments that differ less, over the largest, are equal [-]."""
 
-THIN = 0.03
+MIN_HALF_SIZE = 0.03
 """Least half size, over the largest [-]: a disk or a rod is drawn with some thickness."""
 
 
@@ -54,7 +54,7 @@ def equal_inertia(mass: float, moments: Sequence[float], kind: str = "") -> Form
     if np.linalg.det(axes) < 0.0:
         axes = -axes
     apart = [abs(principal[(k + 1) % 3] - principal[(k + 2) % 3]) for k in range(3)]
-    equal = [gap < EQUAL * largest for gap in apart]
+    equal = [gap < MOMENT_RTOL * largest for gap in apart]
     if kind == "ball":
         return Form("ball", np.full(3, np.sqrt(2.5 * float(np.mean(principal)) / mass)), axes)
     if kind == "cylinder" or (kind == "" and any(equal) and not all(equal)):
@@ -69,7 +69,7 @@ def equal_inertia(mass: float, moments: Sequence[float], kind: str = "") -> Form
 
 
 def _thick(half: Vector) -> Vector:
-    return np.maximum(half, THIN * np.max(half))
+    return np.maximum(half, MIN_HALF_SIZE * np.max(half))
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,7 @@ AT_POINT = {
     "largest multiplier": lambda point: point.multipliers.largest,
 }  # fmt: skip
 """Quantities of a branch at one of its points."""
-FAR = 3.0
+MAX_DRAWN_MODULUS = 3.0
 """Modulus beyond which a multiplier is drawn at the edge of the picture [-]."""
 
 
@@ -85,11 +85,11 @@ def _multipliers(axes: Any, gait: LimitCycle) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.plot(np.cos(turn), np.sin(turn), color=tone(NEUTRAL), linewidth=0.8)
     sizes = np.abs(gait.multipliers)
-    near = sizes <= FAR
+    near = sizes <= MAX_DRAWN_MODULUS
     for part, shade in ((sizes < 1.0, CYCLE[2]), ((sizes >= 1.0) & near, CYCLE[1])):
         axes.plot(gait.multipliers.real[part], gait.multipliers.imag[part], "o", color=tone(shade), markersize=5)
     for value in gait.multipliers[~near]:  # at the edge, with what it is
-        place = FAR * value / abs(value)
+        place = MAX_DRAWN_MODULUS * value / abs(value)
         axes.plot(place.real, place.imag, "D", color=tone(CYCLE[1]), markersize=5)
         text = f"{value.real:.4g}" if value.imag == 0.0 else f"{abs(value):.4g}"
         axes.annotate(text, (place.real, place.imag), (0, 6), textcoords="offset points", ha="center", color=tone(INK))

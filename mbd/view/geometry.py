@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
-from mbd.view.packing import FINE, finite, packed, side, step_of
+from mbd.view.packing import QUANTIZATION_STEPS, finite, packed, side, step_of
 from mbd.view.scene import Scene
 from mbd.view.scenery import Sheet
-from mbd.view.space import TURN, space, surface
+from mbd.view.space import TURN_STEP, space, surface
 
 __all__ = ["geometry"]
 
@@ -23,7 +23,7 @@ def geometry(picture: Scene) -> dict[str, Any]:
     size = float(np.max(np.ptp(used, axis=1))) if used.size else 0.0
     size = max([size, *(float(np.max(each.radius)) for each in picture.around.rounds)])
     size = size or float(np.max(np.abs(used), initial=0.0)) or 1.0
-    step = float(f"{size / FINE:.1g}")
+    step = float(f"{size / QUANTIZATION_STEPS:.1g}")
     heaviest = max(picture.masses.values(), default=1.0)
     return {
         "spatial": picture.spatial,
@@ -76,14 +76,18 @@ def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
 
     return {
         "decks": [
-            {"at": series(deck.place, step), "normal": series(deck.normal, TURN), "along": series(deck.forward, TURN)}
+            {
+                "at": series(deck.place, step),
+                "normal": series(deck.normal, TURN_STEP),
+                "along": series(deck.forward, TURN_STEP),
+            }
             for deck in around.decks
         ],
         "sheets": [sheet_of(sheet) for sheet in around.sheets],
         "wheels": [
             {
                 "side": side(wheel.name), "at": series(wheel.center, step), "radius": packed(wheel.radius, step),
-                "spoke": series(wheel.spoke, TURN), "down": series(np.cross(wheel.spoke, wheel.axle), TURN),
+                "spoke": series(wheel.spoke, TURN_STEP), "down": series(np.cross(wheel.spoke, wheel.axle), TURN_STEP),
             }
             for wheel in around.wheels
         ],
@@ -92,7 +96,7 @@ def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
             for ball in around.balls
         ],
         "blades": [
-            {"side": side(blade.name), "at": series(blade.place, step), "along": series(blade.along, TURN)}
+            {"side": side(blade.name), "at": series(blade.place, step), "along": series(blade.along, TURN_STEP)}
             for blade in around.blades
         ],
     }  # fmt: skip

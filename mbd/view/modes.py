@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["modes"]
 
-IN_PHASE = 0.02
+IMAGINARY_RTOL = 0.02
 """Imaginary part of a shape below which all coordinates are drawn as moving in phase [-]."""
 
 
@@ -33,7 +33,7 @@ def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) 
         height, turned = np.arange(len(names)), False
         for number, (axes, mode) in enumerate(zip(panels, chosen, strict=True)):
             shape = np.array([mode.shape[name] for name in names])
-            shade, late = tone(CYCLE[number % len(CYCLE)]), bool(np.max(np.abs(shape.imag)) > IN_PHASE)
+            shade, late = tone(CYCLE[number % len(CYCLE)]), bool(np.max(np.abs(shape.imag)) > IMAGINARY_RTOL)
             turned = turned or late
             axes.barh(height - 0.18 * late, shape.real, 0.66 - 0.32 * late, color=shade)
             if late:

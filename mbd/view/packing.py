@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["FINE", "finite", "packed", "side", "step_of"]
+__all__ = ["QUANTIZATION_STEPS", "finite", "packed", "side", "step_of"]
 
-FINE = 5000.0
+QUANTIZATION_STEPS = 5000.0
 """Steps into which a range of values is divided; finer than a pixel."""
 
 
@@ -37,4 +37,4 @@ def step_of(*series: ArrayLike) -> float:
     both = np.concatenate([np.ravel(np.asarray(values, dtype=np.float64)) for values in series])
     both = both[np.isfinite(both)]
     span = float(np.max(np.abs(both), initial=0.0))
-    return float(f"{span / FINE:.1g}") if span > 0.0 else 1.0
+    return float(f"{span / QUANTIZATION_STEPS:.1g}") if span > 0.0 else 1.0

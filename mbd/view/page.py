@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["content", "write"]
 
-RATE = 60.0
+MAX_FRAME_RATE = 60.0
 """Most pictures per second of run [1/s]."""
 
 LEAST, MOST = 240, 6000
@@ -40,13 +40,13 @@ SPATIAL = (
 )  # fmt: skip
 """Parts of the page's script, joined into one function."""
 
-LARGEST = 950_000
+MAX_CHARACTERS = 950_000
 """Characters of a spatial page, beyond which it leaves out pictures that others show by interpolation."""
 
-CURVES = 0.1
+CURVE_ERROR_RATIO = 0.1
 """What interpolation may miss of places over the size of the mechanism, over what it may of curves over their range."""
 
-FINEST = 1e-4
+MIN_INTERPOLATION_ERROR = 1e-4
 """Least that interpolation between the pictures kept may miss, over the size of the mechanism [-]."""
 
 
@@ -59,11 +59,11 @@ def html(run: Trajectory) -> str:
     """The page as text; only that of a spatial mechanism has a camera."""
     picture = scene(run, pictures(run))
     text = _html(run, picture)
-    if not picture.spatial or len(text) <= LARGEST:
+    if not picture.spatial or len(text) <= MAX_CHARACTERS:
         return text
-    whole, tolerance = picture.instants, FINEST
-    moving = np.hstack([motion(picture), CURVES * _curves(run, whole)])
-    while len(text) > LARGEST and len(picture.instants.time) > LEAST:
+    whole, tolerance = picture.instants, MIN_INTERPOLATION_ERROR
+    moving = np.hstack([motion(picture), CURVE_ERROR_RATIO * _curves(run, whole)])
+    while len(text) > MAX_CHARACTERS and len(picture.instants.time) > LEAST:
         chosen = kept(whole.time, moving, tolerance)
         if len(chosen) < len(picture.instants.time):
             picture = scene(run, whole.part(chosen))
@@ -98,7 +98,7 @@ def _html(run: Trajectory, picture: Scene, *more: tuple[str, str]) -> str:
 
 def pictures(run: Trajectory) -> int:
     """How many pictures a page has, besides those at events."""
-    return int(np.clip(round(RATE * float(run.time[-1] - run.time[0])), LEAST, MOST))
+    return int(np.clip(round(MAX_FRAME_RATE * float(run.time[-1] - run.time[0])), LEAST, MOST))
 
 
 def content(run: Trajectory, picture: Scene) -> dict[str, Any]:

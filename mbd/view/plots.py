@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait", "portrayed"]
 
-MANY = 60
+MAX_EVENT_LINES = 60
 """Events beyond this number are left to the contact bars, so that lines do not hide the curves."""
 
 
@@ -145,7 +145,7 @@ def _mark(axes: Any, run: Trajectory) -> None:
 
 def _lines(axes: Any, marks: Sequence[tuple[float, str]], above: bool = False) -> None:
     """A thin line at each (time, name), in the color of its side; black without a name; above areas or below curves."""
-    if 0 < len(marks) <= MANY:
+    if 0 < len(marks) <= MAX_EVENT_LINES:
         shades = [color(name) if name else tone(INK) for _, name in marks]
         look: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.35, "linestyle": ":", "zorder": 2.5 if above else 0.5}
         _upright(axes, [time for time, _ in marks], 0.0, 1.0, colors=shades, **look)
@@ -174,7 +174,7 @@ def _shade(axes: Any, run: Trajectory, wanted: Sequence[str]) -> None:
         closed[color(contact.name)] = closed.get(color(contact.name), False) | column
     for side, rows in closed.items():
         spans = stretches(run.time, rows)
-        if len(spans) <= MANY:
+        if len(spans) <= MAX_EVENT_LINES:
             corners = [[(begin, 0.0), (begin, 1.0), (end, 1.0), (end, 0.0)] for begin, end in spans]
             bands = PolyCollection(corners, color=side, alpha=0.09, linewidth=0, zorder=0.2)
             bands.set_transform(axes.get_xaxis_transform())
@@ -258,7 +258,7 @@ def _mark_events(ledger: Ledger, upper: Any, lower: Any) -> None:
     """Lines at events, ticks where there are many."""
     for panel in (upper, lower):
         _lines(panel, ledger.marks, above=True)
-    if len(ledger.marks) > MANY:
+    if len(ledger.marks) > MAX_EVENT_LINES:
         _upright(lower, [time for time, _ in ledger.marks], 0.93, 1.0, colors=tone(INK), linewidth=0.7, alpha=0.6)
 
 

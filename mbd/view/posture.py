@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 __all__ = ["drawn", "instant"]
 
-SOIL = "#B9C0C9"
+GROUND_COLOR = "#B9C0C9"
 
 LETTER, LINE = 5.5, 10.0
 """Width of a letter and height of a line of names [pt]."""
 
-ROOM = 0.62
+HALF_WIDTH_RATIO = 0.62
 """Half of the side of the picture, over the larger side of the mechanism [-]."""
 
 
@@ -66,8 +66,8 @@ def _frame(axes: Any, extent: Matrix) -> tuple[float, float, float]:
     """A square with some room around what is drawn; its left and right edge, and the size of what is drawn [m]."""
     low, high = extent.min(axis=0), extent.max(axis=0)
     size = float(np.max(high - low)) or 1.0
-    left, below = (low + high) / 2.0 - ROOM * size
-    right, above = (low + high) / 2.0 + ROOM * size
+    left, below = (low + high) / 2.0 - HALF_WIDTH_RATIO * size
+    right, above = (low + high) / 2.0 + HALF_WIDTH_RATIO * size
     axes.set(aspect="equal", xlim=(left, right), ylim=(below, above))
     return float(left), float(right), size
 
@@ -88,7 +88,7 @@ def _ground(axes: Any, picture: Scene, left: float, right: float) -> None:
         normal = ground.normal[:2]
         if abs(normal[1]) > 1e-9:
             x = np.array([left, right])
-            axes.plot(x, (ground.offset - normal[0] * x) / normal[1], color=SOIL, lw=2.0, zorder=0)
+            axes.plot(x, (ground.offset - normal[0] * x) / normal[1], color=GROUND_COLOR, lw=2.0, zorder=0)
 
 
 def _rim(wheel: Wheel) -> Matrix:
@@ -103,10 +103,10 @@ def _scenery(axes: Any, picture: Scene, rims: list[Matrix], size: float) -> None
     around = picture.around
     for sheet in around.sheets:
         for line in sheet.lines[0]:
-            axes.plot(*line[:, :2].T, color=SOIL, lw=2.0, zorder=0)
+            axes.plot(*line[:, :2].T, color=GROUND_COLOR, lw=2.0, zorder=0)
     for deck in around.decks:
         ends = deck.place[0] + np.array([[-9.0], [9.0]]) * size * deck.forward[0]
-        axes.plot(*ends[:, :2].T, color=SOIL, lw=2.0, zorder=0)
+        axes.plot(*ends[:, :2].T, color=GROUND_COLOR, lw=2.0, zorder=0)
     for wheel, rim in zip(around.wheels, rims, strict=True):
         axes.plot(*rim.T, color=color(wheel.name), lw=2.0, zorder=2)
         axes.plot(*np.array([wheel.center[0, :2], rim[0]]).T, color=color(wheel.name), lw=1.5, zorder=2)
@@ -122,7 +122,7 @@ def _pivots(axes: Any, model: Any, run: Trajectory, rows: Matrix) -> None:
         frame = next((each for each in (joint.parent, joint.child) if isinstance(each.body, Ground)), None)
         if frame is not None and joint.labels and all(label.unit == "rad" for label in joint.labels):
             x, y, _ = rows @ turn @ run[frame.full_name][0]
-            axes.plot([x], [y], marker=6, markersize=13, color=SOIL, zorder=1)
+            axes.plot([x], [y], marker=6, markersize=13, color=GROUND_COLOR, zorder=1)
 
 
 def _bodies(axes: Any, picture: Scene, places: Matrix) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_forces", "with_forces"]
 
-FORCE = "#009E73"
+FORCE_COLOR = "#009E73"
 
 
 def with_forces(model: Any, state: State) -> Trajectory | None:
@@ -57,6 +57,13 @@ def _arrow(axes: Any, push: Push, rows: Matrix, scale: float) -> Vector:
     """Where it ends in the picture."""
     start = rows[:2] @ push.place[0]
     end = start + scale * (rows[:2] @ push.force[0])
-    how = {"arrowstyle": "-|>", "color": tone(FORCE), "lw": 1.8, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 11.0}
+    how = {
+        "arrowstyle": "-|>",
+        "color": tone(FORCE_COLOR),
+        "lw": 1.8,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+        "mutation_scale": 11.0,
+    }
     axes.annotate("", end, start, arrowprops=how, zorder=7)
     return np.asarray(end)

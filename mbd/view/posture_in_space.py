@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.view.facets import FINEST, facets, shaded, size_of, surfaces
+from mbd.view.facets import MAX_FACET_EDGE, facets, shaded, size_of, surfaces
 from mbd.view.scene import Scene
 from mbd.view.style import FAINT, PALE, tone
 
@@ -26,7 +26,7 @@ def draw_in_space(axes: Any, picture: Scene, rows: Matrix) -> Matrix:
     for part, closed in ((sheet, False), (found, True)):
         if part is None:
             continue
-        places, tint = shaded(part, rows, FINEST * size, closed)
+        places, tint = shaded(part, rows, MAX_FACET_EDGE * size, closed)
         stack = PolyCollection(list(places), facecolors=tint, edgecolors=tint, linewidths=0.3, zorder=2)
         stack.set_rasterized(True)
         axes.add_collection(stack)

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Ball", "Blade", "Deck", "Ground", "Sheet", "Scenery", "Wheel", "plane_of_motion", "scenery"]
 
-FIT = 1e-6
+PLANE_ATOL = 1e-6
 """A plane whose distance reproduces a gap this well is the ground of that contact [m]."""
 
 FINE, MOST, MOST_MOVING = 100, 4000, 400
 """Points of a curve over the size of the mechanism, and on a whole curve, at rest and moving."""
 
-PATCH = 25
+SURFACE_LINES = 25
 """Lines of a surface in space along each of its directions."""
 
 TIMES, TIMES_IN_SPACE = 200, 40
@@ -188,7 +188,7 @@ def _sheet(run: Trajectory, shape: Shape, instants: Instants, turn: Matrix, poin
     moves, fine = "t" in shape.across, (high[0] - low[0] + 2.0 * reach) / max(size, 0.12 * travel, 1e-9) * FINE
     count = int(np.clip(fine, 200, MOST_MOVING if moves else MOST))
     if spatial:
-        count, reach = 2 * PATCH - 1, 0.25 * reach
+        count, reach = 2 * SURFACE_LINES - 1, 0.25 * reach
     x = np.linspace(low[0] - reach, high[0] + reach, count)
     z = np.linspace(low[2] - reach, high[2] + reach, count) if spatial else low[2:]
     along = np.stack(np.broadcast_arrays(x[None, :], z[:: 2 if spatial else 1, None]), axis=-1)
@@ -219,17 +219,17 @@ def _heights(run: Trajectory, shape: Shape, places: NDArray[np.float64], times: 
 
 def plane_of_motion(p: Matrix, gap: Vector) -> tuple[Vector, float] | None:
     """normal, offset with ``normal · p − offset = gap`` and a unit normal; None if the motion shows no such plane."""
-    if np.max(np.abs(p[:, 1] - gap)) < FIT:
+    if np.max(np.abs(p[:, 1] - gap)) < PLANE_ATOL:
         return np.array([0.0, 1.0, 0.0]), 0.0
-    moving = np.ptp(p, axis=0) > FIT
+    moving = np.ptp(p, axis=0) > PLANE_ATOL
     if moving.sum() < 2:
         return None
     unknowns = np.column_stack([p[:, moving], -np.ones(len(p))])
     solution, _, rank, _ = np.linalg.lstsq(unknowns, gap, rcond=1e-9)
-    if rank < unknowns.shape[1] or np.max(np.abs(unknowns @ solution - gap)) > FIT:
+    if rank < unknowns.shape[1] or np.max(np.abs(unknowns @ solution - gap)) > PLANE_ATOL:
         return None
     normal = np.zeros(3)
     normal[moving] = solution[:-1]
-    if abs(float(np.linalg.norm(normal)) - 1.0) > FIT:
+    if abs(float(np.linalg.norm(normal)) - 1.0) > PLANE_ATOL:
         return None
     return normal, float(solution[-1])

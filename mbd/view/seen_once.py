@@ -13,12 +13,12 @@ from mbd.view.solids import Solid, rotations
 
 __all__ = ["once", "solid_ones"]
 
-AIR = 1.2
+MIN_DENSITY = 1.2
 """Density below which a solid is none that anyone builds [kg/m³]."""
 
-SAME = 0.02
+RADIUS_RTOL = 0.02
 """Radii that differ less, over the radius, are one [-]."""
-PLACED = 1e-6
+CENTER_RTOL = 1e-6
 """Centers that are nearer, over the radius, are one [-]."""
 
 
@@ -45,7 +45,7 @@ def _body_of(ball: Ball, solids: Iterable[Solid]) -> Solid | None:
     for solid in solids:
         if solid.form.kind == "ball" and ball.name.startswith(f"{solid.name}.") and not np.any(ball.radius != radius):
             away = float(np.max(np.linalg.norm(solid.center - ball.center, axis=1)))
-            if away <= PLACED * radius and abs(float(solid.form.half[0]) - radius) < SAME * radius:
+            if away <= CENTER_RTOL * radius and abs(float(solid.form.half[0]) - radius) < RADIUS_RTOL * radius:
                 return solid
             if away < radius:
                 return replace(solid, center=ball.center, form=replace(solid.form, half=np.full(3, radius)))
@@ -62,7 +62,7 @@ def solid_ones(solids: tuple[Solid, ...], points: Sequence[str], places: Matrix)
     for solid in solids:
         others = [k for k, point in enumerate(points) if point.rpartition(".")[0] != solid.name]
         size = float(np.max(np.ptp(places[others], axis=0), initial=0.0)) if others else 0.0
-        if not (solid.density < AIR and 0.0 < size < 2.0 * float(np.max(solid.form.half))):
+        if not (solid.density < MIN_DENSITY and 0.0 < size < 2.0 * float(np.max(solid.form.half))):
             found.append(solid)
     return tuple(found)
 
@@ -74,9 +74,9 @@ def _shown(wheel: Wheel, solids: Iterable[Solid], hidden: set[str]) -> bool:
         own = wheel.name.startswith(f"{solid.name}.")
         if not own or solid.form.kind != "cylinder" or not _along(wheel, solid):
             continue
-        if float(np.max(np.abs(solid.center - wheel.center))) > PLACED * radius:
+        if float(np.max(np.abs(solid.center - wheel.center))) > CENTER_RTOL * radius:
             continue
-        if abs(float(solid.form.half[0]) - radius) < SAME * radius:
+        if abs(float(solid.form.half[0]) - radius) < RADIUS_RTOL * radius:
             return True
         hidden.add(solid.name)
     return False
@@ -84,4 +84,4 @@ def _shown(wheel: Wheel, solids: Iterable[Solid], hidden: set[str]) -> bool:
 
 def _along(wheel: Wheel, solid: Solid) -> bool:
     """Whether a wheel's axle is the axis of a cylinder."""
-    return bool(abs(float(rotations(solid.turn[:1])[0][:, 2] @ wheel.axle[0])) > 1.0 - SAME)
+    return bool(abs(float(rotations(solid.turn[:1])[0][:, 2] @ wheel.axle[0])) > 1.0 - RADIUS_RTOL)

@@ -13,11 +13,11 @@ from mbd.view.first_view import first_view
 from mbd.view.forms import mesh
 from mbd.view.packing import finite, packed, side
 from mbd.view.scene import Scene
-from mbd.view.scenery import PATCH, Sheet
+from mbd.view.scenery import SURFACE_LINES, Sheet
 
-__all__ = ["TURN", "space", "surface"]
+__all__ = ["TURN_STEP", "space", "surface"]
 
-TURN = 1e-4
+TURN_STEP = 1e-4
 """Steps of directions and quaternions [-]."""
 
 
@@ -35,16 +35,21 @@ def space(picture: Scene, step: float) -> dict[str, Any]:
             {
                 "body": solid.name, "side": side(solid.name), "kind": solid.form.kind,
                 "half": [finite(x) for x in solid.form.half], "at": _series(solid.center, step),
-                "turn": _series(solid.turn, TURN),
+                "turn": _series(solid.turn, TURN_STEP),
             }
             for solid in picture.solids
         ],
         "hinges": [
-            {"name": hinge.name, "at": _series(hinge.place, step), "axis": _series(hinge.axis, TURN)}
+            {"name": hinge.name, "at": _series(hinge.place, step), "axis": _series(hinge.axis, TURN_STEP)}
             for hinge in picture.hinges
         ],
         "cones": [
-            {"name": stop.name, "at": _series(stop.place, step), "axis": _series(stop.axis, TURN), "angle": stop.angle}
+            {
+                "name": stop.name,
+                "at": _series(stop.place, step),
+                "axis": _series(stop.axis, TURN_STEP),
+                "angle": stop.angle,
+            }
             for stop in picture.stops
         ],
         "meshes": {kind: _mesh(kind) for kind in sorted(kinds)},
@@ -58,7 +63,7 @@ def surface(sheet: Sheet, upwards: Vector, step: float) -> dict[str, Any]:
 
     upwards : the direction of heights in the scene; holes : numbers of corners without a height
     """
-    rows, count = PATCH, sheet.lines.shape[2]
+    rows, count = SURFACE_LINES, sheet.lines.shape[2]
     corners = sheet.lines[:, :rows].reshape(len(sheet.times), rows * count, 3)
     holes = np.flatnonzero(~np.all(np.isfinite(corners), axis=(0, 2)))
     risen = (corners - corners[0]) @ upwards

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["spectra"]
 
-LEAST = 1e-9
+MIN_DRAWN = 1e-9
 """Damping ratios and elongations below this are not drawn [-]."""
 HALF = float(np.pi)
 """ω dt of two steps a period, beyond which there is no period to speak of [rad]."""
@@ -68,7 +68,7 @@ def _scale(found: Sequence[Criteria], upper: Any, middle: Any, lower: Any) -> No
 
 def _above(values: Any) -> Any:
     """The values that a logarithmic axis can show."""
-    return np.where(values > LEAST, values, np.nan)
+    return np.where(values > MIN_DRAWN, values, np.nan)
 
 
 def _label(each: Criteria) -> str:

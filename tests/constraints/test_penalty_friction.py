@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.constraints.penalty import CREEP
+from mbd.constraints.penalty import CREEP_SPEED
 
 G, MASS, MU = 9.81, 2.0, 0.3
 UP = mbd.Plane(normal=(0.0, 0.0, 1.0))
@@ -54,14 +54,14 @@ def test_it_slows_along_a_line_dissipates_and_comes_to_the_place_of_rigid_fricti
 def test_under_a_load_below_the_limit_it_creeps_as_the_law_says(load):
     slope = np.arctan(load * MU)
     run = slid(pressed(slope), (0.0, 0.0), slope=slope)
-    assert run["slide.x.rate"][-1] == pytest.approx(CREEP * load / np.sqrt(1.0 - load**2), rel=1e-6)
+    assert run["slide.x.rate"][-1] == pytest.approx(CREEP_SPEED * load / np.sqrt(1.0 - load**2), rel=1e-6)
     assert abs(run["slide.y"][-1]) < 1e-15
 
 
 def test_beyond_the_limit_it_slides_down():
     run = slid(pressed(0.4), (0.0, 0.0), slope=0.4)
     fall = G * (np.sin(0.4) - MU * np.cos(0.4))
-    assert run["slide.x.rate"][-1] == pytest.approx(fall * 0.8, abs=CREEP * 5.0)
+    assert run["slide.x.rate"][-1] == pytest.approx(fall * 0.8, abs=CREEP_SPEED * 5.0)
 
 
 def test_in_a_plane_it_is_that_of_space():
@@ -110,7 +110,7 @@ def test_on_a_height_function_it_acts_along_the_surface_of_now():
     v = x * u + z * w  # along the surface, into which it does not go much deeper
     along = np.sqrt(u * u + v * v + w * w)
     pull = np.hypot(run["mat.friction.forward"], run["mat.friction.sideways"])
-    assert pull == pytest.approx(0.2 * run["mat.force"] * along / np.sqrt(along**2 + CREEP**2), rel=2e-2)
+    assert pull == pytest.approx(0.2 * run["mat.force"] * along / np.sqrt(along**2 + CREEP_SPEED**2), rel=2e-2)
 
 
 def test_what_makes_no_sense_is_refused_by_name_and_what_is_absent_leaves_nothing():

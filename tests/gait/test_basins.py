@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.gait.basin.basin import BLOCK
+from mbd.gait.basin.basin import BLOCK_SIZE
 from tests.cases.walkers import compass, standing
 from tests.gait.basins import LETTERS, classes, grid, start_of, walker
 from tests.gait.walkers import slope_of
@@ -68,7 +68,7 @@ def test_threads_and_the_order_of_starts_change_nothing(monkeypatch):
     assert same(study(10, workers=3), found)
     theta, s = grid()
     model, gait = walker()
-    monkeypatch.setattr("mbd.gait.basin.basin.BLOCK", 100)
+    monkeypatch.setattr("mbd.gait.basin.basin.BLOCK_SIZE", 100)
     turned = mbd.basin(model, gait, {"s": s[::-10], "theta": theta[::-10]}, start=start_of, steps=30, dt=0.2)
     for name in ("kind", "attractor", "steps", "time"):
         ours = getattr(turned, name).T[::-1, ::-1]
@@ -79,9 +79,9 @@ def test_threads_and_the_order_of_starts_change_nothing(monkeypatch):
 
 
 def test_a_study_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr("mbd.gait.basin.basin.BLOCK", 100)
+    monkeypatch.setattr("mbd.gait.basin.basin.BLOCK_SIZE", 100)
     path, found = tmp_path / "basin.jsonl", study()
-    assert BLOCK > 100
+    assert BLOCK_SIZE > 100
     assert same(study(10, file=path), found)
     lines = path.read_bytes().splitlines(keepends=True)
     assert len(lines) == 5

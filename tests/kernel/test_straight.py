@@ -134,7 +134,7 @@ def test_straight_line_code_solves_the_equations_of_accelerations_and_rows(seed,
 def test_where_no_pivot_is_large_enough_pivots_are_searched_for(form, monkeypatch):
     scheme = mbd.GeneralizedAlpha(0.8, formulation=form)
     straight = walk(scheme)
-    monkeypatch.setattr(elimination, "LOSS", 1e300)
+    monkeypatch.setattr(elimination, "MIN_PIVOT_RATIO", 1e300)
     searched = walk(scheme)
     assert searched.stats["pivoted"] == searched.stats["factorizations"] > 0
     assert_same(straight, searched)
@@ -226,7 +226,7 @@ def test_what_is_raised_while_code_is_made_comes_out_of_the_step(monkeypatch):
             raise RuntimeError("no room for code")
         return made(self, kind, mode, names, make)
 
-    monkeypatch.setattr(elimination, "LOSS", 1e300)
+    monkeypatch.setattr(elimination, "MIN_PIVOT_RATIO", 1e300)
     monkeypatch.setattr(Mechanism, "_add", fails)
     walker = kneed_walker()
     with pytest.raises(RuntimeError, match="no room"):

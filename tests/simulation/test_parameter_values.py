@@ -16,7 +16,7 @@ import sympy
 import mbd
 from mbd.bodies.base import Body
 from mbd.constraints.base import Constraint
-from mbd.constraints.restitution import LEAST_RESTITUTION, chi_for, restitution_of_chi
+from mbd.constraints.restitution import MIN_RESTITUTION, chi_for, restitution_of_chi
 from mbd.joints.base import Joint
 from mbd.joints.losses.base import Loss
 
@@ -94,7 +94,7 @@ def restitution(value: Any) -> mbd.Model:
     """A mat described by its restitution, for a value of χ."""
     if not isinstance(value, float) or not math.isfinite(value):
         return mat(restitution=value)
-    inside = 0.0 < value < 1.0 / LEAST_RESTITUTION
+    inside = 0.0 < value < 1.0 / MIN_RESTITUTION
     return mat(restitution=restitution_of_chi(value) if inside else 0.01 if value > 0.0 else 1.0 - value)
 
 

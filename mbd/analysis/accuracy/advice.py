@@ -9,9 +9,9 @@ from mbd.analysis.accuracy.points import Point
 
 __all__ = ["advice", "cheapest", "decades", "milliseconds"]
 
-MORE = 10.0
+ACCURACY_FACTOR = 10.0
 """Times more accuracy whose cost is reported."""
-KNOWN = 30.0
+MIN_ERROR_OVER_BOUND = 30.0
 """Times the bound of the reference below which an error is mostly that of the reference."""
 
 
@@ -54,7 +54,7 @@ def advice(points: Sequence[Point], target: float | None, bound: float) -> list[
     return [
         f"For an error of {_power(target)} use {_described(best)}.",
         _costs(best),
-        _more(points, best, target / MORE, bound),
+        _more(points, best, target / ACCURACY_FACTOR, bound),
     ]
 
 
@@ -77,9 +77,9 @@ def _power(error: float) -> str:
 def _limits(points: Sequence[Point], bound: float) -> str:
     """Why no smaller error is shown."""
     best = _best(points)
-    if best.at_most is not None and best.at_most < KNOWN * bound:
+    if best.at_most is not None and best.at_most < MIN_ERROR_OVER_BOUND * bound:
         return f"Smaller errors cannot be told apart: the reference itself is known to {bound:.1g}."
-    guess = _extrapolated(points, (best.at_most or 0.0) / MORE)
+    guess = _extrapolated(points, (best.at_most or 0.0) / ACCURACY_FACTOR)
     if guess is None:
         return f"The least error of all points is {best.at_most:.2g}, and no order tells what a smaller one costs."
     scheme, dt, seconds = guess
@@ -132,7 +132,7 @@ def _costs(point: Point) -> str:
 def _more(points: Sequence[Point], best: Point, target: float, bound: float) -> str:
     """What a tenth of the error costs: measured, or extrapolated from the finest step."""
     if best.reaches(target) and best.at_most:
-        text, target = "It is ten times more accurate already; ten times more than that", best.at_most / MORE
+        text, target = "It is ten times more accurate already; ten times more than that", best.at_most / ACCURACY_FACTOR
     else:
         text = "Ten times more accuracy"
     finer = cheapest(points, target)

@@ -25,7 +25,7 @@ __all__ = ["OPTIONS", "accuracy", "with_orders"]
 
 OPTIONS = ("contact", "impact", "locate", "parameters", "rest_speed", "backend")
 """Of `simulate`, which every run shares."""
-PATIENCE = 5.0
+MAX_TIMING_SECONDS = 5.0
 """Wall time for timing all points some more [s]."""
 REFERENCE_RUNS = 4
 """Runs of the reference: itself, its bound, the growth of errors, and a check by another scheme."""
@@ -129,7 +129,7 @@ class Bench:
             for name, settings in self.chosen.settings.items():
                 self._of(name, settings, place, found)
                 place += len(settings)
-            found = retimed(found, self.again, PATIENCE, self.share(self.total - 1))
+            found = retimed(found, self.again, MAX_TIMING_SECONDS, self.share(self.total - 1))
             self.share(self.total - 1)(1.0)
         except KeyboardInterrupt:
             return found, False

@@ -12,7 +12,7 @@ import numpy as np
 
 from mbd.analysis.accuracy.published import Published
 from mbd.analysis.accuracy.settings import Setting
-from mbd.analysis.accuracy.truth import CLEAR, Truth
+from mbd.analysis.accuracy.truth import MIN_REPORTED_OVER_BOUND, Truth
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError
@@ -24,7 +24,7 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["CLEAR", "Point", "Setting", "Subject", "measured"]
+__all__ = ["MIN_REPORTED_OVER_BOUND", "Point", "Setting", "Subject", "measured"]
 
 CLOCK = perf_counter if sys.platform == "win32" else thread_time
 """Processor time of the thread [s]; wall time where the system counts the other in steps of 16 ms."""
@@ -203,7 +203,7 @@ def _judged(run: Trajectory, truth: Truth | Published, scheme: Integrator) -> di
     known = truth.bound_of(scheme)
     found = truth.judged(run)
     worst = {name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) for name in known}
-    clear = {name: worst[name] >= CLEAR * bound for name, bound in known.items()}
+    clear = {name: worst[name] >= MIN_REPORTED_OVER_BOUND * bound for name, bound in known.items()}
     leading = max(worst, key=lambda name: worst[name])
     is_clear = clear[leading]
     notes = [] if is_clear else [f"no clear error beside the reference's own, {known[leading]:.1g}"]
@@ -212,7 +212,9 @@ def _judged(run: Trajectory, truth: Truth | Published, scheme: Integrator) -> di
         "error": found.error if is_clear else None,
         "at_most": max(worst[name] + bound for name, bound in known.items()),
         "errors": {name: value for name, value in found.largest.items() if clear[name]},
-        "end_errors": {name: value for name, value in found.at_end.items() if value >= CLEAR * known[name]},
+        "end_errors": {
+            name: value for name, value in found.at_end.items() if value >= MIN_REPORTED_OVER_BOUND * known[name]
+        },
         "event_time": found.event_time if isinstance(truth, Truth) else None,
         "same_events": found.same_events, "left_out": found.left_out, "note": "; ".join(notes),
     }  # fmt: skip

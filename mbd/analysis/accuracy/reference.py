@@ -34,9 +34,9 @@ METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
 MOST_STRIDES = {"DOP853": 400, "Radau": 4000}
 """Strides within one step after which the method gives up: the scene is too stiff for it."""
-KEPT = 1000
+MAX_CACHED_INTERVALS = 1000
 """Dense outputs of a course that are kept; only the last few are needed."""
-ON_ROWS = 1e-14
+ROW_RTOL = 1e-14
 """|h| and |ḣ|, relative to the size of the state, that need no correction."""
 
 
@@ -86,7 +86,7 @@ class Balance:
             matrix, _, (h, rate, _), H = self._evaluate(t, q, y)
             h = np.where(self.held, h, 0.0)
             size = 1.0 + max(np.max(np.abs(q)), np.max(np.abs(y)))
-            if max(np.max(np.abs(h)), np.max(np.abs(rate))) <= ON_ROWS * size:
+            if max(np.max(np.abs(h)), np.max(np.abs(rate))) <= ROW_RTOL * size:
                 break
             right = np.zeros((n + len(h), 2))
             right[n:, 0], right[n:, 1] = -h, -rate
@@ -148,8 +148,8 @@ class Course:
             problem = solver.step()
         if problem:
             raise _TooStiffError(problem)
-        if len(self.pieces) > KEPT:
-            del self.pieces[: KEPT // 2]
+        if len(self.pieces) > MAX_CACHED_INTERVALS:
+            del self.pieces[: MAX_CACHED_INTERVALS // 2]
         self.pieces.append(solver.dense_output())
         q = self.balance.configuration.normalise(solver.y[:n_q])
         self.q, self.y = self.balance.on_rows(solver.t, q, solver.y[n_q:])

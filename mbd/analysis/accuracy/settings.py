@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Setting", "is_high", "long_steps", "rounded", "steps_for", "steps_of", "tolerances"]
 
-FINENESS = 5
+STEPS_PER_SHORTEST_TIME = 5
 """Largest step: this part of the shortest time in which accelerations change velocities by their range [-]."""
-COUNT = 6
+STEP_COUNT = 6
 """Steps, each half the one before."""
-TENTH = 10.0
+FINEST_ERROR_FACTOR = 10.0
 """The finest step is for an error this many times less than that wanted [-]."""
 TOLERANCES = {False: (1e-3, 1e-4, 1e-5), True: (1e-3, 1e-5, 1e-7)}
 """Of schemes of low and of high order, over the middle range of the coordinates, where no error is wanted [-]."""
@@ -59,7 +59,7 @@ def steps_of(probe: Trajectory, span: float) -> tuple[float, ...]:
     swing = np.ptp(record.v, axis=0) if len(record.v) else np.zeros(0)
     rise = np.percentile(np.abs(record.a), 99, axis=0) if len(record.a) else np.zeros(0)
     times = [s / r for s, r in zip(swing, rise, strict=True) if r > 1e-9 * np.max(rise) and s > 0.0]
-    return _halved(rounded(min([*times, span / 4.0]) / FINENESS))
+    return _halved(rounded(min([*times, span / 4.0]) / STEPS_PER_SHORTEST_TIME))
 
 
 def long_steps(probe: Trajectory, span: float) -> tuple[float, ...]:
@@ -73,9 +73,11 @@ def steps_for(target: float, error: float, dt: float, span: float) -> tuple[floa
     >>> steps_for(1e-4, error=1e-3, dt=1e-3, span=1.0)
     (0.00256, 0.00128, 0.00064, 0.00032, 0.00016, 8e-05)
     """
-    finest = max(0.9 * dt * math.sqrt(target / TENTH / error), span / 400000)  # so many of the finest steps at most
-    least = rounded(min(finest, span / 2**COUNT))
-    return tuple(least * 2.0**k for k in reversed(range(COUNT)))
+    finest = max(
+        0.9 * dt * math.sqrt(target / FINEST_ERROR_FACTOR / error), span / 400000
+    )  # so many of the finest steps at most
+    least = rounded(min(finest, span / 2**STEP_COUNT))
+    return tuple(least * 2.0**k for k in reversed(range(STEP_COUNT)))
 
 
 def tolerances(scheme: Integrator, ranges: Sequence[float], target: float | None) -> tuple[float, ...]:
@@ -94,7 +96,7 @@ def tolerances(scheme: Integrator, ranges: Sequence[float], target: float | None
 
 
 def _halved(largest: float) -> tuple[float, ...]:
-    return tuple(largest / 2**k for k in range(COUNT))
+    return tuple(largest / 2**k for k in range(STEP_COUNT))
 
 
 def rounded(value: float) -> float:

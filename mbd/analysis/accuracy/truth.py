@@ -24,21 +24,21 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["CLEAR", "INSTANTS", "Truth", "truth"]
+__all__ = ["MIN_REPORTED_OVER_BOUND", "MAX_INSTANTS", "Truth", "truth"]
 
 TIGHT, LOOSE = 1e-12, 1e-10
 """Tolerances of the reference and of the run that bounds its error [-]."""
-INSTANTS = 400
+MAX_INSTANTS = 400
 """Common instants at which runs are compared, at most: stored rows of the reference, which need no interpolation."""
-NUDGE = 1e-9
+VELOCITY_PERTURBATION = 1e-9
 """Part of their range by which the velocities of the start are changed, to measure how errors grow [-]."""
-UNSURE = 0.01
+MAX_REFERENCE_BOUND = 0.01
 """Bound of the reference above which it has not converged, and judges nobody [-]."""
 CHECKS = (2.0, 8.0, 32.0)
 """Steps between rows of the reference over those of the runs that check it, one after the other [-]."""
-NEAR = 3.0
+MAX_DIFFERENCE_OVER_BOUND = 3.0
 """Difference of such a run, over the bound of the reference, that is near enough [-]."""
-CLEAR = 10.0
+MIN_REPORTED_OVER_BOUND = 10.0
 """An error is reported where it is this many times the bound of what it was judged by [-]."""
 WORDS = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}
 KIN: dict[Method, type[Integrator]] = {"DOP853": RungeKutta853, "Radau": RadauIIA}
@@ -121,7 +121,7 @@ class Truth:
         names = [name for name, _ in run.facts.coordinates][: run.facts.coordinate_count]
         found = differences(run, self.run, dict.fromkeys(names, 1.0), self.instants)
         floor = max((self.bound[name] * self.scales[name] for name in names if name in self.bound), default=0.0)
-        return found.error if found.error >= CLEAR * floor else None
+        return found.error if found.error >= MIN_REPORTED_OVER_BOUND * floor else None
 
     def remark(self, found: Difference) -> str:
         """What else is to be said of a difference."""
@@ -171,7 +171,7 @@ def truth(
     scales = ranges(tight, names, instants)
     apart = differences(loose, tight, scales, instants)
     bound = {name: max(apart.largest.get(name, 0.0), apart.at_end.get(name, 0.0)) for name in scales}
-    if max(bound.values(), default=0.0) > UNSURE:
+    if max(bound.values(), default=0.0) > MAX_REFERENCE_BOUND:
         return _unconverged(bound, method, apart)
     growth = _growth(model, start, tight, options, lambda begin: run(method, TIGHT, step, begin, shares[2]))
     found = Truth(
@@ -201,7 +201,9 @@ def _by_another(found: Truth, run: Callable[[float], Trajectory], step: float) -
             return checked
         checked = _checked(other, found, checked)
         known = max(checked.values(), default=0.0) if checked is not None else np.inf
-        if known <= NEAR * found.error or other.stats["wall_seconds"] > 3.0:  # no finer one is made after 3 s
+        if (
+            known <= MAX_DIFFERENCE_OVER_BOUND * found.error or other.stats["wall_seconds"] > 3.0
+        ):  # no finer one is made after 3 s
             break
     return checked
 
@@ -238,7 +240,7 @@ def _checked(other: Trajectory, found: Truth, before: dict[str, float] | None) -
 
 def chosen(times: Vector) -> Vector:
     """Some of the times of a run's rows, evenly spread, the last among them and the first not."""
-    wanted = np.linspace(times[0], times[-1], INSTANTS + 1)[1:]
+    wanted = np.linspace(times[0], times[-1], MAX_INSTANTS + 1)[1:]
     places = np.clip(np.searchsorted(times, wanted - 0.5 * (wanted[1] - wanted[0])), 1, len(times) - 1)
     return np.unique(np.append(times[places], times[-1]))
 
@@ -270,7 +272,7 @@ def _growth(
 
 
 def _nudged(model: Any, start: State, reference: Trajectory, options: Mapping[str, Any]) -> State:
-    """The start with velocities changed by `NUDGE` of their range, as far as the closed rows let them."""
+    """The start with velocities changed by `VELOCITY_PERTURBATION` of their range, as far as closed rows allow."""
     mechanism = mechanism_of(model, options.get("backend", "auto"), options.get("parameters"))
     manager = manager_of(mechanism, reference.record.parameters)
     y = np.concatenate([start.v, start.z])
@@ -279,7 +281,7 @@ def _nudged(model: Any, start: State, reference: Trajectory, options: Mapping[st
     n, n_v = len(y), len(start.v)
     swing = np.ptp(reference.record.v, axis=0) if len(reference.record.v) else np.ones(n_v)
     change = np.zeros(n)
-    change[:n_v] = NUDGE * swing * np.where(np.arange(n_v) % 2 == 0, 1.0, -0.7)
+    change[:n_v] = VELOCITY_PERTURBATION * swing * np.where(np.arange(n_v) % 2 == 0, 1.0, -0.7)
     if rows:
         B = terms.B[rows]
         matrix = np.block([[terms.M, B.T], [B, np.zeros((len(rows), len(rows)))]])

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["change", "common", "same_rows"]
 
-ALIKE = 4
+MATCHING_WINDOW = 4
 """Events among which the next one is looked for: those of about one instant may come in any order."""
-FARTHER = 2.0
+MAX_SHIFT_RATIO = 2.0
 """How much farther one of two events that come in the other order may be shifted than the other or earlier ones [-]."""
 
 
@@ -72,12 +72,12 @@ def common(
     pairs: list[tuple[float, float]] = []
     shift = 0.0
     while mine and theirs:
-        match = _like(mine[0], theirs[:ALIKE])
+        match = _like(mine[0], theirs[:MATCHING_WINDOW])
         if match is None:
             break
         pair = mine[0].time, theirs[match].time
         if match:
-            back = _like(theirs[0], mine[:ALIKE])
+            back = _like(theirs[0], mine[:MATCHING_WINDOW])
             if back is None:
                 break  # what the other run has first never comes in this one
             if not _about_one_instant(pair, (mine[back].time, theirs[0].time), shift):
@@ -97,7 +97,7 @@ def _like(event: EventRecord, others: Sequence[EventRecord]) -> int | None:
 def _about_one_instant(pair: tuple[float, float], other: tuple[float, float], shift: float) -> bool:
     """Whether two events that come in the other order are shifted alike, and not one by much more than all the rest."""
     less, more = sorted(abs(a - b) for a, b in (pair, other))
-    return more <= FARTHER * max(less, shift) + INSTANT_RTOL * max(map(abs, (*pair, *other)))
+    return more <= MAX_SHIFT_RATIO * max(less, shift) + INSTANT_RTOL * max(map(abs, (*pair, *other)))
 
 
 def _ends(run: Trajectory, whole: Trajectory) -> str:

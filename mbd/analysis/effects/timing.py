@@ -15,7 +15,7 @@ __all__ = ["Pair", "Timing", "timed"]
 
 LEAST_ROUNDS, MOST_ROUNDS = 5, 15
 """Times that each run is made; beyond the least only while there is time left."""
-PATIENCE = 8.0
+MAX_TIMING_SECONDS = 8.0
 """Wall time for all rounds [s]."""
 
 Pair = tuple[Callable[[], "Trajectory"], Callable[[], "Trajectory"]]
@@ -47,13 +47,13 @@ def timed(pairs: Sequence[Pair | None], share: Callable[[float], None]) -> list[
     began, rounds = perf_counter(), 0
     while rounds < MOST_ROUNDS:
         spent = perf_counter() - began
-        if rounds >= LEAST_ROUNDS and spent * (rounds + 1) / rounds > PATIENCE:
+        if rounds >= LEAST_ROUNDS and spent * (rounds + 1) / rounds > MAX_TIMING_SECONDS:
             break
         for place, pair in enumerate(pairs):
             for times, run in zip(taken[place], pair or (), strict=False):
                 times.append(_nanoseconds(run))
             done = (rounds + (place + 1) / len(pairs)) / MOST_ROUNDS
-            share(min(1.0, max(done, (perf_counter() - began) / PATIENCE)))
+            share(min(1.0, max(done, (perf_counter() - began) / MAX_TIMING_SECONDS)))
         rounds += 1
     share(1.0)
     return [None if pair is None else _timing(*times) for pair, times in zip(pairs, taken, strict=True)]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Fit", "bounds", "fit"]
 
-ALIKE = 1e-8
+RANK_RTOL = 1e-8
 """Singular value of the scaled derivatives, over the largest, below which the data cannot tell directions apart [-]."""
 MAX_STEPS_OF_SPAN = 20
 """Steps of a search over a part of the time: parameters that it does not tell of would wander on [-]."""
@@ -349,7 +349,7 @@ class _Search:
         scaled = found.jac / np.where(sizes > 0.0, sizes, 1.0)
         _, strengths, directions = np.linalg.svd(scaled)
         strengths = np.pad(strengths, (0, len(directions) - len(strengths)))
-        weak = strengths <= ALIKE * max(strengths[0], 1e-300)
+        weak = strengths <= RANK_RTOL * max(strengths[0], 1e-300)
         groups, unknown = [], np.zeros(len(found.x), dtype=bool)
         for line in directions[weak]:
             members = np.abs(line) > 0.1

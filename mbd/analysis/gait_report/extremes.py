@@ -12,7 +12,7 @@ from mbd.results.interpolation import OneSide
 
 __all__ = ["largest"]
 
-FEWEST = 9
+MIN_SAMPLES = 9
 """Samples of a part between two events at least, and of each refinement [-]."""
 
 
@@ -35,7 +35,7 @@ def largest(
         knots = np.unique([begin, *(time for time in breaks if begin < time < end), end])
         for first, last in pairwise(knots):
             # samples of the whole interval among which the largest is looked for first
-            count = max(FEWEST, int(np.ceil(1001 * (last - first) / (end - begin))))
+            count = max(MIN_SAMPLES, int(np.ceil(1001 * (last - first) / (end - begin))))
             parts.append(np.linspace(first, last, count))
             owners.append(owner)
     # of each interval the part with the largest sample
@@ -43,7 +43,7 @@ def largest(
     for owner, times, found in zip(owners, parts, _sampled(values, parts), strict=True):
         best[owner] = max(best.get(owner, (-np.inf, times[:2])), _around(found, times), key=lambda one: one[0])
     for _ in range(4):  # each four times as finely
-        finer = [np.linspace(float(near[0]), float(near[1]), FEWEST) for _, near in best.values()]
+        finer = [np.linspace(float(near[0]), float(near[1]), MIN_SAMPLES) for _, near in best.values()]
         for owner, times, found in zip(best, finer, _sampled(values, finer), strict=True):
             here, near = _around(found, times)
             best[owner] = max(best[owner][0], here), near

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from mbd.results.impulses import Impulse
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["BOTH", "Measure", "Spent", "energy_of", "measures_of"]
+__all__ = ["NO_SIDE", "Measure", "Spent", "energy_of", "measures_of"]
 
-BOTH = "both"
+NO_SIDE = "both"
 """Of what belongs to no side."""
 
 MIDDLE = (0.25, 0.85)
 """Shares of swing between which clearance is sought: near both ends every foot is close to the ground."""
 
-CANCELS = 1e-3
+CANCELLATION_RTOL = 1e-3
 """Part of what braking and driving come to, below which their sum is none: they cancel [-]."""
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -55,7 +55,9 @@ class Measure:
 
     def cancels(self, sides: Sequence[str]) -> bool:
         """Whether the numbers of these sides are but what is left where their parts cancel."""
-        return sum(abs(self.mean[side]) for side in sides) <= CANCELS * sum(self.gross.get(side, 0.0) for side in sides)
+        return sum(abs(self.mean[side]) for side in sides) <= CANCELLATION_RTOL * sum(
+            self.gross.get(side, 0.0) for side in sides
+        )
 
 
 @dataclass(frozen=True)
@@ -204,10 +206,10 @@ def energy_of(run: Trajectory, sides: Sequence[Side]) -> list[Spent]:
     first, last = (int(row) for row in rows)
     found = [
         Spent(
-            next((side.name for side in sides if of_side(part.name, side.name)), BOTH), part.kind, part.name,
+            next((side.name for side in sides if of_side(part.name, side.name)), NO_SIDE), part.kind, part.name,
             float(part.energy[last] - part.energy[first]) / len(strides),
         )
         for part in run.energy.parts
     ]  # fmt: skip
     numerical = float(run.energy.numerical[last] - run.energy.numerical[first]) / len(strides)
-    return [*found, Spent(BOTH, "numerical", "numerical", numerical)]
+    return [*found, Spent(NO_SIDE, "numerical", "numerical", numerical)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.analysis.gait_report.band import NormativeBand
 from mbd.analysis.gait_report.curves import PERCENT, Curve, curves_of
-from mbd.analysis.gait_report.measures import BOTH, Measure, Spent, energy_of, measures_of
+from mbd.analysis.gait_report.measures import NO_SIDE, Measure, Spent, energy_of, measures_of
 from mbd.analysis.gait_report.strides import Side, sides_of, words_of
 from mbd.analysis.gait_report.symmetry import symmetry_of
 from mbd.bodies.values import names_of, number, printable
@@ -118,7 +118,7 @@ class GaitReport:
         ordered = sorted(keys, key=lambda key: (key[1], order.get(key[0], len(order))))
         return [
             (
-                kind if side == BOTH else f"{kind}, {side}",
+                kind if side == NO_SIDE else f"{kind}, {side}",
                 *(_text(walk.spent().get((side, kind), 0.0) if walk.energies else np.nan) for walk in self.walks),
             )
             for side, kind in ordered

@@ -15,17 +15,27 @@ from mbd.errors import TrajectoryError
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["ALL", "Interval", "Side", "Stride", "base_name", "of_side", "sides_of", "strides_between", "words_of"]
+__all__ = [
+    "SINGLE_SIDE",
+    "Interval",
+    "Side",
+    "Stride",
+    "base_name",
+    "of_side",
+    "sides_of",
+    "strides_between",
+    "words_of",
+]
 
 SHORT = {"left": "l", "right": "r"}
 """Letters that stand for the words of sides in names of other programs."""
 
 Interval = tuple[float, float]
 
-ALL = "all"
+SINGLE_SIDE = "all"
 """The side of a machine whose names have no words of sides: every foot and every joint is of it."""
 
-JUST_STRUCK = 1e-6
+MIN_LOAD_RATIO = 1e-6
 """Share of its largest force below which a foot of a force law has just struck [-]."""
 
 
@@ -67,7 +77,7 @@ def of_side(name: str, side: str) -> bool:
     (True, False, True)
     """
     words = name.replace(".", " ").split()
-    return side == ALL or side in words or any(_is_of(part, side) for word in words for part in _parts(word))
+    return side == SINGLE_SIDE or side in words or any(_is_of(part, side) for word in words for part in _parts(word))
 
 
 def base_name(name: str, side: str) -> str:
@@ -93,9 +103,9 @@ def _is_of(part: str, side: str) -> bool:
 
 
 def words_of(run: Trajectory) -> tuple[str, ...]:
-    """'left' and 'right' where a foot has one of these words, or there is none; `ALL` for a hopper or a wheel."""
+    """'left' and 'right' where a foot has one of these words or there is none, else `SINGLE_SIDE` (hoppers, wheels)."""
     usual, feet = ("left", "right"), _feet(run)
-    return usual if not feet or any(of_side(name, side) for name in feet for side in usual) else (ALL,)
+    return usual if not feet or any(of_side(name, side) for name in feet for side in usual) else (SINGLE_SIDE,)
 
 
 def _feet(run: Trajectory) -> list[str]:
@@ -206,7 +216,7 @@ def _pushes_at_start(run: Trajectory, contacts: Sequence[str]) -> bool:
     """Whether a foot of a force law pushes in the first row, so that it has struck before."""
     own = [each.name for each in run.facts.contacts if each.name in contacts and each.kind == "penalty"]
     forces = [run[f"{name}.force"] for name in own]
-    return any(force[0] > JUST_STRUCK * np.max(force) for force in forces)
+    return any(force[0] > MIN_LOAD_RATIO * np.max(force) for force in forces)
 
 
 def strides_between(

@@ -12,7 +12,7 @@ from mbd.forces.samples import Samples
 
 __all__ = ["Corner", "corner", "curve"]
 
-OUTSIDE = 1.0
+EXTENSION_LENGTH = 1.0
 """Length of the straight pieces in the table before the first and after the last corner, which continue [-]."""
 
 Corner = tuple[Vector, Vector]
@@ -49,9 +49,11 @@ def curve(*corners: Corner) -> Samples:
     xs, ys = np.concatenate(x), np.concatenate(y)
     ends: Any = ((1, before), (1, after))
     inside = CubicSpline(xs, ys, bc_type=ends)
-    first, last_one = [0.0, 0.0, before, ys[0] - OUTSIDE * before], [0.0, 0.0, after, ys[-1]]
+    first, last_one = [0.0, 0.0, before, ys[0] - EXTENSION_LENGTH * before], [0.0, 0.0, after, ys[-1]]
     table = np.concatenate([np.array([first]).T, inside.c, np.array([last_one]).T], axis=1)
-    made: Any = Samples.of(PPoly(table, np.concatenate([[xs[0] - OUTSIDE], xs, [xs[-1] + OUTSIDE]])), "curve")
+    made: Any = Samples.of(
+        PPoly(table, np.concatenate([[xs[0] - EXTENSION_LENGTH], xs, [xs[-1] + EXTENSION_LENGTH]])), "curve"
+    )
     return made  # type: ignore[no-any-return]
 
 

@@ -22,7 +22,7 @@ __all__ = ["WrappingCylinder", "WrappingSphere", "WrappingSurface", "taut"]
 
 MIN_TANGENT = 1e-15
 """Square of the tangent to a surface, in radii, below which a point counts as lying on it: round-off of a² − r² [-]."""
-SWEEPS = 12
+MAX_SWEEPS = 12
 """Corrections of the points between two surfaces; one surface needs none.
 
 They leave 1e-11 of a length between cylinders, and between spheres too where the path stays clear of their middles;
@@ -210,7 +210,7 @@ def taut(scope: Scope, owner: str, first: Triple, last: Triple, over: Sequence[t
 
     1. Every surface is met on the way from the exit of the surface before to the entry of the next one, of which the
        last point is the first guess.
-    2. This is repeated `SWEEPS` times; two circles in a plane converge quadratically, helices by a factor each time.
+    2. This is repeated `MAX_SWEEPS` times; two circles in a plane converge quadratically, helices linearly.
 
     The length is least over these points, so that an error ε of theirs is ε² of it.
 
@@ -221,7 +221,7 @@ def taut(scope: Scope, owner: str, first: Triple, last: Triple, over: Sequence[t
     """
     entries: list[Triple] = [last] * (len(over) + 1)
     length: Scalar = 0.0
-    for _ in range(1 if len(over) == 1 else SWEEPS):
+    for _ in range(1 if len(over) == 1 else MAX_SWEEPS):
         start, length = first, 0.0
         for k, (place, surface) in enumerate(over):
             around = surface.around(scope, f"{owner} point {place + 1}", start, entries[k + 1])

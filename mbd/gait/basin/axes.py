@@ -20,7 +20,7 @@ __all__ = ["Grid", "Study", "grid_of", "study_of"]
 
 Start = Callable[[Mapping[str, Vector]], Mapping[str, Any]]
 """From columns of the axes to columns of coordinates, rates and parameters."""
-MOST = 100_000_000
+MAX_STARTS = 100_000_000
 """Starts of one study at most."""
 
 
@@ -86,8 +86,8 @@ def grid_of(axes: Any) -> Grid:
             values |= {name: table[:, k] for k, name in enumerate(names)}
     counts = Counter(name for names in dimensions for name in names)
     faults += [f"axes: {name!r} is given twice" for name, count in counts.items() if count > 1]
-    if not faults and np.prod([float(size) for size in shape]) > MOST:
-        faults.append(f"axes give more than {MOST:g} starts; give fewer values, and study them part by part")
+    if not faults and np.prod([float(size) for size in shape]) > MAX_STARTS:
+        faults.append(f"axes give more than {MAX_STARTS:g} starts; give fewer values, and study them part by part")
     if faults:
         raise ModelError(faults)
     return Grid(tuple(dimensions), values, tuple(shape))

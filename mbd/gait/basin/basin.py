@@ -26,7 +26,7 @@ from mbd.simulation.batch.batch import worker_count
 
 __all__ = ["basin"]
 
-BLOCK = 8192
+BLOCK_SIZE = 8192
 """Starts that are decided together, and written to a file together."""
 
 
@@ -144,7 +144,9 @@ def _head(made: Made, grid: Grid, steps: int) -> dict[str, Any]:
     """What makes a study another one."""
     map_ = made.map
     everything = (
-        np.arange(len(grid)) if len(grid) <= BLOCK else np.unique(np.linspace(0, len(grid) - 1, BLOCK).astype(int))
+        np.arange(len(grid))
+        if len(grid) <= BLOCK_SIZE
+        else np.unique(np.linspace(0, len(grid) - 1, BLOCK_SIZE).astype(int))
     )
     state, columns = made.study.columns(everything)
     return {
@@ -165,8 +167,8 @@ def _decided(made: Made, steps: int, store: Store | None, bar: Any) -> tuple[Dec
     found = Decided.of(total)
     complete = True
     try:
-        for first in range(0, total, BLOCK):
-            last = min(first + BLOCK, total)
+        for first in range(0, total, BLOCK_SIZE):
+            last = min(first + BLOCK_SIZE, total)
             block = None if store is None else store.block(first, last - first)
             if block is None:
                 block = made.block(np.arange(first, last), steps)

@@ -26,19 +26,19 @@ from mbd.state import State
 
 __all__ = ["Made"]
 
-MOST_GAITS = 1000
+MAX_GAITS = 1000
 """Sets of parameters at most, at each of which the gait is looked for."""
 
 
-AT_ONCE = 1 << 16
+CHUNK = 1 << 16
 """Starts whose parameters are looked at together [-]."""
-SPREAD = 257
+SAMPLED_STARTS = 257
 """Starts by whose parameters the mechanism is made [-]."""
 
 
 def _spread(count: int) -> Any:
     """Numbers of some starts from the first to the last."""
-    return np.unique(np.linspace(0, count - 1, min(count, SPREAD)).astype(int))
+    return np.unique(np.linspace(0, count - 1, min(count, SAMPLED_STARTS)).astype(int))
 
 
 @dataclass(eq=False)
@@ -61,7 +61,7 @@ class Made:
             first.chart.section,
         )
         columns = self.study.columns(_spread(len(self.study.grid)))
-        kinds, _ = kinds_of_parameters(self.map, self.base, columns[1], SPREAD)
+        kinds, _ = kinds_of_parameters(self.map, self.base, columns[1], SAMPLED_STARTS)
         plain = [self.map.plain(values) for values in kinds]
         self.plain = {name: np.array([values[name] for values in plain]) for name in plain[0]}
         options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": REST_SPEED,
@@ -138,14 +138,14 @@ class Made:
         """The different sets of parameters of the study."""
         found: dict[tuple[float, ...], dict[str, float]] = {}
         total = len(self.study.grid)
-        for first in range(0, total, AT_ONCE):
-            runs = np.arange(first, min(first + AT_ONCE, total))
+        for first in range(0, total, CHUNK):
+            runs = np.arange(first, min(first + CHUNK, total))
             _, columns = self.study.columns(runs)
             for values in kinds_of_parameters(self.map, self.base, columns, len(runs))[0]:
                 found[tuple(values.values())] = values
-            if len(found) > MOST_GAITS:
+            if len(found) > MAX_GAITS:
                 raise ModelError(
-                    f"axes give more than {MOST_GAITS} sets of parameters, at each of which the gait is looked for; "
+                    f"axes give more than {MAX_GAITS} sets of parameters, at each of which the gait is looked for; "
                     "give fewer values, and study them part by part"
                 )
             if not columns:

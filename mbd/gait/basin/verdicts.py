@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.analysis.ending import FALLEN
+from mbd.analysis.ending import FALLEN_HEIGHT_RATIO
 from mbd.arrays import Matrix, Vector
 from mbd.compile.python import array_function
 from mbd.equal import INSTANT_RTOL
@@ -19,11 +19,11 @@ from mbd.simulation.batch.changes import Changes
 from mbd.simulation.batch.runner import Runner
 from mbd.simulation.many_runs import Ends
 
-__all__ = ["ARRIVES", "Verdicts"]
+__all__ = ["STILL_WALKING", "Verdicts"]
 
-ARRIVES = -1
+STILL_WALKING = -1
 """In place of a kind: the walk goes on."""
-AT_REST = 1e-3
+REST_SPEED_RATIO = 1e-3
 """Largest rate at the end over the largest at the start below which a walker stands [-]."""
 Numbers = NDArray[np.int64]
 
@@ -50,7 +50,7 @@ class Verdicts:
         self._points = _Points(map_)
 
     def kinds(self, lines: Matrix, ends: Ends, changes: Changes) -> Numbers:
-        """The kind of each end (N,), ARRIVES where the walk is on the section."""
+        """The kind of each end (N,), STILL_WALKING where the walk is on the section."""
         status, found = ends.status, np.full(len(ends.status), NUMBER["numerical error"])
         found[status == codes.CHATTER] = NUMBER["chatters"]
         found[status == codes.DOUBTFUL_START] = NUMBER["not on the section"]
@@ -58,7 +58,7 @@ class Verdicts:
         event = status == codes.EVENT
         here = event & (ends.stopped_by == self.section)
         found[event & ~here] = NUMBER["other event"]
-        found[here] = ARRIVES
+        found[here] = STILL_WALKING
         at_once = here & (ends.time <= INSTANT_RTOL * self.map.longest)
         found[at_once | (here & self._scuffs(lines, ends, changes))] = NUMBER["scuffs"]
         self._contacts(found, lines, ends)
@@ -85,7 +85,7 @@ class Verdicts:
             now = now[:, [self.contacts.index(mirror.name(name)) for name in self.contacts]]
         off = (now != begun) & self._counting
         missing = (off & (begun > now)).any(axis=1) & (self.section in self.feet)
-        here = found == ARRIVES
+        here = found == STILL_WALKING
         found[here & off.any(axis=1)] = NUMBER["wrong contacts"]
         found[here & missing] = NUMBER["scuffs"]
 
@@ -117,7 +117,7 @@ class Verdicts:
         v = self.runner.run.kernel
         rates = (part[:, 1 + v.n_q : 1 + v.n_q + v.n_v] for part in (lines, ends.row))
         before, after = (np.max(np.abs(each), axis=1, initial=0.0) for each in rates)
-        found[(found == NUMBER["misses"]) & (after <= AT_REST * before)] = NUMBER["stands"]
+        found[(found == NUMBER["misses"]) & (after <= REST_SPEED_RATIO * before)] = NUMBER["stands"]
 
     def _falls(self, found: Numbers, lines: Matrix, ends: Ends, changes: Changes) -> None:
         """Events named a fall, and walkers that are down; the side by where the highest point went first."""
@@ -204,7 +204,7 @@ class _Points:
         over = (np.einsum("nk,nk->n", was[each, top] - foot, up), np.einsum("nk,nk->n", now[each, top] - foot, up))
         ahead, lean = _level(soon[each, top] - was[each, top], up), _level(now[each, top] - foot, up)
         side = np.where(known, np.sign(np.sum(ahead * lean, axis=1)), 0.0).astype(np.int64)
-        return known & (over[1] < FALLEN * over[0]), side
+        return known & (over[1] < FALLEN_HEIGHT_RATIO * over[0]), side
 
     def _rates(self, inputs: dict[str, Matrix]) -> Matrix:
         """q̇."""

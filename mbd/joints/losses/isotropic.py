@@ -10,9 +10,9 @@ from mbd.joints.losses.viscous import Viscous
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["LEAST_SQUARE", "isotropic"]
+__all__ = ["MIN_SQUARED_SPEED", "isotropic"]
 
-LEAST_SQUARE = 1e-60
+MIN_SQUARED_SPEED = 1e-60
 """Square of a speed that is none, beside which a direction is defined [m²/s², rad²/s²]."""
 
 
@@ -23,7 +23,7 @@ def isotropic(loss: Loss, velocity: Sequence[Scalar], scope: Scope, owner: str) 
         return [_sum(forces) for forces in zip(*parts, strict=True)]
     if len(velocity) == 1 or isinstance(loss, Viscous):
         return [loss.force(rate, scope, owner) for rate in velocity]
-    size: Scalar = sqrt(_sum([LEAST_SQUARE, *(rate * rate for rate in velocity)]))
+    size: Scalar = sqrt(_sum([MIN_SQUARED_SPEED, *(rate * rate for rate in velocity)]))
     share = loss.force(size, scope, owner) / size
     return [share * rate for rate in velocity]
 

@@ -49,7 +49,7 @@ MOTIONS: dict[str, tuple[tuple[str, tuple[float, float, float]], ...]] = {
 """What each coordinate of a joint does, in the order of the coordinates."""
 ORDER = ("translation1", "translation2", "translation3", "rotation1", "rotation2", "rotation3")
 """Motions one after another: shifts along axes of the parent, then turns about axes that move along."""
-UNIT = 1e-3
+UNIT_LENGTH_ATOL = 1e-3
 """By how much the length of an axis may differ from 1, as printed digits make it [-]."""
 
 
@@ -182,7 +182,7 @@ def _custom(file: OsimFile, joint: OsimJoint) -> list[Motion]:
         size = float(np.linalg.norm(axis))
         if size == 0.0:
             raise element.wrong(f"of joint {joint.name!r} needs an axis, got one without a direction")
-        if abs(size - 1.0) > UNIT:
+        if abs(size - 1.0) > UNIT_LENGTH_ATOL:
             file.report.approximated.append(f"axis of {what} has the length {size:.3g}; only its direction is used")
         x, y, z = map(float, axis / size)
         motion.axis = (x, y, z)

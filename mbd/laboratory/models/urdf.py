@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix
-from mbd.assembly.doubtful import WIDE
+from mbd.assembly.doubtful import MAX_PLAUSIBLE_ANGLE
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.rigid_body import RigidBody
 from mbd.constraints.base import Constraint
@@ -248,14 +248,14 @@ def _stops(each: Element, joint: Joint, report: ImportReport) -> list[Constraint
 
 
 def _limits_in_degrees(links: list[Element], file: Any) -> list[str]:
-    """A sentence on limits of angles that are whole numbers beyond `WIDE`, as degrees are."""
+    """A sentence on limits of angles that are whole numbers beyond `MAX_PLAUSIBLE_ANGLE`, as degrees are."""
     limits = [(_plain(each.get("name")), each.find("limit")) for each in links if each.get("type") == "revolute"]
     both = ("lower", "upper")
     ends = {name: [limit.numbers(key, 1, (0.0,))[0] for key in both] for name, limit in limits if limit is not None}
     wide = {
         name: max(pair, key=abs)
         for name, pair in ends.items()
-        if WIDE < max(map(abs, pair)) <= 360.0 and all(end.is_integer() for end in pair)
+        if MAX_PLAUSIBLE_ANGLE < max(map(abs, pair)) <= 360.0 and all(end.is_integer() for end in pair)
     }
     if not wide:
         return []

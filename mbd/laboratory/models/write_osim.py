@@ -32,7 +32,7 @@ __all__ = ["osim_of"]
 
 KINDS = {"de groote": "DeGrooteFregly2016Muscle", "millard": "Millard2012EquilibriumMuscle"}
 """Names of muscles by their curves."""
-LONG = 1.0
+CYLINDER_LENGTH = 1.0
 """Length of a cylinder, which has no ends here [m]."""
 PLAIN = {ord(mark): "_" for mark in ' ./\\:*?"<>|'}
 """What OpenSim does not allow in names becomes an underscore."""
@@ -211,7 +211,7 @@ def _surface(surface: WrappingSurface, name: str, radius: float, values: dict[st
     place, R = place_of(surface.frame, values)
     side, more = "all", ""
     if isinstance(surface, WrappingCylinder):
-        more = f"<length>{_text(LONG)}</length>"
+        more = f"<length>{_text(CYLINDER_LENGTH)}</length>"
         if surface.side is not None:
             x, y, _ = surface.side
             side, R = "x", R @ np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])

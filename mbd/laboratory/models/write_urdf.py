@@ -35,7 +35,7 @@ __all__ = ["urdf_of"]
 UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Axes of the file, whose z is up, in those of the ground, whose y is."""
 X, Y, Z = np.eye(3)
-LARGEST = 1e9
+NO_LIMIT = 1e9
 """Effort and velocity of joints without a limit of them, which the format wants [N m, rad/s]."""
 
 Step = tuple[str, Vector, str]
@@ -130,10 +130,10 @@ def _limits(model: Any, tree: list[WrittenJoint]) -> tuple[dict[str, tuple[float
     for name, measure in stops_of(model, tree):
         joint, names = measure.joint.name, {*names, name}
         if measure.sign > 0.0:
-            low[joint] = max(measure.offset, low.get(joint, -LARGEST))
+            low[joint] = max(measure.offset, low.get(joint, -NO_LIMIT))
         else:
-            high[joint] = min(-measure.offset, high.get(joint, LARGEST))
-    whole = {name: (low.get(name, -LARGEST), high.get(name, LARGEST)) for name in {*low, *high}}
+            high[joint] = min(-measure.offset, high.get(joint, NO_LIMIT))
+    whole = {name: (low.get(name, -NO_LIMIT), high.get(name, NO_LIMIT)) for name in {*low, *high}}
     return whole, names
 
 
@@ -219,7 +219,7 @@ def _joint(
         if damping or friction:
             parts.append(f'<dynamics damping="{_text(damping)}" friction="{_text(friction)}"/>')
         if kind != "continuous":
-            low, high = (-LARGEST, LARGEST) if limit is None else limit
+            low, high = (-NO_LIMIT, NO_LIMIT) if limit is None else limit
             ends = f'lower="{_text(low)}" upper="{_text(high)}"'
-            parts.append(f'<limit {ends} effort="{LARGEST:g}" velocity="{LARGEST:g}"/>')
+            parts.append(f'<limit {ends} effort="{NO_LIMIT:g}" velocity="{NO_LIMIT:g}"/>')
     return f'  <joint name={quoteattr(name)} type="{kind}">{"".join(parts)}</joint>'

@@ -15,7 +15,7 @@ __all__ = ["Element", "read_xml"]
 
 DEEPEST, MOST = 200, 500_000
 """Nested elements, and elements in all, of a file that is read."""
-LARGEST = 200_000_000
+MAX_BYTES = 200_000_000
 """Size of a file that is read [bytes]."""
 
 
@@ -88,8 +88,8 @@ def read_xml(path: Path, repaired: list[str] | None = None) -> Element:
         for what is no XML, declares entities or a document type, is nested too deep or too large, with the line.
     """
     try:
-        if path.stat().st_size > LARGEST:
-            raise ModelError(f"{path.name} is larger than {LARGEST / 1e6:.0f} MB")
+        if path.stat().st_size > MAX_BYTES:
+            raise ModelError(f"{path.name} is larger than {MAX_BYTES / 1e6:.0f} MB")
         data = path.read_bytes()
     except OSError as error:
         raise ModelError(f"'{path}' cannot be read: {error.strerror or error}") from None

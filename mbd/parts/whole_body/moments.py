@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from mbd.forces.potential import Potential
-from mbd.joints.base import AWAITED, Joint
+from mbd.joints.base import AWAITED_ATTRIBUTE, Joint
 from mbd.joints.revolute import Revolute
 from mbd.joints.spherical import Spherical
 from mbd.joints.universal import Universal
@@ -34,7 +34,7 @@ def await_passive_moments(joints: Iterable[Joint]) -> None:
     """
     resisting = list(filter(_resists, joints))
     for joint in resisting:
-        object.__setattr__(joint, AWAITED, tuple(map(_name, resisting)))
+        object.__setattr__(joint, AWAITED_ATTRIBUTE, tuple(map(_name, resisting)))
 
 
 def _resists(joint: Joint) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.given_state import LARGEST_ANGLE
+from mbd.assembly.given_state import MAX_ANGLE
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import array_function
 from mbd.dataclass import dataclass
@@ -79,7 +79,7 @@ def needs_judgement(
     """
     doubtful = found.status >= codes.DOUBTFUL_START
     whole = ~doubtful & (found.status <= codes.LAST)
-    doubtful |= whole & ~(np.max(np.abs(ends["q"]), axis=1, initial=0.0) <= LARGEST_ANGLE)
+    doubtful |= whole & ~(np.max(np.abs(ends["q"]), axis=1, initial=0.0) <= MAX_ANGLE)
     equations = mechanism.equations
     if equations.facings:
         with equations.tape.lock:

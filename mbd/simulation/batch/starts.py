@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.given_state import LARGEST_ANGLE, fits
+from mbd.assembly.given_state import MAX_ANGLE, fits
 from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.dataclass import dataclass
@@ -170,7 +170,7 @@ def starts_of(
         raise UnknownNameError([f"starts: {each}" for each in wrong])
     raise_for_turning("starts", columns, mechanism, "give a list of states")
     for name, column in columns.items():
-        if np.max(np.abs(column), initial=0.0) > LARGEST_ANGLE:
-            raise ModelError(f"starts: {name!r} has values beyond {LARGEST_ANGLE:g}; take whole turns away")
+        if np.max(np.abs(column), initial=0.0) > MAX_ANGLE:
+            raise ModelError(f"starts: {name!r} has values beyond {MAX_ANGLE:g}; take whole turns away")
     whole = {name: np.broadcast_to(column, count) for name, column in columns.items()}
     return Starts(base, states, whole, count)

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mbd.assembly.doubtful import WIDE, degrees
+from mbd.assembly.doubtful import MAX_PLAUSIBLE_ANGLE, degrees
 from mbd.equations.equations import Contact
 from mbd.forces.muscles import Muscle
 from mbd.kernel.codes import PULL
@@ -102,7 +102,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
     equations = run.mechanism.equations
     notes = [*_doubts(run)]
-    if np.max(np.abs(run.start.q), initial=0.0) >= WIDE:
+    if np.max(np.abs(run.start.q), initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
         notes = degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))) + notes
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)

@@ -19,7 +19,7 @@ from mbd.equal import INSTANT_RTOL
 from mbd.results.dense import Restepping
 from mbd.results.driving import drives_of, share
 from mbd.results.matching import Matches, apart, matched
-from mbd.results.osculating import DOUBT, osculating
+from mbd.results.osculating import MAX_ERROR_RATIO, osculating
 from mbd.results.polynomials import Places, quintic
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ def _difference(run: Trajectory, other: Trajectory, rows: Vector, middles: Vecto
 
 def _doubt(places: Places, record: Record, q: Matrix) -> Vector:
     """How far the worst coordinate of quintic polynomials may be off (k,) [m, rad]."""
-    return np.asarray(DOUBT * np.max(np.abs(q - places.blend(record.q, record.v)), axis=1, initial=0.0))
+    return np.asarray(MAX_ERROR_RATIO * np.max(np.abs(q - places.blend(record.q, record.v)), axis=1, initial=0.0))
 
 
 def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[Matrix, NDArray[np.bool_]]:
