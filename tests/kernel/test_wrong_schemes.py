@@ -163,7 +163,7 @@ def test_more_coefficients_than_memory_are_refused(listed):
 def test_a_step_breaks_the_law_that_it_should(listed, step, law, monkeypatch):
     listed(step=step)
     findings, run = Findings("wrong"), kit.Scene.run
-    monkeypatch.setattr(kit, "MORE", 0)
+    monkeypatch.setattr(kit, "MORE_HALVINGS", 0)
     monkeypatch.setattr(kit.Scene, "run", lambda *given, **how: run(*given, **how, backend="python"))
     monkeypatch.setattr(
         kit.Scene, "reference", lambda scene, high: run(scene, mbd.RungeKutta853(), dt=0.05, backend="python")

@@ -287,8 +287,8 @@ def test_a_planar_page_has_none_of_it(tmp_path):
 def test_a_long_run_leaves_out_pictures_that_others_show_and_says_so(tmp_path, monkeypatch):
     full = 401
     monkeypatch.setattr(pages, "LEAST", 30)
-    monkeypatch.setattr(pages, "RATE", 1600.0)
-    monkeypatch.setattr(pages, "LARGEST", 100_000)
+    monkeypatch.setattr(pages, "MAX_FRAME_RATE", 1600.0)
+    monkeypatch.setattr(pages, "MAX_CHARACTERS", 100_000)
     text, data = page(pendulum(), tmp_path)
     assert len(text) <= 100_000 and 30 <= len(data["time"]) < full
     assert data["facts"][-1][0] == "pictures" and data["facts"][-1][1].startswith(f"{len(data['time'])} of {full}; ")
