@@ -31,7 +31,7 @@ def quick():
     """A coarse reference is enough for small scenes; nothing is timed twice."""
     patch = pytest.MonkeyPatch()
     for place, name, value in ((choices, "LEAST_ROWS", 150), (choices, "MOST_ROWS", 300), (points, "REPEATS", 1),
-                               (lab, "PATIENCE", 0.0)):  # fmt: skip
+                               (lab, "MAX_TIMING_SECONDS", 0.0)):  # fmt: skip
         patch.setattr(place, name, value)
     yield
     patch.undo()

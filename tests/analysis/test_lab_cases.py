@@ -31,7 +31,7 @@ def quick():
     """Small scenes need few rows of the reference; nothing is timed twice."""
     patch = pytest.MonkeyPatch()
     for place, name, value in ((choices, "LEAST_ROWS", 150), (choices, "MOST_ROWS", 300), (points, "REPEATS", 1),
-                               (laboratory, "PATIENCE", 0.0)):  # fmt: skip
+                               (laboratory, "MAX_TIMING_SECONDS", 0.0)):  # fmt: skip
         patch.setattr(place, name, value)
     yield
     patch.undo()

@@ -27,7 +27,7 @@ def quick():
     patch = pytest.MonkeyPatch()
     for place, name, value in (
         (choices, "LEAST_ROWS", 150), (choices, "MOST_ROWS", 300), (points, "REPEATS", 1),
-        (accuracy_lab, "PATIENCE", 0.0), (timing, "LEAST_ROUNDS", 2), (timing, "MOST_ROUNDS", 2),
+        (accuracy_lab, "MAX_TIMING_SECONDS", 0.0), (timing, "LEAST_ROUNDS", 2), (timing, "MOST_ROUNDS", 2),
         (lab, "STEPS", (50, 50)),
     ):  # fmt: skip
         patch.setattr(place, name, value)
