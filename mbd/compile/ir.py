@@ -20,7 +20,8 @@ SIZE = 2500
 """Lines of text after which a piece is full: some 1000 operations, with what goes in and out of their functions."""
 
 LIBRARY = (
-    "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fmod", "log", "memset", "pow", "sin", "sinh", "tan", "tanh",
+    "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fmod", "free", "log", "malloc", "memset", "pow", "sin",
+    "sinh", "tan", "tanh",
 )  # fmt: skip
 """Functions of the C library that the code may call, by their C names."""
 

@@ -14,18 +14,21 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.backend import Backend, Function, Functions, backend as choose_backend
 from mbd.compile.cache import key_of
+from mbd.compile.composed import Composed, Shape, Term
 from mbd.compile.energies import Energies
 from mbd.compile.layout import Layout
-from mbd.compile.orders import Filled, elimination_order, may_pay
+from mbd.compile.orders import Filled, elimination_order, is_unit, may_pay, pattern
 from mbd.compile.postponed import Postponed
 from mbd.compile.remembered import Facts, Remembered
 from mbd.dataclass import dataclass
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
+from mbd.equations.composition import Part, composes, own_program
 from mbd.equations.equations import Equations
 from mbd.equations.explicit_solution import explicit_solution
 from mbd.equations.sizes import require_room_for_tangent, tangent_refused
 from mbd.errors import MemoryLimitError, ModelError, UnknownNameError, nearest
+from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
 __all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
@@ -107,6 +110,8 @@ class Mechanism:
         self.postponed: list[Postponed] = []
         self.without_effect: frozenset[str] = frozenset()
         self._modes: dict[tuple[Any, ...], ModeCode] = {}
+        self._parts_of_modes: dict[tuple[Part, bool], tuple[Facts, dict[str, Term]]] = {}
+        self._drawn: dict[str, Sequence[Node]] = {}
         self._has_free_rates: bool | None = None
         equations.memory["mechanism"] = ref(self)
         self.seconds = perf_counter() - started
@@ -145,6 +150,10 @@ class Mechanism:
         return programs.accelerations(self.equations)
 
     @cached_property
+    def _composes(self) -> bool:
+        return composes(self.equations)
+
+    @cached_property
     def _filled(self) -> Filled:
         return Filled.of(self._accelerations, self.layout.n, self.layout.n_rows)
 
@@ -177,12 +186,14 @@ class Mechanism:
         """
         key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(given_rows), stabilized)
         with self.equations.tape.lock:  # runs in other threads share this mechanism
-            if key not in self._modes:
+            if key not in self._modes and self._composes:
+                self._modes[key] = self._composed(key)
+            elif key not in self._modes:
 
                 def make() -> Made:
                     require_room_for_tangent(len(self.equations.tape.nodes))
                     outputs = self._of(key, programs.newton)
-                    order = self._order(outputs, key[0])
+                    order = self._order(pattern(outputs, self.layout.n + len(key[0])), key[0])
                     return {"tangent": outputs, "residual": self._of(key, programs.residual)}, {"order": order}
 
                 facts, (tangent, residual) = self._add("mode", key, ("tangent", "residual"), make)
@@ -190,6 +201,69 @@ class Mechanism:
                     key[0], key[1], key[2], tangent, residual, given_rows=key[3], order=_numbers(facts["order"])
                 )
             return self._modes[key]
+
+    def _composed(self, mode: Any) -> ModeCode:
+        """A mode of parts, each of which is made the first time that a mode needs it."""
+        *kinds, stabilized = mode
+        parts = [self._part(part, stabilized) for part in Part.of_mode(self.equations, *kinds)]
+        rows, n = tuple(sorted(mode[0])), self.layout.n
+        found = []
+        for name in ("tangent", "residual"):
+            shape = Shape(n, self.layout.n_v, rows, stabilized, name == "tangent")
+            terms = [functions[name]._replace(places=shape.places(facts[name])) for facts, functions in parts]
+            found.append(Composed(name, terms, shape.size))
+        size = n + len(rows)
+        shape = Shape(n, self.layout.n_v, rows, stabilized, True)
+
+        def make() -> Made:
+            entries: dict[tuple[int, int], bool] = {}
+            for facts, _ in parts:
+                for place, is_number in zip(
+                    shape.places(facts["tangent"]).tolist(), facts["units of tangent"], strict=True
+                ):
+                    if place < size * size:
+                        at = divmod(place, size)
+                        entries[at] = is_number and at not in entries
+            return {}, {"order": self._order(entries, rows)}
+
+        facts = self._compiled(("order", mode), make)
+        tangent, residual = found
+        order = _numbers(facts["order"])
+        return ModeCode(mode[0], mode[1], mode[2], tangent, residual, given_rows=mode[3], order=order)
+
+    def _part(self, part: Part, stabilized: bool) -> tuple[Facts, dict[str, Term]]:
+        """Where the outputs of a part of a mode go, and its functions; the same one for all contacts of a kind."""
+        key = (part, stabilized)
+        if key in self._parts_of_modes:
+            return self._parts_of_modes[key]
+
+        def make() -> Made:
+            require_room_for_tangent(len(self.equations.tape.nodes))
+            facts: dict[str, Any] = {}
+            for name, made in (("tangent", part.newton), ("residual", part.residual)):
+                found = made(self.equations, stabilized)
+                outputs, inputs = [node for _, node in found], list[tuple[str, int]]()
+                facts[name], facts[f"units of {name}"] = [at for at, _ in found], [is_unit(node) for node in outputs]
+                if part.contact >= 0 and not any(node.op == "table" for node in live(outputs)):
+                    outputs, inputs = own_program(outputs)
+                tape = outputs[0].tape if outputs else self.equations.tape
+                known = (tuple(tape.keys()), [node.index for node in outputs]) if inputs else key
+                facts[f"program of {name}"] = called = f"{name}_{key_of(repr(known))[:16]}"
+                facts[f"inputs of {name}"] = [
+                    [self.layout.place(kind, i) for kind, i in inputs if kind != "p"],
+                    [i for kind, i in inputs if kind == "p"],
+                ]
+                self._drawn[called] = outputs
+            return {}, facts
+
+        facts, functions = self._compiled(("part", key), make), {}
+        for name in ("tangent", "residual"):
+            called, (block, parameters) = facts[f"program of {name}"], facts[f"inputs of {name}"]
+            if called not in self.common:
+                self._compiled(called, lambda called=called: ({called: self._drawn[called]}, {}))  # type: ignore[misc]
+            functions[name] = Term(self.common[called], _places([]), _places(block), _places(parameters))
+        self._parts_of_modes[key] = facts, functions
+        return self._parts_of_modes[key]
 
     def stepping(
         self,
@@ -235,7 +309,7 @@ class Mechanism:
                     order = None
                     pays = may_pay(self._filled, n, sorted(rows))
                     if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
-                        order = self._order(self._of(mode, programs.newton), rows)
+                        order = self._order(pattern(self._of(mode, programs.newton), n + m), rows)
                     found = None
                     if order is None and not given_rows:
                         found = explicit_solution(self.equations, self._accelerations, sorted(rows))
@@ -293,7 +367,7 @@ class Mechanism:
         self.postponed.append(later)
         return later
 
-    def _order(self, tangent: Sequence[Node], rows: Sequence[int]) -> list[int] | None:
+    def _order(self, tangent: Mapping[tuple[int, int], bool], rows: Sequence[int]) -> list[int] | None:
         """The order in which the matrices of these rows are eliminated, None where it does not pay."""
         n, n_rows = self.layout.n, self.layout.n_rows
         found = elimination_order(tangent, self._accelerations, self._filled, n, n_rows, sorted(rows))
@@ -468,6 +542,10 @@ class Mechanism:
             "chart_end": 3 * layout.n_v,
             "chart_motion": 2 * layout.n_v,
         }
+
+
+def _places(numbers: Sequence[int]) -> Any:
+    return np.array(numbers, dtype=np.int64)
 
 
 def _numbers(order: Sequence[int] | None) -> Any:

@@ -15,7 +15,7 @@ Z, Z, Z               where its value is: in the tangent; in the program `accele
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from mbd.dataclass import dataclass
 from mbd.tape.node import Node
 from mbd.tape.ordering import Order, order
 
-__all__ = ["FEWER", "SMALLEST", "Filled", "elimination_order", "flat_order", "may_pay"]
+__all__ = ["FEWER", "SMALLEST", "Filled", "elimination_order", "flat_order", "is_unit", "may_pay", "pattern"]
 
 SMALLEST = 21
 """Unknowns from which on an order is looked for: below, loops over dense rows take no longer [-]."""
@@ -39,25 +39,42 @@ def may_pay(filled: Filled, n: int, rows: Sequence[int]) -> bool:
 
 
 def elimination_order(
-    tangent: Sequence[Node], accelerations: Sequence[Node], filled: Filled, n: int, n_rows: int, rows: Sequence[int]
+    tangent: Mapping[tuple[int, int], bool],
+    accelerations: Sequence[Node],
+    filled: Filled,
+    n: int,
+    n_rows: int,
+    rows: Sequence[int],
 ) -> Any | None:
-    """The order for the outputs of `programs.newton` and `programs.accelerations`, None where it does not pay."""
+    """The order for the outputs of `programs.newton` and `programs.accelerations`, None where it does not pay.
+
+    tangent : places of what is not zero in K, and whether that is a number of about one
+    """
     size = n + len(rows)
     if not may_pay(filled, n, rows):
         return None
-    places = {divmod(k, size) for k, node in enumerate(tangent[: size * size]) if not node.is_zero}
-    places |= filled.places(n, rows)
-    numbers = set[tuple[int, int]]()
-    for i, j in places:
-        there = [tangent[i * size + j], *(accelerations[k] for k in _both(i, j, n, n_rows, rows) if k >= 0)]
-        if all(node.is_constant and 0.1 < abs(node.data) < 10.0 for node in there):
-            numbers.add((i, j))
+    places = tangent.keys() | filled.places(n, rows)
+    numbers = {
+        (i, j)
+        for (i, j), known in tangent.items()
+        if known and all(is_unit(accelerations[k]) for k in _both(i, j, n, n_rows, rows) if k >= 0)
+    }
     if 4 * len(places) > size * size:
         return None
     found = order(places, numbers, n, size)
     if found is None or FEWER * found.operations > size**3 / 3.0:
         return None
     return flat_order(found, n, n_rows, rows)
+
+
+def pattern(tangent: Sequence[Node], size: int) -> dict[tuple[int, int], bool]:
+    """What `elimination_order` asks of a matrix of nodes."""
+    return {divmod(k, size): is_unit(node) for k, node in enumerate(tangent[: size * size]) if not node.is_zero}
+
+
+def is_unit(node: Node) -> bool:
+    """Whether an entry is a number of about one, which is a pivot whatever happens."""
+    return node.is_constant and 0.1 < abs(node.data) < 10.0
 
 
 @dataclass(frozen=True)

@@ -264,6 +264,17 @@ class TreeGeometry:
         work = self.work + self._viewed(values, multipliers, rates, forces)
         return [*self.dynamics.balance(work), *self.rests]
 
+    def forces(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> list[Node]:
+        """What `balance_with` adds to the balance."""
+        pushed = self.dynamics.generalized(self._viewed(values, multipliers, rates, forces))
+        return [*pushed, *([self.scope.tape.zero] * len(self.rests))]
+
     def tangent(
         self,
         values: Sequence[Node],

@@ -355,6 +355,15 @@ class Geometry(Protocol):
         The values depend on t and q ⊕ x only, the rates on v too.
         """
 
+    def forces(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> list[Node]:
+        """What `balance_with` adds to the balance."""
+
     def mass_matrix(self) -> list[list[Node]] | None:
         """M = ∂r/∂a, line by line; None where more than inertia depends on accelerations."""
 

@@ -89,11 +89,10 @@ class Inputs:
         found: list[Mapping[Node, Node]] = []
         for j in range(len(self.x)):
             sums: dict[Node, Node] = {}
-            for line, slopes in zip(self.chart.velocities, known, strict=True):
-                if not line[j].is_zero:
-                    for node, slope in slopes.items():
-                        part = line[j] * slope
-                        sums[node] = sums[node] + part if node in sums else part
+            for i, entry in self.turning[j]:
+                for node, slope in known[i].items():
+                    part = entry * slope
+                    sums[node] = sums[node] + part if node in sums else part
             found.append(sums)
         return found
 

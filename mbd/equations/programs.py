@@ -31,7 +31,7 @@ from mbd.equations.cones import cosine, sliding_force
 from mbd.equations.equations import Contact, Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.magnitudes import magnitudes
-from mbd.equations.tangents import Forces, tangent
+from mbd.equations.tangents import Columns, Forces, seeded, tangent
 from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
 from mbd.tape.elimination import factors
 from mbd.tape.node import Node, Scalar
@@ -39,7 +39,7 @@ from mbd.tape.node import Node, Scalar
 __all__ = [
     "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "constraint_terms", "correction",
     "follows_multipliers", "free_rates", "guard_terms", "guards", "increment_rates", "is_judged", "law_forces",
-    "loaded_balance", "mass_matrix", "newton", "residual", "row_forces", "scales", "switched_balance",
+    "loaded_balance", "mass_matrix", "newton", "residual", "row_forces", "scales", "switched_balance", "system",
 ]  # fmt: skip
 
 
@@ -59,7 +59,7 @@ def newton(
     ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized, and rows on velocities in both); the columns of
     first-order states are zero in B̃.
     """
-    matrix, tail = _system(equations, sorted(rows), penalties, stabilized, sliding, given_rows)
+    matrix, tail = _whole(equations, *system(equations, sorted(rows), penalties, stabilized, sliding, given_rows))
     return [entry for line in matrix for entry in line] + tail
 
 
@@ -94,7 +94,7 @@ def correction(
     n, n_v, m = inputs.n, equations.n_v, len(rows)
     if not 0 < n + m <= LARGEST:
         return None
-    matrix, tail = _system(equations, rows, penalties, stabilized, sliding)
+    matrix, tail = _whole(equations, *system(equations, rows, penalties, stabilized, sliding))
     inertia = substitute([matrix[k][k] for k in range(n)], {inputs.c[0]: 0.0, inputs.c[1]: 0.0})
     # beyond so many operations making the code takes longer than it is likely to save
     found = factors(matrix, n, 1000, {k for k in range(n) if inertia[k].is_zero})
@@ -123,17 +123,22 @@ def correction(
     return Correction([*out, *kept], again.solve([tape.input("held", place + k) for k in range(n + m)]), len(tail))
 
 
-def _system(
+def system(
     equations: Equations,
     rows: Sequence[int],
     penalties: Sequence[int],
     stabilized: bool,
     sliding: Sequence[int],
     given_rows: Sequence[int] = (),
-) -> tuple[list[list[Node]], list[Node]]:
-    """K, line by line, and r | h | ḣ | ∂ḣ/∂x, the last two stabilized only."""
+    alone: bool = False,
+) -> tuple[Columns, Columns, list[list[Node]], list[Node]]:
+    """S and ∂r/∂λ column by column, B̃ line by line, and r | h | ḣ | ∂ḣ/∂x, the last two stabilized only.
+
+    alone : r are the forces of these rows, penalties and frictions, without those of the balance
+    """
     inputs = Inputs.of(equations)
-    r = balance_with(equations, sorted({*rows, *given_rows}), penalties, sliding)
+    forces = _forces(equations, sorted({*rows, *given_rows}), [(c, equations.tape.one) for c in penalties], sliding)
+    r = _pushed(equations, forces, alone)
     B = constraint_jacobian(equations, rows)
     bottom, turning = [inputs.row_by_increments(line) for line in B], list[Node]()
     fast = [place for place, k in enumerate(rows) if stabilized or equations.rows[k].is_velocity]
@@ -145,14 +150,18 @@ def _system(
         turning = [entry for change in changes for entry in change]
     right = row_forces(equations, r, rows, B)
     levels = _levels(equations, rows, stabilized)
-    forces = _forces(equations, sorted({*rows, *given_rows}), [(c, equations.tape.one) for c in penalties], sliding)
     others = [*(entry for line in (*bottom, *right) for entry in line), *levels, *turning]
-    S = tangent(equations, r, forces, others)
-    zero = equations.tape.zero
-    n, n_z, m = inputs.n, equations.n_z, len(rows)
-    matrix = [[S[j][i] for j in range(n)] + [right[k][i] for k in range(m)] for i in range(n)]
-    matrix += [[*bottom[k], *([zero] * (n_z + m))] for k in range(m)]
-    return matrix, r + levels + turning
+    S = seeded(equations, r) if alone else tangent(equations, r, forces, others)
+    return S, right, bottom, r + levels + turning
+
+
+def _whole(
+    equations: Equations, S: Columns, right: Columns, bottom: list[list[Node]], tail: list[Node]
+) -> tuple[list[list[Node]], list[Node]]:
+    """K, line by line, and the tail as it is."""
+    padding = [equations.tape.zero] * (equations.n_z + len(right))
+    lines = [list(line) for line in zip(*S, *right, strict=True)]
+    return lines + [[*line, *padding] for line in bottom], tail
 
 
 def residual(
@@ -162,10 +171,12 @@ def residual(
     stabilized: bool,
     sliding: Sequence[int] = (),
     given_rows: Sequence[int] = (),
+    alone: bool = False,
 ) -> list[Node]:
-    """r | h | ḣ of one contact mode; of the rows `given_rows` only the given multipliers."""
+    """r | h | ḣ of one contact mode; of the rows `given_rows` only the given multipliers; `alone` as in `system`."""
     rows = sorted(rows)
-    r = balance_with(equations, sorted({*rows, *given_rows}), penalties, sliding)
+    forces = _forces(equations, sorted({*rows, *given_rows}), [(c, equations.tape.one) for c in penalties], sliding)
+    r = _pushed(equations, forces, alone)
     return r + _levels(equations, rows, stabilized)
 
 
@@ -329,15 +340,15 @@ def loaded_balance(equations: Equations) -> list[Node]:
     return _pushed(equations, (values, multipliers, rates, forces))
 
 
-def _pushed(equations: Equations, forces: Forces) -> list[Node]:
-    """The balance with these forces."""
+def _pushed(equations: Equations, forces: Forces, alone: bool = False) -> list[Node]:
+    """The balance with these forces, or these forces alone."""
     inputs = Inputs.of(equations)
     values, multipliers, rates, rubbing = forces
+    result = [equations.tape.zero] * inputs.n if alone else list(equations.balance)
     if not values and not rates:
-        return list(equations.balance)
+        return result
     if equations.geometry is not None:
-        return equations.geometry.balance_with(*forces)
-    result = list(equations.balance)
+        return (equations.geometry.forces if alone else equations.geometry.balance_with)(*forces)
     for outputs, adjoints, along in (values, multipliers, inputs.x), (rates, rubbing, inputs.v):
         if outputs:
             added = vjp(outputs, adjoints, along) + [equations.tape.zero] * equations.n_z

@@ -101,10 +101,14 @@ def jvps(outputs: Sequence[Node], directions: Iterable[Mapping[Node, Scalar]]) -
     directions = list(directions)
     given = {node.index for seeds in directions for node in seeds}
     tape, order = outputs[0].tape, live(outputs, given)
+    reached = {node.index for node in order}
     order = [node for node in order if node.args and node.op not in _FLAT and node.index not in given]
     results = []
     for seeds in directions:
-        dots = {node.index: tape.lift(seed) for node, seed in seeds.items()}
+        dots = {node.index: tape.lift(seed) for node, seed in seeds.items() if node.index in reached}
+        if not dots:
+            results.append([tape.zero] * len(outputs))
+            continue
         _push_forward(tape, order, dots)
         results.append([dots.get(node.index, tape.zero) for node in outputs])
     return results
@@ -127,12 +131,17 @@ class Sweeps:
         given = {node.index for seeds in directions for node in seeds}
         if len(self._dots) != len(directions) or not given.isdisjoint(self._pushed):  # it is named for the first time
             self._dots, self._pushed = [{} for _ in directions], set()
-        tape, pushed = outputs[0].tape, self._pushed
-        order = [node for node in live(outputs, given) if node.args and node.op not in _FLAT]
+        tape, pushed, found = outputs[0].tape, self._pushed, live(outputs, given)
+        reached = {node.index for node in found}
+        order = [node for node in found if node.args and node.op not in _FLAT]
         order = [node for node in order if node.index not in given and node.index not in pushed]
         results = []
         for dots, seeds in zip(self._dots, directions, strict=True):
-            dots.update({node.index: tape.lift(seed) for node, seed in seeds.items()})
+            new = {node.index: tape.lift(seed) for node, seed in seeds.items() if node.index in reached}
+            if not new:  # what lies between was reached in no direction of this name
+                results.append([tape.zero] * len(outputs))
+                continue
+            dots.update(new)
             _push_forward(tape, order, dots)
             results.append([dots.get(node.index, tape.zero) for node in outputs])
         pushed.update(node.index for node in order)

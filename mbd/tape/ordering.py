@@ -14,6 +14,7 @@ that an order takes little more time than the elimination has entries.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from heapq import heappop, heappush
 
 from mbd.dataclass import dataclass
 
@@ -60,7 +61,8 @@ class _Pattern:
 
     along, down : columns of each row and rows of each column that are left; whole: columns of each row with fill-in
     waiting : coordinates of each row that must go before its multiplier
-    costs : of every pivot, or pair of pivots, that may be next; stale: rows and columns whose costs have changed
+    costs : of every pivot, or pair of pivots, that may be next; ranked: the same as a heap, with some that are past
+    of : pivots and pairs by unknown or row; stale: rows and columns whose costs have changed
     """
 
     def __init__(self, places: Iterable[Place], numbers: Collection[Place], coordinates: int, size: int) -> None:
@@ -80,21 +82,28 @@ class _Pattern:
         self.gone_rows, self.gone_columns = set[int](), set[int]()
         self.operations = 0
         self.costs: dict[tuple[Place, ...], int] = {}
+        self.ranked: list[tuple[int, tuple[Place, ...]]] = []
+        self.of: list[set[tuple[Place, ...]]] = [set() for _ in range(size)]
         self.stale = set(range(size))
 
     def cheapest(self) -> tuple[Place, ...] | None:
         """The pivot, or pair of pivots, that makes the fewest products; of equals the first."""
-        for one in [one for one in self.costs if not self.stale.isdisjoint(one[0])]:
-            del self.costs[one]
+        for k in self.stale:
+            for one in self.of[k]:
+                self.costs.pop(one, None)
+            self.of[k].clear()
         for k in self.stale:
             for one in self._choices(k):
                 cost = self._cost(one)
-                if cost is not None:
+                if cost is not None and self.costs.get(one) != cost:
                     self.costs[one] = cost
+                    heappush(self.ranked, (cost, one))
+                    for unknown in one[0]:
+                        self.of[unknown].add(one)
         self.stale.clear()
-        if not self.costs:
-            return None
-        return min(self.costs, key=lambda one: (self.costs[one], one))
+        while self.ranked and self.costs.get(self.ranked[0][1]) != self.ranked[0][0]:
+            heappop(self.ranked)
+        return self.ranked[0][1] if self.ranked else None
 
     def _choices(self, k: int) -> list[tuple[Place, ...]]:
         """Pivots and pairs that unknown or row k takes part in."""

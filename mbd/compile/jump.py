@@ -1,0 +1,154 @@
+"""Machine code of sums of functions: one loop for all, and jumps to it that know their tables."""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+
+from mbd.compile.llvm import Machine, cached_object, emit_object
+
+__all__ = ["Jump"]
+
+AT_ONCE = 64
+"""Jumps that are made together."""
+
+LOOP = """
+define internal void @compose(ptr %block, ptr %parameters, ptr %out, ptr %plan) {
+enter:
+  %size = load i64, ptr %plan
+  %at.most = getelementptr i64, ptr %plan, i64 1
+  %most = load i64, ptr %at.most
+  %at.inputs = getelementptr i64, ptr %plan, i64 2
+  %most.inputs = load i64, ptr %at.inputs
+  %at.parts = getelementptr i64, ptr %plan, i64 3
+  %parts = load i64, ptr %at.parts
+  %room = add i64 %most, %most.inputs
+  %room.bytes = mul i64 %room, 8
+  %work = call ptr @malloc(i64 %room.bytes)
+  %inputs = getelementptr double, ptr %work, i64 %most
+  %bytes = mul i64 %size, 8
+  call ptr @memset(ptr %out, i32 0, i64 %bytes)
+  br label %next
+next:
+  %k = phi i64 [ 0, %enter ], [ %k.next, %done ]
+  %more = icmp slt i64 %k, %parts
+  br i1 %more, label %part, label %leave
+part:
+  %before = mul i64 %k, 6
+  %first = add i64 %before, 4
+  %entry = getelementptr i64, ptr %plan, i64 %first
+  %code = load ptr, ptr %entry
+  %at.n = getelementptr i64, ptr %entry, i64 1
+  %n = load i64, ptr %at.n
+  %at.places = getelementptr i64, ptr %entry, i64 2
+  %places = load ptr, ptr %at.places
+  %at.b = getelementptr i64, ptr %entry, i64 3
+  %b = load i64, ptr %at.b
+  %at.all = getelementptr i64, ptr %entry, i64 4
+  %all = load i64, ptr %at.all
+  %at.sources = getelementptr i64, ptr %entry, i64 5
+  %sources = load ptr, ptr %at.sources
+  %own = icmp sgt i64 %all, 0
+  %numbers = select i1 %own, ptr %inputs, ptr %block
+  br label %from.block
+from.block:
+  %j = phi i64 [ 0, %part ], [ %j.next, %take ]
+  %in.block = icmp slt i64 %j, %b
+  br i1 %in.block, label %take, label %from.parameters
+take:
+  %at.source = getelementptr i64, ptr %sources, i64 %j
+  %source = load i64, ptr %at.source
+  %at.number = getelementptr double, ptr %block, i64 %source
+  %number = load double, ptr %at.number
+  %at.input = getelementptr double, ptr %inputs, i64 %j
+  store double %number, ptr %at.input
+  %j.next = add i64 %j, 1
+  br label %from.block
+from.parameters:
+  %l = phi i64 [ %b, %from.block ], [ %l.next, %take.parameter ]
+  %in.parameters = icmp slt i64 %l, %all
+  br i1 %in.parameters, label %take.parameter, label %call
+take.parameter:
+  %at.where = getelementptr i64, ptr %sources, i64 %l
+  %where = load i64, ptr %at.where
+  %at.parameter = getelementptr double, ptr %parameters, i64 %where
+  %parameter = load double, ptr %at.parameter
+  %at.own = getelementptr double, ptr %inputs, i64 %l
+  store double %parameter, ptr %at.own
+  %l.next = add i64 %l, 1
+  br label %from.parameters
+call:
+  call void %code(ptr %numbers, ptr %parameters, ptr %work)
+  br label %add
+add:
+  %i = phi i64 [ 0, %call ], [ %i.next, %put ]
+  %left = icmp slt i64 %i, %n
+  br i1 %left, label %put, label %done
+put:
+  %at.place = getelementptr i64, ptr %places, i64 %i
+  %place = load i64, ptr %at.place
+  %from = getelementptr double, ptr %work, i64 %i
+  %value = load double, ptr %from
+  %to = getelementptr double, ptr %out, i64 %place
+  %old = load double, ptr %to
+  %sum = fadd double %old, %value
+  store double %sum, ptr %to
+  %i.next = add i64 %i, 1
+  br label %add
+done:
+  %k.next = add i64 %k, 1
+  br label %next
+leave:
+  call void @free(ptr %work)
+  ret void
+}
+declare ptr @memset(ptr, i32, i64)
+declare ptr @malloc(i64)
+declare void @free(ptr)
+@plans = internal global [NUMBER x ptr] zeroinitializer
+define ptr @mbd.plans() {
+  ret ptr @plans
+}
+""".replace("NUMBER", str(AT_ONCE))
+"""Clears the output, gives each part its inputs, calls it, and adds what it writes; the plan is that of `Composed`."""
+
+JUMP = """
+define void @mbd.jump.{k}(ptr %block, ptr %parameters, ptr %out) {{
+  %at = getelementptr ptr, ptr @plans, i64 {k}
+  %plan = load ptr, ptr %at
+  tail call void @compose(ptr %block, ptr %parameters, ptr %out, ptr %plan)
+  ret void
+}}
+"""
+
+
+class Jump:
+    """A function (block, parameters, out) by the plan of a `Composed`.
+
+    Parameters
+    ----------
+    plan : address of the plan, which lives as long as this does
+    """
+
+    def __init__(self, plan: int) -> None:
+        if not _FREE:
+            _make_more()
+        self.address, slot = _FREE.pop()
+        slot.value = plan
+        weakref.finalize(self, _FREE.append, (self.address, slot))
+
+
+_FREE: list[tuple[int, ctypes.c_uint64]] = []
+"""Jumps that nobody has, with where their plans are told."""
+_MACHINES: list[Machine] = []
+"""What holds all jumps until the process ends."""
+
+
+def _make_more() -> None:
+    text = LOOP + "".join(JUMP.format(k=k) for k in range(AT_ONCE))
+    machine = Machine()
+    names = ["mbd.plans", *(f"mbd.jump.{k}" for k in range(AT_ONCE))]
+    plans, *jumps = machine.load(cached_object(text, lambda: emit_object(text), lasting=True), names)
+    _MACHINES.append(machine)
+    first = ctypes.CFUNCTYPE(ctypes.c_uint64)(plans)()
+    _FREE.extend((jump, ctypes.c_uint64.from_address(first + 8 * k)) for k, jump in enumerate(jumps))
