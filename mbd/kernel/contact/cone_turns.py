@@ -2,33 +2,42 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.linear import factor, solve
+from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
 from mbd.kernel.algebra.roots import sqrt
-from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents, mass_of
+from mbd.kernel.algebra.saddle import factor_saddle
+from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents
 from mbd.kernel.contact.cones import HELD, leads_group, product_of, speed_of
 from mbd.kernel.contact.contact_modes import STILL
-from mbd.kernel.records import Balance, ContactForces, Switching
-from mbd.kernel.stepping.restart import evaluate
+from mbd.kernel.records import Balance, ContactForces, SchemeAbilities, Switching
+from mbd.kernel.stepping.restart import evaluate, stepping_rows
 
-__all__ = ["STABLE", "estimated_turn_rate"]
+__all__ = ["estimated_turn_rate", "stable_turn"]
 
-STABLE = 2.0
-"""Step times the estimated rate at which friction turns directions that explicit schemes take [-].
+STABLE = 0.72
+"""Part of what an explicit scheme is stable for that step times the estimated rate may be [-].
 
-Beyond 2.785 that of order 4 lets what is across the direction grow from round-off until γ has turned away.
+Beyond all of it what is across the direction grows from round-off until γ has turned away.
 """
+UNKNOWN = 2.0
+"""The same for a scheme that does not tell what it is stable for [-]."""
 SOON = 100.0
 """Steps before it comes to rest from which on a motion that slows down is looked at [-]."""
 
 
-def estimated_turn_rate(K: Switching) -> float:
-    """Estimated rate [1/s] at which friction turns γ that it does not point along, Σ limit λ/(‖γ‖ + s).
+def stable_turn(K: SchemeAbilities) -> float:
+    """Largest turn, step times rate, in which an explicit scheme may follow a direction."""
+    return STABLE * K.stability if K.stability < 1e300 else UNKNOWN
 
-    λ is that of B M⁻¹ Bᵀ across the direction (see `ease_across`); that pushes follow the direction is left out. The
-    rate is large where γ is small, just after sliding has begun and before it ends: an explicit scheme must follow it.
+
+def estimated_turn_rate(K: Switching) -> float:
+    """Rate [1/s] at which friction turns γ that it does not point along, Σ limit λ/(‖γ‖ + s).
+
+    λ is the largest eigenvalue of what a force across the direction gains there, with the rows that hold and with the
+    pushes that follow it. The rate is large where γ is small, just after sliding has begun and before it ends: an
+    explicit scheme must follow it.
     """
     rate = 0.0
-    evaluated = False
+    rows = -1
     for f in range(K.n_frictions):
         if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
             gain = product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate)
@@ -36,44 +45,35 @@ def estimated_turn_rate(K: Switching) -> float:
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
             if gain < 0.0 and speed > STILL and speed > SOON * change * K.dt:  # it slows down, and is still fast
                 continue
-            if not evaluated:
+            if rows < 0:
                 evaluate(K, K.time, K.q, K.y)
-                evaluated = True
+                rows = stepping_rows(K)
+                if not factor_saddle(K, rows, False, LOSS_AT_ONCE):
+                    return 0.0
             speed += 4.0 * K.hold[f]
             if speed > 0.0:
-                rate += K.guards0[K.at_limit + f] * ease_across(K, f) / speed
+                rate += K.guards0[K.at_limit + f] * largest_ease(K, f, rows) / speed
     return rate
 
 
-def ease_across(K: Balance, f: int) -> float:
-    """What a force across the direction of the group of f gains: of a ball joint the largest eigenvalue λ.
-
-    Of a contact, other corners of whose foot may hold, which makes λ far too large, the mean by the diagonal of M; true
-    rates were found up to 1.24 times those that follow from it.
-    """
-    if K.group_size[f] == 2:
-        mass = mass_of(K, f)
-        return 1.0 / mass if mass > 0.0 else 0.0
-    for i in range(K.n * K.n):
-        K.kkt[i] = K.acc[i]
-    return largest_ease(K, f) if factor(K.kkt, K.n, K.pivots) == 0 else 0.0
-
-
-def largest_ease(K: Balance, f: int) -> float:
-    """The largest eigenvalue of B M⁻¹ Bᵀ across the direction of the group of f; M is factored in K.kkt."""
-    fill_tangents(K, f, 0)
-    first = ease_between(K, f, 0, 0)
-    second = ease_between(K, f, 1, 1)
-    mixed = ease_between(K, f, 0, 1)
+def largest_ease(K: Balance, f: int, rows: int) -> float:
+    """The largest eigenvalue of B K⁻¹ Bᵀ across the direction of the group of f; K is factored, with so many rows."""
+    unknowns = fill_tangents(K, f, 0)
+    first = ease_between(K, f, 0, 0, rows)
+    if unknowns == 1:
+        return first
+    second = ease_between(K, f, 1, 1, rows)
+    mixed = ease_between(K, f, 0, 1, rows)
     half = 0.5 * (first - second)
     return 0.5 * (first + second) + sqrt(half * half + mixed * mixed)
 
 
-def ease_between(K: Balance, f: int, i: int, j: int) -> float:
-    """t_i B M⁻¹ Bᵀ t_j of the tangents i and j of the group of f."""
+def ease_between(K: Balance, f: int, i: int, j: int, rows: int) -> float:
+    """t_i B K⁻¹ Bᵀ t_j of the tangents i and j of the group of f."""
     for k in range(K.n):
         K.rhs[k] = row_along(K, f, j, k)
-    solve(K.kkt, K.n, K.pivots, K.rhs)
+    K.rhs[K.n : K.n + rows] = 0.0
+    solve_kkt(K, K.n + rows, K.rhs)
     value = 0.0
     for k in range(K.n):
         value += row_along(K, f, i, k) * K.rhs[k]
