@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from mbd.constraints import (
         Ball as Ball,
         Bilateral as Bilateral,
+        Bristles as Bristles,
         Controller as Controller,
         Event as Event,
         HystereticStop as HystereticStop,
@@ -223,10 +224,10 @@ _HOMES = {
     "mbd.analysis.sweep": "Sweep sweep",
     "mbd.assembly.assemble": "assemble",
     "mbd.bodies": "Domain Link Marker PointMass RigidBody box cylinder disk rod segment sphere",
-    "mbd.constraints": "Ball Bilateral Controller Event HystereticStop Impulse KnifeEdge MaxwellStop Mode Nonholonomic "
-    "Penalty PenaltyParameters Plane Rolling SampledLaw SpringLeg Transition Unilateral When cone disk_touchdown "
-    "distance extension flexion height measure penalty_parameters profile_touchdown rolling_touchdown separation "
-    "sphere_touchdown touchdown twist",
+    "mbd.constraints": "Ball Bilateral Bristles Controller Event HystereticStop Impulse KnifeEdge MaxwellStop Mode "
+    "Nonholonomic Penalty PenaltyParameters Plane Rolling SampledLaw SpringLeg Transition Unilateral When cone "
+    "disk_touchdown distance extension flexion height measure penalty_parameters profile_touchdown rolling_touchdown "
+    "separation sphere_touchdown touchdown twist",
     "mbd.equations.energy_description": "Coordinate",
     "mbd.laboratory.assignment": "assign_plates",
     "mbd.laboratory.force_plate": "ForcePlate",

@@ -283,6 +283,10 @@ CONSTRAINTS: list[tuple[str, Callable[[Frame, Frame, Joint], Constraint]]] = [
         "rubbing mat",
         lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, damping=10.0, friction=0.3, creep=0.1),
     ),
+    (
+        "bristles",
+        lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a), 1e4, 10.0, friction=mbd.Bristles(0.3, 2e3, 40.0)),
+    ),
     ("raft", lambda a, b, joint: mbd.Penalty("law", mbd.touchdown(a, swell), 1e4, damping=10.0, release="pull")),
     ("ball", lambda a, b, joint: mbd.Penalty("law", mbd.height(a), 1e5, exponent=1.5, restitution=0.5)),
     ("rod", lambda a, b, joint: mbd.Bilateral("law", mbd.distance(a, b), value=0.6)),

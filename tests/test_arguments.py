@@ -67,6 +67,7 @@ WORDS = {
     mbd.SpringLeg: ("leg", ROD.end, 1e4, 1.0, 1.2),
     mbd.HystereticStop: ("stop", mbd.flexion(HINGE), 1e3, 0.4, 0.01),
     mbd.MaxwellStop: ("stop", mbd.flexion(HINGE), 1e3, 1e3, 10.0),
+    mbd.Bristles: (0.5, 1e4, 50.0),
     mbd.KnifeEdge: ("knife", ROD.end),
     mbd.Nonholonomic: ("row", lambda rate: rate, 0.0, ("hinge.rate",)),
     mbd.Penalty: ("stop", mbd.flexion(HINGE), 1e3),

@@ -3,6 +3,7 @@
 from mbd.constraints.balls import Ball
 from mbd.constraints.base import Constraint, VelocityConstraint
 from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.bristles import Bristles
 from mbd.constraints.controller import Controller
 from mbd.constraints.disks import disk_touchdown
 from mbd.constraints.event import Event
@@ -30,9 +31,10 @@ from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
 
 __all__ = [
-    "Ball", "Bilateral", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event", "HystereticStop",
-    "Impulse", "KnifeEdge", "Law", "MaxwellStop", "Measure", "Mode", "Nonholonomic", "Penalty", "PenaltyParameters",
-    "Plane", "Rolling", "SampledLaw", "SpringLeg", "Transition", "Unilateral", "VelocityConstraint", "When", "cone",
-    "disk_touchdown", "distance", "extension", "flexion", "height", "measure", "penalty_parameters",
-    "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown", "twist",
+    "Ball", "Bilateral", "Bristles", "Closing", "Constraint", "Controller", "Drag", "Equation", "Event",
+    "HystereticStop", "Impulse", "KnifeEdge", "Law", "MaxwellStop", "Measure", "Mode", "Nonholonomic", "Penalty",
+    "PenaltyParameters", "Plane", "Rolling", "SampledLaw", "SpringLeg", "Transition", "Unilateral",
+    "VelocityConstraint", "When", "cone", "disk_touchdown", "distance", "extension", "flexion", "height", "measure",
+    "penalty_parameters", "profile_touchdown", "rolling_touchdown", "separation", "sphere_touchdown", "touchdown",
+    "twist",
 ]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -11,7 +11,8 @@ from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, name_of, number
 from mbd.constraints.base import Constraint
-from mbd.constraints.law import Closing, Hold, Law
+from mbd.constraints.bristles import Bristles
+from mbd.constraints.law import Closing, Drag, Hold, Law
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.restitution import KELVIN_VOIGT, MIN_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
@@ -21,6 +22,7 @@ from mbd.constraints.unilateral import measure_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
+from mbd.joints.losses.base import StateRates
 from mbd.tape.functions import maximum
 from mbd.tape.node import Scalar
 
@@ -32,7 +34,7 @@ MIN_APPROACH_SPEED = 1e-6
 CREEP_SPEED = 1e-3
 """Speed at which friction is 1/√2 of what it becomes, the default of 'name.creep' [m/s]."""
 
-NUMBERS = ("stiffness", "damping", "exponent", "friction", "creep")
+NUMBERS = ("stiffness", "damping", "exponent", "creep")
 """Arguments that are always numbers."""
 
 
@@ -60,7 +62,7 @@ class Penalty(Constraint):
     effective_mass : mass that the contact feels, ``1/(J M⁻¹ Jᵀ)`` with J = ∂g/∂q [kg, or kg m²], for 'kelvin-voigt'
         with a restitution
     friction : μ ≥ 0, opposite to the velocity γ along the surface, ``f = −μ p γ/√(‖γ‖² + creep²)``: under a load T
-        below μ p it creeps with ``creep T/√((μ p)² − T²)``. What truly sticks is a `Unilateral`
+        below μ p it creeps with ``creep T/√((μ p)² − T²)``. `mbd.Bristles` stick elastically, a `Unilateral` truly
     creep : speed at which friction is 1/√2 of μ p [m/s]
     only_while : name of a contact that must be closed, or a measure that must be positive, for it to begin to act
     """
@@ -74,7 +76,7 @@ class Penalty(Constraint):
     law: str | None = None
     release: str = "gap"
     effective_mass: float | None = None
-    friction: float = 0.0
+    friction: float | Bristles = 0.0
     creep: float = CREEP_SPEED
     only_while: str | Measure | None = None
 
@@ -84,6 +86,8 @@ class Penalty(Constraint):
         for field in (*NUMBERS, "restitution", "effective_mass"):
             if getattr(self, field) is not None or field in NUMBERS:
                 object.__setattr__(self, field, number(getattr(self, field), f"{field} of '{self.name}'"))
+        if not isinstance(self.friction, Bristles):
+            object.__setattr__(self, "friction", number(self.friction, f"friction of '{self.name}'"))
         if not among(self.release, ("gap", "pull")):
             raise ModelError(f"release of Penalty '{self.name}' is 'gap' or 'pull', got {self.release!r}")
         object.__setattr__(self, "only_while", condition_of(self.only_while, self.name))
@@ -163,12 +167,24 @@ class Penalty(Constraint):
         rate = scope.rate(gap)
         push = self.force(gap, rate, scope, *hold(self.captured(rate)))
         contact = Closing(gap, self.measure.unit, self.opens_on, only_while=self.only_while)
-        drags = []
-        if self.has_friction:
+        slips = slip_velocities(self.measure, scope, hold) if self.has_friction else []
+        drags: list[Drag] = []
+        rates: StateRates = ()
+        open_rates: bool | Sequence[Scalar] = True
+        if isinstance(self.friction, Bristles):
+            drags, rates, open_rates = self.friction.act(slips, push, scope, self.name)
+        elif self.has_friction:
             coefficient = scope.parameter(self.name, "mu", self.friction)
             creep = scope.parameter(self.name, "creep", self.creep)
-            drags = rub(slip_velocities(self.measure, scope, hold), coefficient * push, creep)
-        return Law(contact=contact, push=push, drags=drags, elastic=self.elastic_energy(gap, scope))
+            drags = rub(slips, coefficient * push, creep)
+        return Law(
+            contact=contact,
+            push=push,
+            drags=drags,
+            elastic=self.elastic_energy(gap, scope),
+            rates=rates,
+            rates_while_open=open_rates,
+        )
 
     @property
     def has_friction(self) -> bool:
@@ -192,9 +208,14 @@ class Penalty(Constraint):
     def details(self) -> str:
         """Where, how stiff, and what it loses."""
         loss = f"damping {self.damper:.6g}" if self.chi is None else f"chi {self.chi:.6g}"
-        friction = f", friction {self.friction:.6g}" if self.has_friction else ""
+        friction = f", friction {self._friction_text}" if self.has_friction else ""
         condition = condition_details(self.only_while)
         return f", {self.measure.details}, stiffness {self.stiffness:.6g}, {loss}{friction}{condition}"
+
+    @property
+    def _friction_text(self) -> str:
+        """Its friction as it was given."""
+        return repr(self.friction) if isinstance(self.friction, Bristles) else f"{self.friction:.6g}"
 
     def captured(self, gap_rate: Scalar) -> tuple[Scalar, ...]:
         """What is held from the instant of closing: the approach speed −ġ, where χ needs it."""
@@ -249,10 +270,14 @@ class Penalty(Constraint):
         return [*self.measure.mentions(), *mentions_of(self.only_while)]
 
     def parameters(self) -> dict[str, float]:
-        """`stiffness`, `damping` or `chi` and `slowest`, `mu` and `creep` with friction; and those of its measure."""
+        """`stiffness`, `damping` or `chi` and `slowest`, those of its friction, and those of its measure."""
         chi = self.chi
         loss = {"damping": self.damper} if chi is None else {"slowest": MIN_APPROACH_SPEED, "chi": chi}
-        friction = {"mu": self.friction, "creep": self.creep} if self.has_friction else {}
+        friction: dict[str, float] = {}
+        if isinstance(self.friction, Bristles):
+            friction = self.friction.fields()
+        elif self.has_friction:
+            friction = {"mu": self.friction, "creep": self.creep}
         own = {
             f"{self.name}.{field}": value for field, value in {"stiffness": self.stiffness, **loss, **friction}.items()
         }
@@ -267,7 +292,9 @@ class Penalty(Constraint):
             largest = chi_for(MIN_RESTITUTION, law_of(self.law, self.name))
             problem = f"is not between 0 and {largest:g}, which belong to the restitutions 1 and {MIN_RESTITUTION:g}"
             domains |= {"chi": Domain(low=0.0, high=largest, problem=problem), "slowest": positive(unit="m/s")}
-        if self.has_friction:
+        if isinstance(self.friction, Bristles):
+            domains |= self.friction.domains()
+        elif self.has_friction:
             domains["mu"] = Domain(low=0.0, problem="is negative; give 0 for none", called="friction")
             domains["creep"] = positive(unit="m/s")
         return {f"{self.name}.{field}": domain for field, domain in domains.items()} | self.measure.domains()
@@ -279,7 +306,7 @@ class Penalty(Constraint):
             faults.append(f"'{self.name}': exponent {self.exponent:g} is below 1, endlessly stiff at touch; give n ≥ 1")
         if self.has_friction and not (self.measure.has_tangents or self.measure.has_slip_velocities):
             faults.append(
-                f"'{self.name}': friction {self.friction:g} on a {self.measure.title}, which has no direction to slide "
-                "in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"
+                f"'{self.name}': friction {self._friction_text} on a {self.measure.title}, which has no direction to "
+                "slide in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"
             )
         return faults

@@ -19,6 +19,7 @@ from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.gathered import Gathered
 from mbd.equations.held_forces import HeldForces, held_force_faults
 from mbd.equations.impulses import impulses_of
+from mbd.equations.kinks import kinks
 from mbd.equations.laws import Laws
 from mbd.equations.machines import declare_machines, machine_guards
 from mbd.equations.magnitudes import of_directions
@@ -124,8 +125,10 @@ def _derived(
         )
     constraints.impulses += impulses_of(scope, dynamics, model.impulses, model.contacts, gathered)
     rests: list[Node] = []
+    rates = [*(pair for cause in found for pair in cause.rates), *constraints.rates]
     with gathered.catch():
-        rests = state_balance(scope, [*(pair for cause in found for pair in cause.rates), *constraints.rates])
+        rests = state_balance(scope, rates)
+        constraints.guards += kinks(scope, found, constraints)
     gathered.raise_all()
     weight = weight_of(scope, dynamics)
     stored = [weight, *found] if weight.acts else found

@@ -15,6 +15,7 @@ from mbd.equations.effects import causes, effect_of
 from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.gathered import Gathered
 from mbd.equations.impulses import impulses_of
+from mbd.equations.kinks import kinks
 from mbd.equations.laws import Laws
 from mbd.equations.machines import declare_machines, machine_guards
 from mbd.equations.net_moments import offer_net_moments
@@ -130,8 +131,10 @@ def assembled(system: EnergyDescription, lowering: Lowering) -> Equations:
     found = [cause for cause in found if cause.works]
     balance = [r + f for r, f in zip(balance, acting, strict=True)]
     known = _laws(system, lowering, gathered)
+    rates = [*(pair for cause in found for pair in cause.rates), *known.rates]
     with gathered.catch():
-        balance += state_balance(scope, [*(pair for cause in found for pair in cause.rates), *known.rates])
+        balance += state_balance(scope, rates)
+        known.guards += kinks(scope, found, known)
     gathered.raise_all()
     effects = (*own, *(effect_of(cause, scope, scope) for cause in found), *known.effects)
     potential = V

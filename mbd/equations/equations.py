@@ -213,6 +213,7 @@ class Guard:
     """A user's event: fires when `value` crosses zero (direction −1 falling, +1 rising, 0 both).
 
     transition : that of a machine which is this event; one without a guard of its own never fires by itself
+    is_kink : whether it is no event of the user's: a step ends at it, and nothing tells of it
     """
 
     name: str
@@ -222,6 +223,7 @@ class Guard:
     terminal: bool = False
     reset: Any = None
     transition: Transition | None = None
+    is_kink: bool = False
 
     @property
     def is_timer(self) -> bool:

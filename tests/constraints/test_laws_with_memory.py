@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import mbd
 
@@ -68,6 +69,75 @@ def test_lugre_holds_a_load_below_its_static_friction_as_a_spring():
     run = mbd.simulate(model, mbd.assemble(model), mbd.HHT(), dt=1e-3, until=5.0)
     assert abs(run["rail.rate"][-1]) < 1e-6
     assert run["rail loss.deflection"][-1] == pytest.approx(1.5 / 400.0, rel=1e-3)
+
+
+def on_bristles(friction, pull=None, lift=None):
+    """A puck of 2 kg on a mat, pulled by a function of time and lifted by another."""
+    model, puck = mbd.Model("rubber"), mbd.PointMass("puck", 2.0)
+    model.connect(mbd.Translation("slide", model.ground.origin, puck.origin))
+    model.constrain(mbd.Penalty("mat", mbd.touchdown(puck.origin), 2e4, 200.0, friction=friction))
+    model.apply(mbd.Applied("pull", puck.origin, (pull or (lambda t: 0.0 * t), lift or (lambda t: 0.0 * t))))
+    return model, mbd.assemble(model, {"slide.y": -2.0 * 9.81 / 2e4}, {"slide.x": 0.3}, closed="mat")
+
+
+def test_a_foot_on_bristles_sticks_and_slides_as_scipy_has_it():
+    """To round-off at a fixed dt: steps end where it begins to slide, and no event tells of that."""
+    mu, stiffness, damping, weight = 0.4, 5e3, 80.0, 2.0 * 9.81
+    model, start = on_bristles(
+        mbd.Bristles(mu, stiffness, damping), lambda t: 6.0 * mbd.sin(3.0 * t), lambda t: 15.0 * mbd.sin(7.0 * t) - 4.0
+    )
+
+    def rates(t, y):
+        push = -2e4 * y[1] - 200.0 * y[3]
+        force = np.clip(stiffness * y[4] + damping * y[2], -mu * push, mu * push)
+        up = 15.0 * np.sin(7.0 * t) - 4.0 + push - weight
+        return [y[2], y[3], (6.0 * np.sin(3.0 * t) - force) / 2.0, up / 2.0, (force - stiffness * y[4]) / damping]
+
+    begin = [0.0, -weight / 2e4, 0.3, 0.0, 0.0]
+    y = solve_ivp(rates, (0.0, 0.5), begin, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-4).y[:, -1]
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=2e-3, until=0.5)
+    names = "slide.x", "slide.y", "slide.x.rate", "slide.y.rate", "mat.bristle"
+    np.testing.assert_allclose([run[name][-1] for name in names], y, atol=1e-10)
+    share = run["mat.friction"] / run["mat.force"]
+    assert len(run.events) == 0
+    assert np.max(np.abs(share)) == pytest.approx(mu, rel=1e-12)
+    assert np.min(np.abs(share)) < 0.3
+    assert abs(run.energy.numerical[-1]) < 1e-9
+
+
+def test_bristles_take_energy_however_their_load_changes():
+    """The work of friction and ½ σ₀ z² never rise together, though the foot is pressed and relieved as it slides."""
+    model, start = on_bristles(
+        mbd.Bristles(0.4, 5e3, 80.0), lambda t: 9.0 * mbd.sin(11.0 * t), lambda t: 17.0 * mbd.sin(23.0 * t)
+    )
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=2.0)
+    taken = run.energy["mat friction"] + 0.5 * 5e3 * run["mat.bristle"] ** 2
+    assert np.max(np.diff(taken)) < 1e-9
+    assert taken[-1] < -0.5
+
+
+def test_the_derivative_of_a_run_on_bristles_is_that_of_its_differences():
+    model, start = on_bristles(mbd.Bristles(0.4, 5e3, 80.0), lambda t: 12.0 * mbd.sin(3.0 * t))
+    wrt, scheme = ["mat.mu", "mat.bristle_stiffness"], mbd.RungeKutta853()
+    found = mbd.sensitivities(model, start, scheme, dt=2e-3, until=0.5, wrt=wrt, of=["slide.x"])
+    for name, change in zip(wrt, (1e-4, 1.0), strict=True):
+        value = model.parameters[name]
+        ends = [
+            mbd.simulate(model, start, scheme, dt=2e-3, until=0.5, parameters={name: value + step})["slide.x"][-1]
+            for step in (change, -change)
+        ]
+        assert found["slide.x", name] == pytest.approx((ends[0] - ends[1]) / (2.0 * change), rel=1e-5)
+
+
+def test_schemes_keep_their_order_where_friction_that_remembers_reverses():
+    """RungeKutta4: sixteen times less at half the step, with two reversals on the way."""
+    ends = []
+    for dt in (4e-3, 2e-3, 1e-3):
+        model, body = mbd.Model("shank"), mbd.Link("shank", mass=2.5, length=0.42, center=0.19, inertia=0.04)
+        model.connect(mbd.Revolute("knee", model.ground.origin, body.start, loss=mbd.Dahl(0.4, 25.0)))
+        start = mbd.assemble(model, {"knee.angle": 0.9})
+        ends.append(mbd.simulate(model, start, mbd.RungeKutta4(), dt=dt, until=1.5)["knee.angle"][-1])
+    assert np.log2(abs((ends[0] - ends[1]) / (ends[1] - ends[2]))) == pytest.approx(4.0, abs=0.15)
 
 
 def test_a_maxwell_stop_relaxes_to_its_slow_stiffness():

@@ -169,6 +169,7 @@ class ActiveSetManager:
             "guard_fires": [int(each is not None and ("event", e) in each.causes) for e, each in own],
             "guard_timed": [int(each is not None and guard.is_timer) for guard, (_, each) in zip(
                 self.guards, own, strict=True)],
+            "guard_kink": [int(guard.is_kink) for guard in self.guards],
             "guard_contact": [-1 if each is None else each.contact for _, each in own],
             "release_start": release_starts, "release_mark": releases,
             "cause_start": cause_starts, "cause_mark": causes, "store_start": store_starts, "store_anchor": stored,

@@ -121,6 +121,9 @@ def log_crossings(K: Switching) -> None:
     for e in range(K.n_guards):
         if K.passing[e] == 1 and K.n_machines > 0 and not is_waiting(K, e):  # a transition that has come before it
             K.passing[e] = 0
+        if K.passing[e] == 1 and K.guard_kink[e] == 1:
+            K.passing[e] = 0
+            K.side[e] = -K.side[e]
         if K.passing[e] == 1:
             log_event(K, LOG_EVENT, e, 0.0, NO_IMPULSE)
             K.side[e] = -K.side[e]

@@ -123,7 +123,8 @@ def handle_event(K: Kernel) -> int:
     if not at_start:
         store_row(K)
     if kind == CROSS or kind == CROSS_BACK:
-        if K.n_machines > 0 and K.guard_machine[index] >= 0 and not is_allowed(K, index):
+        unheeded = K.n_machines > 0 and K.guard_machine[index] >= 0 and not is_allowed(K, index)
+        if unheeded or K.guard_kink[index] == 1:
             K.passing[index] = 0
             K.restart_due = 2
             if kind == CROSS:

@@ -49,6 +49,8 @@ NEIGHBOURS = 4.0
 """Error of positions, over the distance between neighbouring numbers, that is round-off [-]."""
 CANCELLED = 64.0
 """The same for what a step adds to them: stages and estimates are sums in which large terms cancel [-]."""
+SIZED = 0.1
+"""Error of a first-order state, over its size, up to which an explicit step tells that size [-]."""
 
 
 def smallest_step(K: State) -> float:
@@ -82,15 +84,17 @@ def error_ratio(K: SingularSteps, h: float) -> float:
     return ratio if ratio < 1e300 else 1e300
 
 
-def largest_state(K: State, i: int) -> float:
+def largest_state(K: SingularSteps, i: int) -> float:
     """The largest size of the first-order state y_i in the run, this candidate among it.
 
-    What an explicit scheme made of it in a step that is not taken tells nothing: it may have been far too long.
+    What an explicit scheme made of it in a step that is not taken counts if its estimate is right to `SIZED`: the step
+    may have been far too long. If none counted, a state that grows from zero by a broken power of time would stay as
+    inaccurate, relative to its own size, however short the steps become.
     """
     z = i - K.n_v
     K.largest[z] = max(K.largest[z], abs(K.y[i]))
     size = max(K.largest[z], abs(K.y1[i]))
-    if K.explicit == 0:
+    if K.explicit == 0 or abs(K.error[K.n_v + i]) <= SIZED * abs(K.y1[i]):
         K.largest[z] = size
     return float(size)
 
