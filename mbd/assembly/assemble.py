@@ -258,7 +258,7 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
     if project and np.max(np.abs(speed_misfit), initial=0.0) > RESIDUAL_RTOL * speed and work.rates:
         work.y = y.copy()
-        if nearest_velocities(work, work.manager.active_rows(work.flags), named.v):
+        if nearest_velocities(work, work.active_rows, named.v):
             speed_misfit = np.zeros(len(speed_misfit))
     capture(work)  # approach speeds
     return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit, project), model)

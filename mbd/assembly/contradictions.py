@@ -58,7 +58,7 @@ def infeasible(work: Posture, rows: Sequence[int], start: Vector, misfit: Vector
 def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
     """Every row and named result that the named values contradict, with both residuals and who is in conflict."""
     equations, rows, misfit, speed_misfit = work.equations, attempt.rows, attempt.misfit, attempt.speed_misfit
-    active = list(work.manager.active_rows(work.flags))
+    active = work.active_rows
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
     fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > RESIDUAL_RTOL * speed)
     if fast and np.isfinite(speed_misfit).all():
@@ -100,7 +100,7 @@ def _sets(work: Posture, attempt: Attempt, off: bool, fast: bool, model: Any) ->
     loops, conflicts = loops_of(model), dict[str, str]()
     finite = np.isfinite(attempt.misfit).all() and np.isfinite(attempt.speed_misfit).all()
     levels = [(False, attempt.rows, attempt.q, attempt.held_q)] if off else []
-    levels += [(True, list(work.manager.active_rows(work.flags)), attempt.y, attempt.held_v)] if fast else []
+    levels += [(True, work.active_rows, attempt.y, attempt.held_v)] if fast else []
     for speeds, rows, start, held in levels if finite else ():
         left = list(rows)
         for _ in range(MAX_CONFLICTING_SETS):

@@ -27,8 +27,8 @@ MIN_SINGULAR_RATIO = 1e-12
 def undetermined(work: Posture) -> list[str]:
     """Coordinates whose acceleration neither mass nor rows determine, rows that depend on others, negative inertia."""
     equations = work.equations
-    picked = list(work.manager.active_rows(work.flags))
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    picked = work.active_rows
+    terms = work.terms()
     n = len(terms.f)
     if n == 0:
         return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
@@ -59,9 +59,9 @@ def undetermined(work: Posture) -> list[str]:
 
 def lost_inertia(work: Posture) -> str:
     """A sentence on the motion of least inertia where elimination has lost it; '' if it has none at all."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     n, n_v = len(terms.f), work.equations.n_v
-    matrix = _equations(terms, list(work.manager.active_rows(work.flags)))
+    matrix = _equations(terms, work.active_rows)
     if not np.isfinite(matrix).all():
         return ""
     for size, motion in reversed(_weak_motions(matrix, n)):
@@ -111,7 +111,7 @@ def _share(work: Posture, motion: Vector, M: Matrix) -> float:
     """
 
     def kinetic(y: Vector) -> float:
-        terms = work.mechanism.acceleration_terms(work.time, work.q, y, work.parameters, work.anchors)
+        terms = work.terms(y=y)
         return float(np.asarray(terms.kinetic).item())
 
     if work.equations.n_z or kinetic(0.0 * motion) != 0.0:  # a moving ground has energy of its own

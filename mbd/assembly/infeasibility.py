@@ -124,10 +124,10 @@ def _nearest(
 def velocity_conflict(work: Posture, loops: Loops) -> Conflict | None:
     """An irreducible set of active rows that no velocity satisfies at the position of `work`, whatever is named."""
     equations = work.equations
-    active = list(work.manager.active_rows(work.flags))
+    active = work.active_rows
     y = work.y.copy()
     y[: equations.n_v] = 0.0
-    terms = work.mechanism.acceleration_terms(work.time, work.q, y, work.parameters, work.anchors)
+    terms = work.terms(y=y)
     right = -terms.rate[active]
     tolerance = RESIDUAL_RTOL * (1.0 + float(np.max(np.abs(right), initial=0.0)))
     members = [member_of(equations.rows[k], equations, loops) for k in active]
@@ -138,8 +138,8 @@ def velocity_conflict(work: Posture, loops: Loops) -> Conflict | None:
 def acceleration_conflict(work: Posture, loops: Loops) -> Conflict | None:
     """An irreducible set of active rows that no acceleration satisfies at the state of `work`."""
     equations = work.equations
-    active = list(work.manager.active_rows(work.flags))
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    active = work.active_rows
+    terms = work.terms()
     right = -terms.bias[active]
     tolerance = 1e-6 * (1.0 + float(np.max(np.abs(right), initial=0.0)))
     members = [member_of(equations.rows[k], equations, loops) for k in active]
@@ -198,7 +198,7 @@ def _moves(work: Posture, y: Vector, rows: Sequence[int], wanted: Sequence[Condi
     """Whether velocities satisfy rows, named rates of results and named rates of coordinates."""
     n_v = work.equations.n_v
     still = replace(work, y=np.concatenate([np.zeros(n_v), y[n_v:]]))
-    terms = still.mechanism.acceleration_terms(still.time, still.q, still.y, still.parameters, still.anchors)
+    terms = still.terms()
     picked = list(rows)
     rate, B = still.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], wanted)
     unit = np.eye(n_v)[[k for each in held for k in each.moves]]

@@ -166,7 +166,7 @@ def _examined(model: Any, work: Posture, given: bool) -> Mobility:
     if np.max(np.abs(misfit), initial=0.0) > RESIDUAL_RTOL:
         conflicts = position_conflicts(work, rows, start, loops, tried=not given)
     capture(work)
-    active = list(work.manager.active_rows(work.flags))
+    active = work.active_rows
     idle = _idle(model, work, active)
     titles = [work.equations.rows[k].title for k in active] + idle
     here = _jacobian(work, active)
@@ -207,13 +207,13 @@ def _posture(
 
 def _off(work: Posture, rows: list[int]) -> Any:
     """Residuals of rows at a given state."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     return terms.h[rows]
 
 
 def _jacobian(work: Posture, active: list[int]) -> Matrix:
     """B of the active rows."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     return np.asarray(terms.B[active][:, : work.equations.n_v])
 
 

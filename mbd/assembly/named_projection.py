@@ -71,20 +71,20 @@ def nearest_velocities(work: Posture, rows: Sequence[int], named: Mapping[int, f
     named : rates by number; those of other results are `work.rates`
     """
     n_v = work.equations.n_v
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     B, rate = terms.B[list(rows)][:, :n_v], terms.rate[list(rows)]
     off, slopes = _misfits(work, work.rates, named, work.y)
     first, free = _split(B, rate)
     wanted = -(off + slopes @ first)
     work.y[:n_v] += first + free @ np.linalg.lstsq(slopes @ free, wanted, rcond=RANK_RTOL)[0]
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     speed = 1.0 + float(np.max(np.abs(work.y[:n_v]), initial=0.0))
     return bool(np.max(np.abs(terms.rate[list(rows)]), initial=0.0) <= RESIDUAL_RTOL * speed)
 
 
 def _jacobian(work: Posture, rows: Sequence[int]) -> Matrix:
     """B of the rows."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     return np.asarray(terms.B[list(rows)][:, : work.equations.n_v])
 
 

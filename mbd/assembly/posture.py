@@ -41,7 +41,7 @@ def position_rows(work: Posture) -> list[int]:
     Rows on velocities leave positions free.
     """
     normals = {contact.rows[0] for contact in work.manager.contacts if contact.rows}
-    rows, active = work.equations.rows, work.manager.active_rows(work.flags)
+    rows, active = work.equations.rows, work.active_rows
     return [k for k in active if not rows[k].is_velocity and (rows[k].contact < 0 or k in normals)]
 
 
@@ -150,7 +150,7 @@ def damped_step(J: Matrix, h: Vector, damping: float) -> Vector:
 
 def _weighted_rows(work: Posture, rows: Sequence[int], weights: Vector) -> tuple[Vector, Matrix]:
     """w h and w B of rows and named results."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     picked = list(rows)
     h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)
     h, B, _ = faced(work, picked, h, B)
@@ -178,7 +178,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
     least, since, astray = np.inf, 0, False
     for iteration in range(200):
         work.iterations += 1
-        terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+        terms = work.terms()
         h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
         h, B, opposite = faced(work, picked, h, B)
         if opposite and iteration < NUDGES:
@@ -211,7 +211,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             return h
         before = size
         move(work, change / limit)
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     return faced(work, picked, *work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places))[0]
 
 
@@ -225,7 +225,7 @@ def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
     """Leave a flat spot, where no free coordinate acts on the rows, along those that act on them nearby."""
     step = np.where(free, NUDGE * (1.0 + np.arange(len(free)) / 7.0), 0.0)
     nearby = work.equations.configuration.compose(work.q, step)
-    terms = work.mechanism.acceleration_terms(work.time, nearby, work.y, work.parameters, work.anchors)
+    terms = work.terms(nearby)
     acting = np.zeros(len(free))
     acting[_involved(terms.B[list(rows)][:, : work.equations.n_v], free)] = 1.0
     move(work, acting * step)
@@ -233,7 +233,7 @@ def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
 
 def capture(work: Posture) -> None:
     """Store what closed contacts hold, such as the place of touchdown, into the anchors."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     for contact, flag in zip(work.manager.contacts, work.flags, strict=True):
         if flag:
             for anchor in contact.anchors:
@@ -242,12 +242,12 @@ def capture(work: Posture) -> None:
 
 def close_velocities(work: Posture, free: Matrix) -> Vector:
     """Complete the free velocities; the remaining rate of each active row."""
-    picked = list(work.manager.active_rows(work.flags))
+    picked = work.active_rows
     if not picked and not work.rates:
         return np.zeros(0)
     n_v = work.equations.n_v
     for refinement in range(REFINEMENTS + 1):
-        terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+        terms = work.terms()
         rate, B = work.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], work.rates)
         places = _involved(B, free)
         if refinement == REFINEMENTS or not len(places):

@@ -86,7 +86,7 @@ def _close(work: Posture) -> None:
     AssemblyError
         where rows are left that do not hold.
     """
-    active, free = list(work.manager.active_rows(work.flags)), np.ones(work.equations.n_v, dtype=bool)
+    active, free = work.active_rows, np.ones(work.equations.n_v, dtype=bool)
 
     def found() -> Any:
         return residuals(work.mechanism, work.time, work.q, work.y, work.parameters, work.anchors)

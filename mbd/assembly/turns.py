@@ -98,7 +98,7 @@ def _in_rows(work: Posture, rows: Sequence[int]) -> set[int]:
 
 def _residuals(work: Posture, rows: Sequence[int]) -> Vector:
     """Rows and named results."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors)
+    terms = work.terms()
     picked = list(rows)
     return work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)[0]
 

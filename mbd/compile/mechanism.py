@@ -11,7 +11,7 @@ from weakref import ref
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Backend, Function, Functions, backend as choose_backend
 from mbd.compile.cache import key_of
 from mbd.compile.composed import Composed, Shape, Term
@@ -76,6 +76,10 @@ class AccelerationTerms:
     kinetic: float
     limits: Vector
     impulses: Vector
+
+    def saddle(self, rows: Sequence[int]) -> Matrix:
+        """``[M R; B 0]`` of some rows."""
+        return np.block([[self.M, self.R[:, rows]], [self.B[rows], np.zeros((len(rows), len(rows)))]])
 
 
 T = TypeVar("T")

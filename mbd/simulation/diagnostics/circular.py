@@ -14,6 +14,7 @@ determinants must be positive.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,19 +41,12 @@ def circular_laws(stepper: Stepper, least: float = LEFT) -> str:
         return ""
     v = stepper.kernel
     # the saddle matrix of the rows that act now, without the law and with it
-    rows = [k for k in stepper.manager.active_rows(v.closed[: v.n_contacts], v.sticks[: v.n_frictions])
-            if not v.dropped[k]]  # fmt: skip
-    penalties = stepper.manager.penalties(v.closed[: v.n_contacts])
-    terms = stepper.mechanism.acceleration_terms(
-        float(v.time), v.q[: v.n_q], v.y[: v.n], v.params, v.anchors[: v.n_anchors], penalties, None,
-        v.lam[: v.n_rows],
-    )  # fmt: skip
-    n, m = v.n, len(rows)
-    if not m or not all(np.isfinite(part).all() for part in (terms.M, terms.R, terms.B)):
+    flags = v.closed[: v.n_contacts]
+    rows = stepper.acting(flags)
+    terms = stepper.terms(stepper.manager.penalties(flags), None, v.lam[: v.n_rows])
+    if not rows or not all(np.isfinite(part).all() for part in (terms.M, terms.R, terms.B)):
         return ""
-    free, whole = np.zeros((n + m, n + m)), np.zeros((n + m, n + m))
-    for matrix, right in (free, terms.B[rows].T), (whole, terms.R[:, rows]):
-        matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, right, terms.B[rows]
+    free, whole = replace(terms, R=terms.B.T).saddle(rows), terms.saddle(rows)
     # how the law changes its determinant
     (sign, size), (other, changed) = np.linalg.slogdet(free), np.linalg.slogdet(whole)
     ratio = sign * other * np.exp(min(changed - size, 50.0)) if sign != 0.0 and np.isfinite(size) else 1.0

@@ -43,21 +43,14 @@ def lost_grip(stepper: Stepper, events: Sequence[EventRecord]) -> str:
 
 def _forces_with(stepper: Stepper, contact: int) -> np.ndarray | None:
     """−λ of all rows with this contact closed at the accepted state, 0 of those that do not act; None if singular."""
-    v, mechanism = stepper.kernel, stepper.mechanism
+    v = stepper.kernel
     flags = v.closed[: v.n_contacts].copy()
     flags[contact] = 1
-    held = [k for k in stepper.manager.active_rows(flags, v.sticks[: v.n_frictions]) if not v.dropped[k]]
-    time, anchors = float(v.time), v.anchors[: v.n_anchors]
-    penalties = stepper.manager.penalties(flags)
-    q, y = v.q[: v.n_q], v.y[: v.n]
-    terms = mechanism.acceleration_terms(time, q, y, v.params, anchors, penalties)
-    n, m = v.n, len(held)
-    matrix = np.zeros((n + m, n + m))
-    matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, terms.R[:, held], terms.B[held]
+    held, terms = stepper.acting(flags), stepper.terms(stepper.manager.penalties(flags))
     try:
-        solved = np.linalg.solve(matrix, -np.concatenate([terms.f, terms.bias[held]]))
+        solved = np.linalg.solve(terms.saddle(held), -np.concatenate([terms.f, terms.bias[held]]))
     except np.linalg.LinAlgError:
         return None
     forces = np.zeros(v.n_rows)
-    forces[held] = -solved[n:]
+    forces[held] = -solved[v.n :]
     return forces

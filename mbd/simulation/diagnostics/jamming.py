@@ -86,12 +86,7 @@ def _determinant(stepper: Stepper, slips: Vector | None, loads: list[int], direc
     v = stepper.kernel
     lam = np.zeros(v.n_rows)
     lam[loads] = direction
-    time, anchors = float(v.time), v.anchors[: v.n_anchors]
-    terms = stepper.mechanism.acceleration_terms(time, v.q[: v.n_q], v.y[: v.n], v.params, anchors, (), slips, lam)
-    rows = v.rows[: int(v.n_active)]
-    n, m = v.n, len(rows)
-    matrix = np.zeros((n + m, n + m))
-    matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, terms.R[:, rows], terms.B[rows]
+    matrix = stepper.terms((), slips, lam).saddle(v.rows[: int(v.n_active)].tolist())
     if not np.isfinite(matrix).all():
         return 0.0, np.inf
     sign, size = np.linalg.slogdet(matrix)

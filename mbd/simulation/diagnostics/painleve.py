@@ -23,20 +23,15 @@ def consistent_forces(stepper: Stepper, contact: int) -> tuple[str, str]:
     that are closed and the frictions that stick go on as they are. Sliding needs ``g̈ = 0`` with ``p ≥ 0``, opening
     ``g̈₀ ≥ 0``. With ``dg̈/dp < 0`` neither is possible if ``g̈₀ < 0`` and both are if ``g̈₀ > 0`` (Painlevé 1895).
     """
-    v, mechanism = stepper.kernel, stepper.mechanism
+    v = stepper.kernel
     flags, slips = v.closed[: v.n_contacts].copy(), v.slip[: v.n_frictions].copy()
     flags[contact] = 0
-    held = [k for k in stepper.manager.active_rows(flags, v.sticks[: v.n_frictions]) if not v.dropped[k]]
-    normal = int(v.normal[contact])
-    q, y, anchors = v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors]
-    penalties = stepper.manager.penalties(flags)
-    terms = mechanism.acceleration_terms(float(v.time), q, y, v.params, anchors, penalties, slips, v.lam[: v.n_rows])
-    n, m = v.n, len(held)
-    matrix, right = np.zeros((n + m, n + m)), np.zeros((n + m, 2))
-    matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = terms.M, terms.R[:, held], terms.B[held]
+    held, normal, n = stepper.acting(flags), int(v.normal[contact]), v.n
+    terms = stepper.terms(stepper.manager.penalties(flags), slips, v.lam[: v.n_rows])
+    right = np.zeros((n + len(held), 2))
     right[:n, 0], right[n:, 0], right[:n, 1] = -terms.f, -terms.bias[held], terms.R[:, normal]
     try:
-        free, gained = terms.B[normal] @ np.linalg.solve(matrix, right)[:n]
+        free, gained = terms.B[normal] @ np.linalg.solve(terms.saddle(held), right)[:n]
     except np.linalg.LinAlgError:
         return NONE, ""
     free += terms.bias[normal]

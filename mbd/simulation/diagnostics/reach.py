@@ -66,7 +66,7 @@ def _posture(run: RunData, ahead: float) -> Posture:
 
 def _heights(work: Posture, rows: list[int]) -> np.ndarray:
     """What the rows are off."""
-    terms = work.mechanism.acceleration_terms(work.time, work.q, work.y, work.parameters, work.anchors, ())
+    terms = work.terms()
     return np.asarray(terms.h[rows])
 
 

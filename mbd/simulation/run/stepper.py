@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanism import AccelerationTerms, Mechanism
 from mbd.equations.equations import Equations
 from mbd.equations.programs import follows_multipliers
 from mbd.errors import MemoryLimitError, ModelError
@@ -216,6 +217,18 @@ class Stepper:
     def place_of(self, name: str) -> slice:
         """Where a kept array stands in `reals` or `integers`."""
         return self.shelves.place_of(name)
+
+    def acting(self, flags: Any) -> list[int]:
+        """Rows that act at the accepted state with these contacts closed, without those that depend on others."""
+        return [row for row in self.manager.active_rows(flags, self.kernel.sticks) if not self.kernel.dropped[row]]
+
+    def terms(
+        self, penalties: Sequence[int] = (), slips: Vector | None = None, lam: Vector | None = None
+    ) -> AccelerationTerms:
+        """M, f, R, B, h, ḣ, bias at the accepted state: see `Mechanism.acceleration_terms`."""
+        v = self.kernel
+        q, y, anchors = v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors]
+        return self.mechanism.acceleration_terms(float(v.time), q, y, v.params, anchors, penalties, slips, lam)
 
     def add_mode(self) -> None:
         """Make code for the contacts closed now."""

@@ -138,8 +138,9 @@ class Search:
             known = replace(known, error=error, gap=near[0].gap)
         elif len(trials) > 1 and not seen and is_rounding(finest):
             known = replace(known, error=rounding(finest, self.names) * float(finest.run.stats["steps"]))
-        return [seen.get(id(trial)) or replace(known, allowed=trial.allowed, run=trial.run, source=trial.source)
-                for trial in trials]  # fmt: skip
+        return [
+            seen.get(id(trial)) or replace(trial, error=known.error, gap=known.gap, finest=True) for trial in trials
+        ]
 
     def _against(self, trial: Trial, finest: Trial) -> Trial:
         """A run with the error that its difference from a finer one tells."""
