@@ -147,7 +147,7 @@ def test_equations_are_formulas_with_names_as_they_are():
 
 def test_formulas_that_are_too_many_stay_text(monkeypatch):
     equations = scene()[0].equations()
-    monkeypatch.setattr("mbd.equations.printing.FORMULAS", 3)
+    monkeypatch.setattr("mbd.equations.printing.MAX_FORMULAS", 3)
     bundle = equations._repr_mimebundle_()
     assert set(bundle) == {"text/plain", "text/html"} and Page(bundle["text/html"]).tags("pre")
 

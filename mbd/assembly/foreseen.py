@@ -14,7 +14,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.inertia import lost_sentence
-from mbd.equations.sizes import FEW, LARGE, operations, require_room
+from mbd.equations.sizes import MIN_CHECKED_OPERATIONS, MIN_JOINTS, operations, require_room
 from mbd.errors import AssemblyError
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Tape
@@ -49,11 +49,11 @@ def require_inertia(model: Any, position: Mapping[str, float], changed: Mapping[
     AssemblyError
         with the coordinate that moves most, the share of inertia, and what to try.
     """
-    if not isinstance(model, Description) or len(model.joints) < FEW or faults(model):
+    if not isinstance(model, Description) or len(model.joints) < MIN_JOINTS or faults(model):
         return
     chosen = plan(model)
     free = not (chosen.cut or model.bilaterals or model.nonholonomic)
-    if not free or operations(chosen) < LARGE or not all(joint.is_vector for joint in chosen.edges):
+    if not free or operations(chosen) < MIN_CHECKED_OPERATIONS or not all(joint.is_vector for joint in chosen.edges):
         return
     require_room(chosen)
     names, velocities = weighted_velocities(chosen, position, changed)

@@ -29,7 +29,7 @@ MAX_STEPS_TO_HALVE = 20
 """Steps of Newton's method in which the largest residual of a start must come down to half [-]."""
 NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
-TRIES, DESCENT = 4, 400
+MAX_STARTS, MAX_DESCENT_STEPS = 4, 400
 """Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
 NEWTON_RANGE = 1e-3
 """Row residual [m, rad] at the end of a descent from which Newton's method may go on."""
@@ -107,7 +107,7 @@ def descents(work: Posture, start: Vector, free: Matrix) -> list[Vector]:
     if not bool(np.any(free)):
         return [start.copy()]
     reach = np.where(_angles(work), 1.5, 0.5)
-    turns = np.random.default_rng(1).uniform(-1.0, 1.0, (TRIES, len(free)))
+    turns = np.random.default_rng(1).uniform(-1.0, 1.0, (MAX_STARTS, len(free)))
     turns[0] = 0.0
     return [work.equations.configuration.compose(start, np.where(free, reach * turn, 0.0)) for turn in turns]
 
@@ -123,7 +123,7 @@ def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -
     n_v, moving = work.equations.n_v, np.flatnonzero(free)
     h, B = _weighted_rows(work, rows, weights)
     damping = 1e-3
-    for _ in range(DESCENT):
+    for _ in range(MAX_DESCENT_STEPS):
         J = B[:, moving]
         steep = np.linalg.norm(J.T @ h) > 1e-13 * (1.0 + np.linalg.norm(h))
         if not len(moving) or not steep:  # nor where the rows have no derivative

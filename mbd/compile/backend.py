@@ -120,7 +120,7 @@ def backend(kind: str = "auto", level: int | None = None, cache: ObjectCache | N
             f"llvmlite is installed but does not load ({error}): plain Python runs instead, 100 to 300 times slower",
         )
     level = _level_of_environment() if level is None else level
-    chosen, hasty = (llvm.LEVEL, llvm.HASTY) if level is None else (level, None)
+    chosen, hasty = (llvm.LEVEL, llvm.MAX_QUICK_LINES) if level is None else (level, None)
     return Backend("llvm", "", lambda layout: llvm.Library(layout, chosen, cache, hasty))
 
 

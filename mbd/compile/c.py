@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from mbd.compile.layout import Layout
-from mbd.compile.lowering import LARGE, PART, lower
+from mbd.compile.lowering import MAX_OPERATIONS, PART_OPERATIONS, lower
 from mbd.tape.node import Node
 from mbd.trees.c import HEAD, Straight
 
 __all__ = ["c_source"]
 
 
-def c_source(programs: Mapping[str, Sequence[Node]], layout: Layout, large: int = LARGE, part: int = PART) -> str:
+def c_source(
+    programs: Mapping[str, Sequence[Node]], layout: Layout, large: int = MAX_OPERATIONS, part: int = PART_OPERATIONS
+) -> str:
     """A file with one ``void mbd_name(const double *block, const double *parameters, double *out)`` per program.
 
     With ``-ffp-contract=off`` it gives the bits of machine code without fused multiply-add (see `mbd.trees.c`).

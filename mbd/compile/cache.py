@@ -22,11 +22,11 @@ from pathlib import Path
 from mbd.dataclass import dataclass
 from mbd.notes import PROCESS, doubt
 
-__all__ = ["LIMIT", "ObjectCache", "default_cache", "key_of"]
+__all__ = ["MAX_BYTES", "ObjectCache", "default_cache", "key_of"]
 
-LIMIT = 256 * 2**20
+MAX_BYTES = 256 * 2**20
 """Bytes above which the entries that were used longest ago are removed (a model takes 10 to 200 kB)."""
-RECENT = 3600.0
+MAX_AGE = 3600.0
 """Age of the note of its last use below which an entry keeps it, and that of a draft that may still be written [s]."""
 
 _DIGEST = 32
@@ -81,7 +81,7 @@ class ObjectCache:
             data = content[_DIGEST:]
             if not data or _sealed(key, data) != content[:_DIGEST]:
                 return None
-            if time.time() - path.stat().st_mtime > RECENT:
+            if time.time() - path.stat().st_mtime > MAX_AGE:
                 os.utime(path)  # it was used
         except OSError:
             return None
@@ -121,31 +121,31 @@ class ObjectCache:
         return not problem
 
     def _prune_in_time(self, size: int) -> None:
-        """Prune at the first entry of a process, then whenever it has written a sixteenth of `LIMIT`.
+        """Prune at the first entry of a process, then whenever it has written a sixteenth of `MAX_BYTES`.
 
         Looking through a directory of 10 000 entries takes as long as compiling one.
         """
         place = str(self.directory)
         written = _written.get(place)
-        if written is None or written + size > LIMIT // 16:
+        if written is None or written + size > MAX_BYTES // 16:
             _written[place] = 0
             self._prune()
         else:
             _written[place] = written + size
 
     def _prune(self) -> None:
-        """Remove drafts that nobody finished, then the entries used longest ago until `LIMIT` is kept."""
+        """Remove drafts that nobody finished, then the entries used longest ago until `MAX_BYTES` is kept."""
         assert self.directory is not None
         entries = []
         now = time.time()
         for path, status in self._entries(self.directory):
             if path.name.endswith(_DRAFT):
-                if now - status.st_mtime > RECENT:
+                if now - status.st_mtime > MAX_AGE:
                     with contextlib.suppress(OSError):
                         path.unlink()
                 continue
             entries.append((path.name.startswith(_LASTING), status.st_mtime, status.st_size, path))
-        excess = sum(size for _, _, size, _ in entries) - LIMIT
+        excess = sum(size for _, _, size, _ in entries) - MAX_BYTES
         for _, _, size, path in sorted(entries):
             if excess <= 0:
                 return
@@ -173,7 +173,7 @@ def _content_of(path: Path) -> bytes | None:
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     with open(os.open(path, flags), "rb") as file:
         status = os.fstat(file.fileno())
-        if not stat.S_ISREG(status.st_mode) or _foreign(status) or status.st_size > LIMIT:
+        if not stat.S_ISREG(status.st_mode) or _foreign(status) or status.st_size > MAX_BYTES:
             return None
         return file.read()
 

@@ -18,9 +18,9 @@ from mbd.tape.node import Node
 
 __all__ = ["Energies"]
 
-OFTEN = 4
+MIN_CALLS = 4
 """Calls after which machine code is made: it takes some milliseconds, and saves one of a large mechanism in each."""
-FEW = 256
+MIN_STATES = 256
 """States above which numpy is as fast."""
 NAME = "energies"
 
@@ -53,7 +53,7 @@ class Energies:
     def __call__(self, inputs: Mapping[str, Any], parameters: Vector | Matrix) -> list[Vector]:
         self.calls += 1
         rows = len(inputs["t"])
-        if self._machine is None or self.calls <= OFTEN or rows > FEW:
+        if self._machine is None or self.calls <= MIN_CALLS or rows > MIN_STATES:
             return self._arrays(inputs, parameters)
         block, out = np.zeros((rows, self._layout.size)), np.empty((rows, 2))
         for kind in self._kinds & inputs.keys():

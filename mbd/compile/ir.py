@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from mbd.compile.layout import Layout
-from mbd.compile.lowering import LARGE, PART, lower
+from mbd.compile.lowering import MAX_OPERATIONS, PART_OPERATIONS, lower
 from mbd.tape.node import Node
 from mbd.trees.llvm import Straight, helpers
 
-__all__ = ["LIBRARY", "SIZE", "Module"]
+__all__ = ["LIBRARY", "MAX_LINES", "Module"]
 
-SIZE = 2500
+MAX_LINES = 2500
 """Lines of text after which a piece is full: some 1000 operations, with what goes in and out of their functions."""
 
 LIBRARY = (
@@ -41,8 +41,8 @@ class Module:
         programs: Mapping[str, Sequence[Node]],
         layout: Layout,
         fused: bool = False,
-        large: int = LARGE,
-        part: int = PART,
+        large: int = MAX_OPERATIONS,
+        part: int = PART_OPERATIONS,
     ) -> None:
         self.bodies, self.fused = lower(programs, layout, Straight, large, part), fused
         self.lines = sum(len(body.lines) for body in self.bodies)
@@ -52,7 +52,7 @@ class Module:
         texts = [body.text("internal " if body.apart else "") for body in self.bodies]
         return "\n".join([*texts, *helpers(self.bodies, self.fused)])
 
-    def pieces(self, size: int = SIZE) -> list[str]:
+    def pieces(self, size: int = MAX_LINES) -> list[str]:
         """Modules that together define the same; parts of functions see each other."""
         portions = list(self._portions(size))
         return [self.text()] if len(portions) == 1 else [self._piece(portion) for portion in portions]

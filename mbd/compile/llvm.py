@@ -17,9 +17,9 @@ Level 1 takes 8 % less than level 2 for code 2 % slower. Neither runs passes ove
 nothing to fold: they took 5 to 40 ms and gained nothing. Level 3 does, for the sake of the vectorization of
 straight-line code: slow to make, worth it for long runs. All levels give the same bits.
 
-Large programs do not wait for level 2 (`HASTY`): they run at level 0 at once, and the object files of level 2 are made
-in pieces beside the run (`background`). A function tells by `provisional` that it has not yet got its final address. As
-all levels give the same bits, it does not matter to any result when that happens.
+Large programs do not wait for level 2 (`MAX_QUICK_LINES`): they run at level 0 at once, and the object files of level 2
+are made in pieces beside the run (`background`). A function tells by `provisional` that it has not yet got its final
+address. As all levels give the same bits, it does not matter to any result when that happens.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
 __all__ = [
-    "HASTY", "LEVEL", "Build", "Library", "Machine", "MachineFunction", "cached_object", "call", "emit_object",
-    "load_object", "tag_key",
+    "LEVEL", "MAX_QUICK_LINES", "Build", "Library", "Machine", "MachineFunction", "cached_object", "call",
+    "emit_object", "load_object", "tag_key",
 ]  # fmt: skip
 
 LEVEL = 2
 """Default optimization level, see above."""
 
-HASTY = 4500
+MAX_QUICK_LINES = 4500
 """Lines of IR above which level 2 takes over 0.1 s, so that it is made in the background: some 2000 operations."""
 
 CUTS = {0: {"large": 150, "part": 120}}

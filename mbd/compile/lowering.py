@@ -2,9 +2,9 @@
 
 Every function is ``mbd.<name>(block, parameters, out)``; inputs are loaded once, nothing is reordered or contracted.
 Sines and cosines come first, four at a time (see `trees.trigonometry`), because a call empties all registers. A
-function above `LARGE` operations is cut into parts of about `PART`, which hand values on through an array of their
-caller: allocating registers costs more than linear time (16 000 operations: 0.8 s in one piece, 0.3 s in parts, which
-run 2 % slower).
+function above `MAX_OPERATIONS` operations is cut into parts of about `PART_OPERATIONS`, which hand values on through
+an array of their caller: allocating registers costs more than linear time (16 000 operations: 0.8 s in one piece,
+0.3 s in parts, which run 2 % slower).
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Table
 from mbd.trees.trigonometry import WIDTHS
 
-__all__ = ["LARGE", "MANY_RUNS", "MANY_ZEROS", "PART", "Target", "lower"]
+__all__ = ["MAX_OPERATIONS", "MIN_RUNS", "MIN_ZEROS", "PART_OPERATIONS", "Target", "lower"]
 
-LARGE = 2500
+MAX_OPERATIONS = 2500
 """Operations above which a function is cut into parts."""
-PART = 250
+PART_OPERATIONS = 250
 """Operations of a part."""
-MANY_ZEROS = 12
+MIN_ZEROS = 12
 """Zeros side by side from which on they are written together: large matrices consist of little else."""
-MANY_RUNS = 24
+MIN_RUNS = 24
 """Such runs from which on all between the first and the last is cleared before anything is stored: LLVM takes 2 s for
 200 calls that clear something behind one another, and 0.2 s for the rest of that function."""
 
@@ -80,8 +80,8 @@ def lower(
     programs: Mapping[str, Sequence[Node]],
     layout: Layout,
     target: Callable[[str, Sequence[str], bool], T],
-    large: int = LARGE,
-    part: int = PART,
+    large: int = MAX_OPERATIONS,
+    part: int = PART_OPERATIONS,
 ) -> list[T]:
     """One function ``mbd.<name>`` per program, each after its parts.
 
@@ -191,7 +191,7 @@ class _Body:
             if node.args or node.index not in self.places:
                 continue
             for first, number in _runs(self.places.pop(node.index)):
-                if number >= MANY_ZEROS and node.is_zero:
+                if number >= MIN_ZEROS and node.is_zero:
                     self.target.clear("out", first, number)
                     continue
                 for place in range(first, first + number):
@@ -260,8 +260,8 @@ class _Body:
 def _clear_at_once(target: Target, outputs: Sequence[Node], places: dict[int, list[int]]) -> None:
     """Clear a stretch of outputs at the beginning where many runs of zeros are in it, and forget these zeros."""
     zeros = next((own for own in places.values() if outputs[own[0]].is_zero), [])
-    runs = [(first, number) for first, number in _runs(zeros) if number >= MANY_ZEROS] if zeros else []
-    if len(runs) < MANY_RUNS:
+    runs = [(first, number) for first, number in _runs(zeros) if number >= MIN_ZEROS] if zeros else []
+    if len(runs) < MIN_RUNS:
         return
     begin, end = runs[0][0], sum(runs[-1])
     target.clear("out", begin, end - begin)

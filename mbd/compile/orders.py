@@ -24,18 +24,18 @@ from mbd.dataclass import dataclass
 from mbd.tape.node import Node
 from mbd.tape.ordering import Order, order
 
-__all__ = ["FEWER", "SMALLEST", "Filled", "elimination_order", "flat_order", "is_unit", "may_pay", "pattern"]
+__all__ = ["MIN_SAVING", "MIN_UNKNOWNS", "Filled", "elimination_order", "flat_order", "is_unit", "may_pay", "pattern"]
 
-SMALLEST = 21
+MIN_UNKNOWNS = 21
 """Unknowns from which on an order is looked for: below, loops over dense rows take no longer [-]."""
-FEWER = 4
+MIN_SAVING = 4
 """How many times fewer operations than dense elimination it must take [-]."""
 
 
 def may_pay(filled: Filled, n: int, rows: Sequence[int]) -> bool:
     """Whether there may be an order that pays, as far as size and entries of the matrices of accelerations tell."""
     size = n + len(rows)
-    return size >= SMALLEST and 4 * len(filled.places(n, rows)) <= size * size
+    return size >= MIN_UNKNOWNS and 4 * len(filled.places(n, rows)) <= size * size
 
 
 def elimination_order(
@@ -62,7 +62,7 @@ def elimination_order(
     if 4 * len(places) > size * size:
         return None
     found = order(places, numbers, n, size)
-    if found is None or FEWER * found.operations > size**3 / 3.0:
+    if found is None or MIN_SAVING * found.operations > size**3 / 3.0:
         return None
     return flat_order(found, n, n_rows, rows)
 

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 __all__ = ["HeldForces", "held_force_faults"]
 
-PLACEHOLDER = 1 << 30
+FIRST_PLACEHOLDER = 1 << 30
 """Number of the first placeholder, far above those of rows."""
-CURE = (
+ADVICE = (
     "let the law read a sample of it (mbd.SampledLaw), or a first-order state that follows it (rates of an "
     "mbd.constraints.Law or a Loss)"
 )
@@ -84,14 +84,14 @@ class HeldForces:
         if word is not None and (what in OF_GAPS or word.kind == "penalty"):
             return self._of_law(word, what)
         if self._first is None:
-            return self._scope.tape.input("lam", PLACEHOLDER + len(self.asked))
+            return self._scope.tape.input("lam", FIRST_PLACEHOLDER + len(self.asked))
         return self._known(name) if self._known.offers(name) else None
 
     def _of_law(self, word: Constraint, what: str) -> Node | None:
         """Gap, its rate, and the force of a penalty contact, which the law gives as functions of the motion."""
         scope, number = self._scope, list(self._contacts).index(word.name)
         if word.name in self._within:
-            raise ModelError(f"'{word.name}' asks for '{word.name}.{what}', which it gives itself; {CURE}")
+            raise ModelError(f"'{word.name}' asks for '{word.name}.{what}', which it gives itself; {ADVICE}")
         if word.name not in self._laws:
             anchors = () if self._first is None else self._first.contacts[number].anchors
             self._within.add(word.name)
@@ -160,7 +160,7 @@ def held_force_faults(equations: Equations, asked: Iterable[str]) -> list[str]:
         condition = None if guard.transition is None else guard.transition.condition
         if lam([guard.value, condition]):
             found.append(
-                f"'{guard.name}' waits for a function of {names}, whose rate is not known between steps; {CURE}, and "
+                f"'{guard.name}' waits for a function of {names}, whose rate is not known between steps; {ADVICE}, and "
                 "wait for that"
             )
     for effect in equations.effects:
@@ -174,6 +174,6 @@ def held_force_faults(equations: Equations, asked: Iterable[str]) -> list[str]:
         if friction >= 0:
             found.append(
                 f"a law reads the dry friction of '{equations.frictions[friction].name}', which follows its normal "
-                f"force as it slides; read that force, or {CURE}"
+                f"force as it slides; read that force, or {ADVICE}"
             )
     return list(dict.fromkeys(found))

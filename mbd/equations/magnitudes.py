@@ -11,9 +11,9 @@ from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["magnitudes", "of_directions"]
 
-SPREAD = 16.0
+MAX_SUM_RATIO = 16.0
 """How far the sum of the terms of a force may lie above the root of their squares: as far as 256 equal ones do."""
-VANISHED = 0.1
+MIN_SINE = 0.1
 """Share of its amplitude that a sine has at least: round-off of its argument when it vanishes."""
 
 
@@ -35,7 +35,7 @@ def of_directions(values: Iterable[Scalar]) -> dict[int, float]:
 
 
 def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] | None = None) -> list[Node]:
-    """Σ|terms| through sums and products, bounded by `SPREAD` times their root of squares.
+    """Σ|terms| through sums and products, bounded by `MAX_SUM_RATIO` times their root of squares.
 
     Where a vector is turned, Σ|terms| of its components is up to √2 times as long as the vector, and in recursions up
     and down a chain of n links this grows like 2ⁿ: beyond some twenty links every residual would pass for round-off.
@@ -51,7 +51,7 @@ def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] |
     """
     bounds = known or {}
     sums, squares = _sums(tape, outputs, bounds), _squares(tape, outputs, bounds)
-    return [minimum(s, SPREAD * sqrt(q)) for s, q in zip(sums, squares, strict=True)]
+    return [minimum(s, MAX_SUM_RATIO * sqrt(q)) for s, q in zip(sums, squares, strict=True)]
 
 
 def _sums(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> list[Node]:
@@ -79,19 +79,19 @@ def _sums(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> li
 
 
 def _squares(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> list[Node]:
-    """Σ terms² through sums and products, at least x²; sines have at least `VANISHED` of their amplitude."""
+    """Σ terms² through sums and products, at least x²; sines have at least `MIN_SINE` of their amplitude."""
     size: dict[int, Node] = {}
     for node in live(outputs):
         parts = [size[arg.index] for arg in node.args]
         if node.index in known:
-            size[node.index] = node * node + (VANISHED * known[node.index]) ** 2
+            size[node.index] = node * node + (MIN_SINE * known[node.index]) ** 2
         elif node.op in ("add", "sub"):
             size[node.index] = maximum(parts[0] + parts[1], node * node)
         elif node.op in ("mul", "div"):
             by = parts[1] if node.op == "mul" else node.args[1] * node.args[1]
             size[node.index] = parts[0] * by if node.op == "mul" else parts[0] / by
         elif node.op in ("sin", "cos", "tanh"):
-            size[node.index] = node * node + VANISHED**2
+            size[node.index] = node * node + MIN_SINE**2
         elif node.op == "table":
             size[node.index] = node * node + _amplitude(node) ** 2
         else:

@@ -19,7 +19,7 @@ from mbd.tape.sympy import raise_to_sympy
 __all__ = ["Report", "report"]
 
 
-FORMULAS = 300
+MAX_FORMULAS = 300
 """Lines of formulas that a notebook sets; more of them it shows as text."""
 
 
@@ -35,10 +35,10 @@ class Report(Text):
     def _repr_latex_(self) -> str | None:
         """Formulas for a display, with what their symbols mean; None where they are too many."""
         parts = _parts(self.equations)
-        if operations([node for entries in parts.values() for node in entries.values()]) > 4 * FORMULAS:
+        if operations([node for entries in parts.values() for node in entries.values()]) > 4 * MAX_FORMULAS:
             return None
         lines, legend = _formulas(self.equations, parts)
-        if len(lines) > FORMULAS:
+        if len(lines) > MAX_FORMULAS:
             return None
         names = [f"&\\mathrm{{{_escaped(line)}}}" for line in [self.equations.name, *legend]]
         body = " \\\\\n".join([*names, *lines]).replace("<", r"\lt ").replace(">", r"\gt ")  # no tags of a page

@@ -77,7 +77,7 @@ class Correction:
     tail: int
 
 
-LARGEST = 20
+MAX_UNKNOWNS = 20
 """Unknowns above which a system is not eliminated on the tape."""
 
 
@@ -92,7 +92,7 @@ def correction(
     """
     inputs, rows, tape = Inputs.of(equations), sorted(rows), equations.tape
     n, n_v, m = inputs.n, equations.n_v, len(rows)
-    if not 0 < n + m <= LARGEST:
+    if not 0 < n + m <= MAX_UNKNOWNS:
         return None
     matrix, tail = _whole(equations, *system(equations, rows, penalties, stabilized, sliding))
     inertia = substitute([matrix[k][k] for k in range(n)], {inputs.c[0]: 0.0, inputs.c[1]: 0.0})

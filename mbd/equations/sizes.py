@@ -20,10 +20,10 @@ BYTES, SECONDS = 800.0, 25e-6
 """Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 1000 links."""
 BYTES_OF_TANGENT = 550.0
 """Memory for each of these operations beside that as the tangent of implicit steps is derived and compiled."""
-LARGE = 1e6
+MIN_CHECKED_OPERATIONS = 1e6
 """Operations below which the free memory is not asked for [-]."""
-FEW = 12
-"""Joints that are fewer make no `LARGE` tree: with two floating bodies each, 18 coordinates a joint at most."""
+MIN_JOINTS = 12
+"""Fewer joints make no tree of so many operations: with two floating bodies each, 18 coordinates a joint at most."""
 
 
 def operations(plan: Plan) -> float:
@@ -47,7 +47,7 @@ def require_room(plan: Plan) -> None:
         with the numbers of bodies and joints, the memory and the time predicted, and what to try.
     """
     expected = operations(plan)
-    if expected < LARGE:
+    if expected < MIN_CHECKED_OPERATIONS:
         return
     needed, free = BYTES * expected, available()
     if needed <= free:
@@ -64,7 +64,7 @@ def require_room(plan: Plan) -> None:
 
 def tangent_refused(derived: int) -> str:
     """Why Newton's matrix of `derived` operations is not derived: the free memory, what to try; '' where it fits."""
-    if derived < LARGE:
+    if derived < MIN_CHECKED_OPERATIONS:
         return ""
     needed, free = BYTES_OF_TANGENT * derived, available()
     if needed <= free:

@@ -35,7 +35,7 @@ MAX_JUMPS = 1_000_000
 """Instants of one switch at most [-]."""
 MIN_SAMPLES, MAX_SAMPLES = 4096, 1_048_576
 """Samples in time of an expression that is not linear in it [-]."""
-SMOOTH = 4
+SMOOTH_ORDER = 4
 """Derivatives of a cubic from which none jumps."""
 
 Targets = Callable[[float, float], Vector]
@@ -147,7 +147,7 @@ def _of_operation(node: Node, offset: int, owner: str) -> Iterable[Switch]:
 def _of_table(node: Node, phase: tuple[Node, float, float] | None, offset: int, owner: str) -> Switch:
     table, order = node.data
     breaks, jumps = np.array(table.breaks[1:]), np.array(table.jumps)
-    counts = jumps < SMOOTH
+    counts = jumps < SMOOTH_ORDER
     breaks, levels = breaks[counts], np.maximum(jumps[counts] - order, 0) + offset
     if phase is None:
         return Switch(
@@ -230,7 +230,7 @@ def table_faults(equations: Equations) -> list[str]:
         offset = -1 if any(row.owner == switch.owner and row.is_velocity for row in equations.rows) else -2
         ends = 0 if switch.node.args[0].index in switch.node.tape.phases else 1
         inside = table.jumps[ends : len(table.jumps) - ends]
-        lowest = min(inside, default=SMOOTH) - order + offset
+        lowest = min(inside, default=SMOOTH_ORDER) - order + offset
         if lowest < (0 if offset == -1 else 1):
             faults.append(
                 f"{switch.owner!r} reads a table whose {'slope' if offset == -1 else 'second derivative'} does not "
@@ -247,7 +247,7 @@ def jumps_between(
     begin: float,
     end: float,
     dt: float,
-    highest: int = SMOOTH,
+    highest: int = SMOOTH_ORDER,
 ) -> tuple[Jump, ...]:
     """The instants after begin and up to end at which the equations jump, in order.
 
@@ -273,7 +273,7 @@ class _Times:
         self.begin, self.end, self.dt = begin, end, dt
         self._known: dict[int, tuple[Vector, Vector]] = {}
 
-    def jumps(self, switch: Switch, highest: int = SMOOTH) -> list[Jump]:
+    def jumps(self, switch: Switch, highest: int = SMOOTH_ORDER) -> list[Jump]:
         """Those of one switch, after begin and up to end."""
         times, values = self.passes(switch)
         node, levels = switch.node, switch.level(values)

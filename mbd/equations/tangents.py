@@ -22,9 +22,9 @@ Columns = list[list[Node]]
 Forces = tuple[list[Node], list[Node], list[Node], list[Node]]
 """What acts besides `balance`: values, what acts on each of them; rates, what acts on each of them."""
 
-CLEAR = 0.1
+MIN_ADVANTAGE = 0.1
 """Part by which one way must be shorter for the balance alone to be taken for every contact mode without counting."""
-DEEP = 8.0
+MAX_DEPTH = 8.0
 """Coordinates that move a body, on average, from which on branches are shorter: seeds cost three times as much a pair.
 """
 
@@ -40,10 +40,10 @@ def tangent(equations: Equations, r: Sequence[Node], forces: Forces, others: Seq
     others : what is evaluated beside, whose parts cost nothing
     """
     ratio = _ratio(equations)
-    if ratio > 1.0 + CLEAR:
+    if ratio > 1.0 + MIN_ADVANTAGE:
         return seeded(equations, r)
     known = _known(equations, forces)
-    if known is None or ratio < 1.0 - CLEAR:
+    if known is None or ratio < 1.0 - MIN_ADVANTAGE:
         return seeded(equations, r) if known is None else known
     swept = seeded(equations, r)
     return known if _size([*r, *others], known) < _size([*r, *others], swept) else swept
@@ -72,7 +72,7 @@ def _ratio(equations: Equations) -> float:
         balance, ratio = list(equations.balance), float("inf")
         known = _known(equations, ([], [], [], []))
         if known is not None:
-            deep = equations.geometry is not None and equations.geometry.depth >= DEEP
+            deep = equations.geometry is not None and equations.geometry.depth >= MAX_DEPTH
             ratio = 0.0 if deep else _size(balance, known) / max(1, _size(balance, seeded(equations, balance)))
         equations.memory["branches over seeds"] = ratio
     return float(equations.memory["branches over seeds"])

@@ -20,7 +20,7 @@ from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 
 __all__ = ["CASES"]
 
-BESIDE = 1e-6
+ANGLE_OFFSET = 1e-6
 """How far beside the angle of toppling a block is let go, relative [-]."""
 
 
@@ -198,11 +198,11 @@ def _apart(run: Any, block: Block, angle: float, rate: float, scheme: Any) -> fl
 def _threshold(block: Block, threshold: float, scheme: Any, dt: float) -> Figure:
     """Let go at rest just below the angle at which it topples, the block falls back; just above, it falls over."""
     wrong = 0
-    for share, falls_over in ((1.0 - BESIDE, False), (1.0 + BESIDE, True)):
+    for share, falls_over in ((1.0 - ANGLE_OFFSET, False), (1.0 + ANGLE_OFFSET, True)):
         run = rock(block, share * threshold, 0.0, scheme, dt, 20.0 * dt)
         wrong += bool(run["place.angle.rate"][-1] > 0.0) is not falls_over
     return Figure(
-        f"starts {BESIDE:g} beside the toppling threshold, relative, that fall to the wrong side [-]", wrong, 0.0
+        f"starts {ANGLE_OFFSET:g} beside the toppling threshold, relative, that fall to the wrong side [-]", wrong, 0.0
     )
 
 

@@ -25,9 +25,9 @@ __all__ = [
 ]  # fmt: skip
 
 EPS = float(np.finfo(float).eps)
-ORDER = 2.0
+MIN_ORDER = 2.0
 """What every scheme that is judged promises at least."""
-MOST_DEVIATION = 0.15
+ORDER_ATOL = 0.15
 """How far an observed order may be from it."""
 
 
@@ -55,10 +55,10 @@ def deviation(steps: Any, errors: Any, floor: Any, better: bool = False) -> floa
     for k in range(1, len(sizes)):
         coarse, fine, least = float(sizes[k - 1]), float(sizes[k]), float(floors[k])
         refinement = float(h[k - 1] / h[k])
-        if max(fine, coarse) <= 4.0 * least or (fine <= least and coarse <= refinement**ORDER * least):
+        if max(fine, coarse) <= 4.0 * least or (fine <= least and coarse <= refinement**MIN_ORDER * least):
             continue  # at round-off, where it should be
         order = math.log(max(coarse, least, 1e-300) / max(fine, least, 1e-300)) / math.log(refinement)
-        short = ORDER - order
+        short = MIN_ORDER - order
         worst = max(worst, abs(short) if fine > least and not better else short)
     return worst
 
@@ -80,11 +80,11 @@ def second_order(
         rank or behind a switch: with an order above 2 nothing smooth hides that, errors do not fall evenly, and what
         order 2 allows at every step is the whole judgement
     """
-    norms, higher = _norms(errors), order > ORDER
+    norms, higher = _norms(errors), order > MIN_ORDER
     off = deviation(steps, norms, floor, better or higher)
     judgement = "what is missing to order 2" if better or higher else "|order − 2|"
     figures = [
-        Figure(f"{judgement}, {what.partition(' [')[0]} [-]", off, MOST_DEVIATION),
+        Figure(f"{judgement}, {what.partition(' [')[0]} [-]", off, ORDER_ATOL),
         Figure(f"{what} at dt = {float(steps[-1]):.3g} s", float(norms[-1]), limit),
     ]
     if not higher:
@@ -95,7 +95,7 @@ def second_order(
 def at_every_step(what: str, steps: Any, errors: Sequence[Any], limit: float) -> Figure:
     """Errors over what order 2 allows at each step, ``limit (dt/finest)²``: the largest."""
     h = np.asarray(steps, dtype=float)
-    share = float(np.max(_norms(errors) / (limit * (h / h[-1]) ** ORDER)))
+    share = float(np.max(_norms(errors) / (limit * (h / h[-1]) ** MIN_ORDER)))
     return Figure(f"{what.partition(' [')[0]} over what order 2 allows, worst of all steps [-]", share, 1.0)
 
 

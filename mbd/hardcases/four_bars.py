@@ -18,11 +18,11 @@ from mbd.hardcases.schemes import DAMPED, EVERY, holds_positions_only
 
 __all__ = ["CASES", "four_bars"]
 
-CLOSE = 1e-8
+CLOSURE_ATOL = 1e-8
 """How far cranks may be from parallel [rad] and joints from closed [m]."""
-ENERGY = 1e-3
+ENERGY_RTOL = 1e-3
 """Most change of energy that the definition allows [-]; a scheme of order 2 is far below it."""
-FACTOR = 0.4
+ERROR_FACTOR = 0.4
 """Of the allowance of errors, with the rate at a flat pose."""
 
 
@@ -75,7 +75,7 @@ def judge_four_bars(case: str, dts: tuple[float, float], integrator: Any) -> Out
     found = study(errors, dts[holds_positions_only(integrator)], integrator, 2)
     finest = runs[-1]
     turning, fine = rate.size, float(found.steps[-1])
-    limit = allowance(FACTOR, turning, fine)
+    limit = allowance(ERROR_FACTOR, turning, fine)
     flat, round_ = _when(finest, turn, 0.5 * math.pi), _when(finest, turn, 2.0 * math.pi)
     speed = abs(float(finest.at(flat)["base 0.angle.rate"])) if flat == flat else math.nan
     total = finest.energy.total
@@ -84,14 +84,14 @@ def judge_four_bars(case: str, dts: tuple[float, float], integrator: Any) -> Out
         [
             Figure("runs that stop early", sum(not run.success for run in runs), 0),
             *found.figures(dict(zip(found.errors, (limit, limit * place.size), strict=True)), erratic=True),
-            Figure("change of energy, relative [-]", change, min(ENERGY, limit)),
+            Figure("change of energy, relative [-]", change, min(ENERGY_RTOL, limit)),
             Figure("error of the energy at the start [J]", abs(total[0] - energy.value), energy.accuracy),
             Figure("wrong number of flat poses", max(abs(_passes(run, turn) - float(passes.value)) for run in runs), 0),
             Figure("error of the time of the first flat pose [s]", abs(flat - float(first.value)), limit * first.size),
             Figure("error of the rate there [rad/s]", abs(speed - float(rate.value)), limit * rate.size),
             Figure("error of the time of one revolution [s]", abs(round_ - float(period.value)), limit * period.size),
-            Figure("cranks out of parallel [rad]", max(_skew(model, run) for run in runs), CLOSE),
-            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSE),
+            Figure("cranks out of parallel [rad]", max(_skew(model, run) for run in runs), CLOSURE_ATOL),
+            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSURE_ATOL),
         ],
         [Curve("crank angle [rad]", finest.time, turn - finest["base 0.angle"]), *found.curves()],
     )
@@ -123,12 +123,14 @@ def _skew(model: mbd.Model, run: Any) -> float:
     return max(float(np.max(np.abs(run[f"{base}.angle"] - run["base 0.angle"]))) for base in bases)
 
 
-MUST = "Every flat pose is passed on the parallelogram branch, without a jump of energy, with an error of order 2."
+REQUIREMENT = (
+    "Every flat pose is passed on the parallelogram branch, without a jump of energy, with an error of order 2."
+)
 
 CASES = tuple(
     HardCase(
         id,
-        MUST,
+        REQUIREMENT,
         partial(judge_four_bars, id, dts),
         DAMPED if slow else EVERY,
         slow,

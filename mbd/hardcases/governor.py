@@ -22,7 +22,7 @@ LARGE, LARGE_ERROR = 1e-2, 1e-3
 """A step [s] that must be taken without failure, and the most that the slider may be off then [m]."""
 FIRST, BOUNDED = 2e-3, 5e-4
 """The largest of the smaller steps [s], and that of an explicit scheme: ω dt = 4 with the fastest rate, 8100/s."""
-FACTOR = 2.0
+ERROR_FACTOR = 2.0
 """Of the allowance of errors, with the rate of the shaft; that of its angle is reckoned per radian."""
 
 
@@ -102,7 +102,7 @@ def judge_governor(integrator: Any) -> Outcome:
     return Outcome(
         [
             *figures,
-            *found.figures({what: allowance(FACTOR, rate, fine, size) for what, size in sizes.items()}, floors),
+            *found.figures({what: allowance(ERROR_FACTOR, rate, fine, size) for what, size in sizes.items()}, floors),
             Figure("difference of the two rods [rad]", max(uneven, default=math.nan), skew.accuracy),
         ],
         [Curve("height of the slider [m]", large.time, large["sleeve.displacement"]), *found.curves()],
@@ -116,7 +116,7 @@ def _taken(run: Any) -> list[Figure]:
     if run.success:
         off = np.abs(run.at(slider.times)["sleeve.displacement"] - slider.value)
     rate, *before, last = definition(B5)["initial_conditions"]["shaft_rate"], *slider.times
-    most, what = allowance(FACTOR, rate, LARGE, slider.size), f"error of the slider at dt = {LARGE:g} s"
+    most, what = allowance(ERROR_FACTOR, rate, LARGE, slider.size), f"error of the slider at dt = {LARGE:g} s"
     return [
         Figure(f"{what}, t ≤ {before[-1]:g} s [m]", float(np.max(off[:-1])), LARGE_ERROR),
         Figure(f"{what}, t = {last:g} s [m]", float(off[-1]), most),

@@ -14,7 +14,7 @@ from mbd.hardcases.references import accuracy, numbers, published, size
 
 __all__ = ["CASES"]
 
-LIMIT = 1e-10
+ERROR_RTOL = 1e-10
 """Of errors relative to the largest value: flights are parabolas, which every scheme takes exactly."""
 
 
@@ -66,7 +66,7 @@ def errors(id: str, run: Any) -> list[Figure]:
     for name, values in found.items():
         wanted = published(id, name)
         off = size(values - wanted) if values.shape == wanted.shape else float("nan")
-        most = max(LIMIT * size(wanted), 10.0 * accuracy(id, name))
+        most = max(ERROR_RTOL * size(wanted), 10.0 * accuracy(id, name))
         figures.append(Figure(f"error of {name} over the limit [-]", off / most, 1.0))
     return figures
 

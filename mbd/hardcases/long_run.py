@@ -19,18 +19,18 @@ from mbd.hardcases.schemes import is_undamped
 __all__ = ["CASES", "long_pendulum"]
 
 J12, QUICK = "j12-long-time-1e5-periods", "j12-long-time-1e3-periods"
-STEPS = 100
+STEPS_PER_PERIOD = 100
 """Steps in a period [-]."""
 FIRST, TIMES = 10, 5.0
 """Energy may differ at the end by so many times what it does within the first periods [-]."""
-PHASE = 0.05
+PHASE_FACTOR = 0.05
 """How far the phase may be from periods × relative error of one × 2π [-]."""
 SMALL, SMALL_RATE, RATE = 0.05, 0.01, 0.05
 """A small amplitude over that of the case; how far its decay, and that of the case, may be from the one predicted by
 the algorithmic damping of linear oscillators [-]."""
-HIGHER_PHASE = 0.01
+HIGH_ORDER_PHASE_FACTOR = 0.01
 """Phase error of a scheme of order p > 2, over periods × (ω dt)^p × 2π; that of order 8 needs a fifth of it [-]."""
-SEEN = 1e3
+MIN_LOSS_OVER_ROUND_OFF = 1e3
 """Loss of energy over its round-off above which the rate of decay is judged [-]."""
 BLOCKS = 20
 """Parts of the run whose mean energies must fall."""
@@ -53,16 +53,16 @@ def judge_long_run(case: str, integrator: Any) -> Outcome:
     numbers = definition(case)["definition"]
     count = int(numbers["n_periods"])
     until = float(quantity(case, "end time").value)
-    dt = until / count / STEPS
+    dt = until / count / STEPS_PER_PERIOD
     model, start = long_pendulum(case=case)
-    begin = mbd.simulate(model, start, integrator, dt=dt, until=FIRST * STEPS * dt)
+    begin = mbd.simulate(model, start, integrator, dt=dt, until=FIRST * STEPS_PER_PERIOD * dt)
     bottom = numbers["m"] * numbers["g"] * numbers["L"]
     energy = quantity(case, "energy above")
     total = begin.energy.total + bottom
     figures = [Figure("error of the energy at the start [J]", abs(total[0] - energy.value), 10.0 * energy.accuracy)]
     higher = integrator.order() > 2
     if is_undamped(integrator):
-        run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=STEPS)
+        run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=STEPS_PER_PERIOD)
         figures += _kept(run, bottom, float(np.max(np.abs(total / total[0] - 1.0))))
         figures += _phase(case, run, begin, count)
     else:
@@ -70,10 +70,10 @@ def judge_long_run(case: str, integrator: Any) -> Outcome:
         figures += _higher(case, integrator, run, count, bottom) if higher else _falling(run, bottom)
         if not higher:
             figures.append(_rate(case, integrator, dt, 1.0, run, RATE))
-        few = min(count, 1000) * STEPS * dt
+        few = min(count, 1000) * STEPS_PER_PERIOD * dt
         model, start = long_pendulum(SMALL, case)
         small = mbd.simulate(model, start, integrator, dt=dt, until=few, store=_stride(min(count, 1000)))
-        if _loss(case, integrator, dt, small) > SEEN * _round_off(case, small):
+        if _loss(case, integrator, dt, small) > MIN_LOSS_OVER_ROUND_OFF * _round_off(case, small):
             figures.append(_rate(case, integrator, dt, SMALL, small, SMALL_RATE))
     return Outcome(figures, [Curve("energy [J]", run.time, run.energy.total + bottom, y_label="energy [J]")])
 
@@ -112,7 +112,7 @@ def _higher(case: str, integrator: Any, run: Any, count: int, bottom: float) -> 
     return [
         Figure("energy gained, relative [-]", float(np.max(off)), _round_off(case, run)),
         Figure("energy lost, relative, over periods × (ω dt)^p × 2π [-]", float(np.max(-off)) / allowed, 1.0),
-        Figure("phase error over periods × (ω dt)^p × 2π [-]", abs(lag) / allowed, HIGHER_PHASE),
+        Figure("phase error over periods × (ω dt)^p × 2π [-]", abs(lag) / allowed, HIGH_ORDER_PHASE_FACTOR),
     ]
 
 
@@ -140,9 +140,9 @@ def _phase(case: str, run: Any, begin: Any, count: int) -> list[Figure]:
     one = (found[-1] - found[0]) / (len(found) - 1) / period - 1.0
     expected = 2.0 * math.pi * count * one
     return [
-        Figure("phase error over periods × error of one × 2π, less 1 [-]", abs(lag / expected - 1.0), PHASE),
+        Figure("phase error over periods × error of one × 2π, less 1 [-]", abs(lag / expected - 1.0), PHASE_FACTOR),
         Figure("relative error of the period over (ω dt)²/12, less 1 [-]",
-               abs(one / ((frequency * period / STEPS) ** 2 / 12.0) - 1.0), 0.5),
+               abs(one / ((frequency * period / STEPS_PER_PERIOD) ** 2 / 12.0) - 1.0), 0.5),
     ]  # fmt: skip
 
 
@@ -190,12 +190,14 @@ def _rate(case: str, integrator: Any, dt: float, share: float, run: Any, limit: 
                   abs((level[0] - level[-1]) / expected - 1.0), limit)  # fmt: skip
 
 
-MUST = "Undamped: energy bounded, phase error adds up; damped: energy falls at the rate of the algorithmic damping."
+REQUIREMENT = (
+    "Undamped: energy bounded, phase error adds up; damped: energy falls at the rate of the algorithmic damping."
+)
 
 CASES = tuple(
     HardCase(
         id,
-        MUST,
+        REQUIREMENT,
         partial(judge_long_run, id),
         ("Newmark", "HHT", "generalized-alpha", "RadauIIA", "RungeKutta853"),
         slow,

@@ -19,7 +19,7 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "bob_on_link", "heavy_below_light"]
 
 J4, J5 = "j4-mass-ratio-1e6", "j5-near-massless-link"
-GAP = 1e-10
+GAP_ATOL = 1e-10
 """Gap of a joint [m] that is allowed."""
 RESOLVING = {2: ((1e-6, 2.5e-7), 5e-7), 3: ((1e-6, 5e-7), 1e-6), 8: ((2e-6, 1e-6), 2e-6)}
 """Steps [s] that resolve the snap of the light mass through the straight line, in minimal and in absolute coordinates,
@@ -28,7 +28,7 @@ COARSE = (1e-2, 1e-3, 1e-4)
 """Steps [s] that do not: there a scheme may damp it or say that it cannot go on."""
 ANGLE_LIMIT, RATE_LIMIT, ABSOLUTE = 8e-5, 1.6e-2, 25.0
 """Errors at the finest step [rad, rad/s]; in absolute coordinates, at steps that are larger, so many times that."""
-GAIN = 1e-3
+ENERGY_GAIN_RTOL = 1e-3
 """Energy that may be gained, over that of the heavy mass between its lowest and highest place [-]."""
 
 
@@ -76,8 +76,8 @@ def judge_mass_ratio(integrator: Any) -> Outcome:
     figures = found.figures(limits, dict.fromkeys(limits, reference.accuracy), better=True)
     for what, limit in limits.items():
         figures.append(Figure(f"{what} at dt = {middle:g} s, absolute coordinates", apart[what], ABSOLUTE * limit))
-    figures.append(Figure("gap of the joints at any step [m]", gap, GAP))
-    figures.append(Figure("energy gained in silence at large steps [-]", max(silent), GAIN))
+    figures.append(Figure("gap of the joints at any step [m]", gap, GAP_ATOL))
+    figures.append(Figure("energy gained in silence at large steps [-]", max(silent), ENERGY_GAIN_RTOL))
     return Outcome(figures, [*curves, *found.curves()])
 
 

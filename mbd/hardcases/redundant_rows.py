@@ -18,11 +18,11 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "bricard", "parallel_cranks"]
 
 J2, B4 = "j2-parallel-fourbar-redundant", "b4-iftomm-a04-bricard"
-CLOSE = 1e-8
+ROW_ATOL = 1e-8
 """How far a row may be from holding [m, rad]."""
 CRANK, PLACE, ENERGY = 0.4, 0.1, 0.05
 """Factors of the allowance of errors of order 2, with √(g/L): of the crank angle, of P3, of the energy."""
-LARGE = 10.0
+MAX_MULTIPLIER = 10.0
 """A multiplier may be so many times the weight of the mechanism [-]; those that fight each other are 1e8 times it."""
 
 
@@ -97,9 +97,9 @@ def judge_parallel_cranks(integrator: Any) -> Outcome:
             Figure("error of the sum of the joint forces [N]", distance_to(total, force), max(force.accuracy, 1e-10)),
             Figure("wrong count of redundant rows in the notes", max(_miscount(run, spare.value) for run in runs), 0),
             Figure("runs that do not say that multipliers are not unique", sum(not _warned(run) for run in runs), 0),
-            Figure("largest multiplier over the weight [-]", _largest(runs) / weight, LARGE),
-            Figure("cranks out of parallel [rad]", skew, CLOSE),
-            Figure("rows that do not hold [m]", max(run.violation.length for run in runs), CLOSE),
+            Figure("largest multiplier over the weight [-]", _largest(runs) / weight, MAX_MULTIPLIER),
+            Figure("cranks out of parallel [rad]", skew, ROW_ATOL),
+            Figure("rows that do not hold [m]", max(run.violation.length for run in runs), ROW_ATOL),
         ],
         [Curve("crank angle [rad]", finest.time, finest["base 0.angle"]), *found.curves()],
     )
@@ -134,8 +134,8 @@ def judge_bricard(integrator: Any) -> Outcome:
             *found.figures(dict(zip(found.errors, limits, strict=True))),
             Figure("wrong count of freedoms by the note of what is redundant", free, 0),
             Figure("runs that do not say that multipliers are not unique", sum(not _warned(run) for run in runs), 0),
-            Figure("largest multiplier over the weight [-]", _largest(runs) / weight, LARGE),
-            Figure("rows that do not hold [m, rad]", apart, CLOSE),
+            Figure("largest multiplier over the weight [-]", _largest(runs) / weight, MAX_MULTIPLIER),
+            Figure("rows that do not hold [m, rad]", apart, ROW_ATOL),
         ],
         [Curve("height of P3 [m]", finest.time, finest["rod 2.tip.y"]), *found.curves()],
     )

@@ -18,7 +18,7 @@ __all__ = ["CASES", "block", "table"]
 J11, J11B = "j11-four-legged-table", "j11b-block-two-contacts"
 UNTIL, STEPS = 10.0, (1e-2, 1e-3)
 """Time of rest, and the steps it is tried with [s]."""
-DRIFT = 1e-10
+MAX_DRIFT = 1e-10
 """Most that anything at rest may move [m, rad]."""
 
 
@@ -87,7 +87,7 @@ def judge_table(integrator: Any) -> Outcome:
             for what, value in found.items():
                 worst[what] = max(worst.get(what, 0.0), float(np.max(value)))
     limits = {what: 1.0 for what in worst} | {"first leg outside of its admissible range [N]": 0.0,
-                                              "drift [m, rad]": DRIFT}  # fmt: skip
+                                              "drift [m, rad]": MAX_DRIFT}  # fmt: skip
     return Outcome(
         [
             *(Figure(what, worst[what], limit) for what, limit in limits.items()),
@@ -124,7 +124,7 @@ def judge_block(integrator: Any) -> Outcome:
         [
             Figure("error of the forces over its round-off [-]", off, 1.0),
             Figure("error of their sum over its round-off [-]", resultant, 1.0),
-            Figure("drift [m, rad]", drift, DRIFT),
+            Figure("drift [m, rad]", drift, MAX_DRIFT),
             Figure("switches of contacts", events, 0),
             Figure("runs that tell a redundancy that is none, or do not tell one that is", wrong, 0),
         ],

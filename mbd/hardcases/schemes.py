@@ -26,7 +26,7 @@ SCHEMES: dict[str, Callable[[], Integrator]] = {
 """Newmark with rows in position only is refused: nothing damps its multipliers."""
 
 EVERY = tuple(SCHEMES)
-FAST = 1e4
+STIFF_OMEGA_DT = 1e4
 """ω dt that stands for infinity [rad]."""
 DAMPED = tuple(name for name in EVERY if name != "Newmark")
 """Those whose multipliers forget their round-off."""
@@ -53,10 +53,10 @@ def has_own_forces(integrator: Integrator) -> bool:
 @cache
 def is_undamped(integrator: Integrator) -> bool:
     """Whether nothing damps an oscillation, however fast: spectral radius 1 as ω dt → ∞."""
-    return abs(spectrum(integrator, FAST).radius - 1.0) < 1e-4
+    return abs(spectrum(integrator, STIFF_OMEGA_DT).radius - 1.0) < 1e-4
 
 
 @cache
 def is_explicit(integrator: Integrator) -> bool:
     """Whether the stiffest spring bounds the step."""
-    return not spectrum(integrator, FAST).radius < 1.0 + 1e-4
+    return not spectrum(integrator, STIFF_OMEGA_DT).radius < 1.0 + 1e-4

@@ -19,10 +19,10 @@ from mbd.hardcases.stepped import stepped_figures, within_steps
 
 __all__ = ["CASES"]
 
-SETTLED = 8.0
+SETTLING_PERIODS = 8.0
 """Periods after which the error of the first steps of a scheme in positions only has died out."""
 
-LONG = 10
+THROWING_PERIODS = 10
 """Periods of the shaker that throws the mass."""
 
 
@@ -58,11 +58,11 @@ def staying_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], 
     m, g, A, w = (float(given[name]) for name in ("m", "g", "A", "w"))
     extremes = published(id, "contact force extremes")
     steps = halved(period / 40.0)  # rows at the quarters of the period
-    runs = [shaken(id, scheme, float(dt), SETTLED) for dt in steps]
+    runs = [shaken(id, scheme, float(dt), SETTLING_PERIODS) for dt in steps]
     errors, peaks = [], []
     for run in runs:
         exact = m * (g - A * w * w * np.sin(w * run.time))
-        last = run.time > period * (SETTLED - 1.001)
+        last = run.time > period * (SETTLING_PERIODS - 1.001)
         errors.append(size((run["table.force"] - exact)[last]))
         force = run["table.force"][last]
         peaks.append(np.array([np.min(force), np.max(force)]) - extremes)
@@ -91,13 +91,13 @@ def thrown_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], l
     amplitude = gamma * g / (w * w)
     first = float(entry.value)
     steps = halved(period / 37.0)  # no row at the instant of lift-off
-    runs = [shaken(id, scheme, float(dt), LONG, amplitude) for dt in steps]
+    runs = [shaken(id, scheme, float(dt), THROWING_PERIODS, amplitude) for dt in steps]
     errors, other = [], []
     for run in runs:
         opened = np.array([event.time for event in run.events if event.kind == "opened"])
         errors.append(opened[0] - first if len(opened) else math.nan)
-        phases = first + period * np.arange(LONG)
-        other.append(opened - phases if len(opened) == LONG else np.array([math.nan]))
+        phases = first + period * np.arange(THROWING_PERIODS)
+        other.append(opened - phases if len(opened) == THROWING_PERIODS else np.array([math.nan]))
     run = runs[-1]
     figures = [
         *second_order(
@@ -112,7 +112,7 @@ def thrown_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], l
             f"error of the lift-off times at Γ = {gamma:g} [s]",
             steps,
             other,
-            1e-4 * period * LONG**0.5,
+            1e-4 * period * THROWING_PERIODS**0.5,
             1e-9 * period,
             order=scheme.order(),
         ),
@@ -135,10 +135,10 @@ def stepped_shaking(id: str, scheme: Any, period: float) -> list[Figure]:
     amplitude = float(re.findall(r"Gamma = ([\d.]+)", entry.name)[0]) * g / (w * w)
     steps = halved(period / 37.0)
     stays = shaken(id, scheme, float(steps[0]), 100.0, contact="nonsmooth")
-    runs = [shaken(id, scheme, float(dt), LONG, amplitude, "nonsmooth") for dt in steps]
-    phases = float(entry.value) + period * np.arange(LONG)
+    runs = [shaken(id, scheme, float(dt), THROWING_PERIODS, amplitude, "nonsmooth") for dt in steps]
+    phases = float(entry.value) + period * np.arange(THROWING_PERIODS)
     found = [leaving(run, period) for run in runs]
-    errors = [each - phases if len(each) == LONG else math.nan for each in found]
+    errors = [each - phases if len(each) == THROWING_PERIODS else math.nan for each in found]
     moving = stepped_figures(table(float(given["m"]), g, amplitude, w), runs[-1])
     return [
         Figure("non-smooth steps: switches in 100 periods [-]", len(stays.events), 0.0),

@@ -18,11 +18,11 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "equal_slider_crank", "parallelogram"]
 
 J3, J3B = "j3-slider-crank-equal-lengths", "j3b-fourbar-flattening"
-JUMP = 1e-6
+ENERGY_JUMP_RTOL = 1e-6
 """Relative change of energy that one passage of a singular pose may make [-]."""
-CLOSE = 1e-8
+CLOSURE_ATOL = 1e-8
 """Gap of a joint [m] and angle between parallel links [rad] that are allowed."""
-WINDOW = 0.02
+JUMP_WINDOW = 0.02
 """Time [s] before and after a singular pose within which a jump of energy is looked for."""
 CRANK, FLAT = 0.6, 0.2
 """Factors of the allowance of errors, of j3 and j3b."""
@@ -107,9 +107,9 @@ def judge_slider_crank(integrator: Any) -> Outcome:
                    allowance(CRANK, turn, dt, rate.size)),
             Figure("error of the energy at the start [J]", abs(float(finest.energy.total[0]) - float(energy.value)),
                    max(energy.accuracy, 1e-12 * float(energy.value))),
-            Figure("jump of energy at a singular pose, relative [-]", _jump(finest, passages), JUMP),
-            Figure("slider off the smooth branch [m]", branch, CLOSE),
-            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSE),
+            Figure("jump of energy at a singular pose, relative [-]", _jump(finest, passages), ENERGY_JUMP_RTOL),
+            Figure("slider off the smooth branch [m]", branch, CLOSURE_ATOL),
+            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSURE_ATOL),
         ],
         [Curve("crank angle [rad]", finest.time, turned), *found.curves()],
     )  # fmt: skip
@@ -136,9 +136,9 @@ def judge_parallelogram(integrator: Any) -> Outcome:
             Figure("runs that stop early", sum(not run.success for run in runs), 0),
             *found.figures({"error of the crank angle [rad]": allowance(FLAT, turn, dt, angle.size)}),
             Figure("wrong number of flat poses", abs(len(passages) - float(count.value)), 0),
-            Figure("jump of energy at a flat pose, relative [-]", _jump(finest, passages), JUMP),
-            Figure("cranks out of parallel [rad]", skew, CLOSE),
-            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSE),
+            Figure("jump of energy at a flat pose, relative [-]", _jump(finest, passages), ENERGY_JUMP_RTOL),
+            Figure("cranks out of parallel [rad]", skew, CLOSURE_ATOL),
+            Figure("gap of the joints [m]", max(run.violation.length for run in runs), CLOSURE_ATOL),
         ],
         [Curve("crank angle [rad]", finest.time, finest["a.angle"]), *found.curves()],
     )
@@ -160,8 +160,8 @@ def _jump(run: Any, passages: list[float]) -> float:
     """
     total, worst = run.energy.total, 0.0 if passages else math.nan
     for instant in passages:
-        before = (run.time > instant - WINDOW) & (run.time < instant)
-        after = (run.time > instant) & (run.time < instant + WINDOW)
+        before = (run.time > instant - JUMP_WINDOW) & (run.time < instant)
+        after = (run.time > instant) & (run.time < instant + JUMP_WINDOW)
         if np.count_nonzero(before) < 4 or np.count_nonzero(after) < 4:
             return math.nan
         ends = [np.polyval(np.polyfit(run.time[side] - instant, total[side], 2), 0.0) for side in (before, after)]

@@ -17,7 +17,7 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "knife_edge", "sleigh"]
 
 D1, D2 = "d1-chaplygin-sleigh", "d2-knife-edge-incline"
-SLIP = 1e-10
+SLIP_ATOL = 1e-10
 """Sideways speed [m/s] that a blade may have: round-off and Newton's tolerance."""
 SLEIGH, EDGE, FORCE = 0.4, 1.0, 0.01
 """Factors of the allowance of errors: of the sleigh, of the knife edge, of its multiplier, which has order 3."""
@@ -109,7 +109,7 @@ def judge_sleigh(integrator: Any) -> Outcome:
                 abs(speed - float(final.value)),
                 allowance(SLEIGH, rate, dt, final.size),
             ),
-            Figure("slip [m/s]", max(float(np.max(np.abs(run["blade.residual"]))) for run in runs.values()), SLIP),
+            Figure("slip [m/s]", max(float(np.max(np.abs(run["blade.residual"]))) for run in runs.values()), SLIP_ATOL),
         ],
         [Curve("rate of turning [rad/s]", finest.time, finest["body.angle.rate"]), *found.curves()],
     )
@@ -152,7 +152,7 @@ def judge_knife_edge(integrator: Any) -> Outcome:
                 abs(float(run["body.y"][-1] / run.time[-1]) - float(drift.value)),
                 allowance(EDGE, rate, dt, drift.size),
             ),
-            Figure("slip [m/s]", max(slips), SLIP),
+            Figure("slip [m/s]", max(slips), SLIP_ATOL),
         ],
         [Curve("path: y over x", run["body.x"], run["body.y"], "downhill [m]", "sideways [m]"), *found.curves()],
     )

@@ -19,7 +19,7 @@ __all__ = [
 BEGIN, END = "<!-- table of mbd hardcases -->", "<!-- end of table -->"
 """Between these marks `mbd hardcases --markdown` writes."""
 
-NARROW = 100
+MIN_COLUMNS = 100
 """Columns below which a terminal has no room for a table."""
 
 HEADS = ("case", "what must hold", "nearest to its limit", "verdict", "s")
@@ -93,8 +93,8 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 
 
 def as_text(verdicts: Sequence[Verdict], width: int = 120) -> str:
-    """The table for a terminal of that many columns; below `NARROW` each case is a paragraph."""
-    if width < NARROW:
+    """The table for a terminal of that many columns; below `MIN_COLUMNS` each case is a paragraph."""
+    if width < MIN_COLUMNS:
         return "\n".join(
             [*(_paragraph(verdict, width) for verdict in verdicts), "", *_wrapped(summary(verdicts), width)]
         )

@@ -15,7 +15,7 @@ from mbd.hardcases.schemes import EVERY, holds_positions_only
 __all__ = ["CASES", "followed", "switched"]
 
 LEG, ROD = "j19-leg-driven-by-a-table", "j20-torque-that-jumps"
-INDEX_3 = 1e-2
+INDEX_3_TOLERANCE = 1e-2
 """The same of schemes that hold positions only, whose multipliers have an error of dt² [-]."""
 
 
@@ -37,7 +37,7 @@ def judge_followed(integrator: Any) -> Outcome:
     given = numbers(LEG)
     model = followed(given)
     run = mbd.simulate(model, mbd.assemble(model), integrator, dt=given["dt"], until=given["until"])
-    allowed = INDEX_3 if holds_positions_only(integrator) else EQUAL_RTOL
+    allowed = INDEX_3_TOLERANCE if holds_positions_only(integrator) else EQUAL_RTOL
     figures, curves = [], []
     for joint in ("hip", "knee"):
         reference, found = quantity(LEG, f"{joint} torque"), run[f"{joint} drive.torque"]

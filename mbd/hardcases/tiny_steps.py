@@ -18,13 +18,13 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "circle"]
 
 J1 = "j1-tiny-steps-index3"
-SHARE = 0.5
+ERROR_CONSTANT = 0.5
 """C of the multiplier error C dt² over m g²/L; the worst scheme needs about half of it [-]."""
-CLOSE = 1e-10
+CONSTRAINT_RTOL = 1e-10
 """|constraint| over L that is allowed at every step [-]."""
 NEAR, NEAR_STEP = 1e-8, 1e-6
 """Places must be this accurate [m] at steps of this size [s] and below."""
-TOO_SMALL = 1e-17
+UNREACHABLE_TOLERANCE = 1e-17
 """A tolerance of the balance that no double precision meets: a tenth of a unit in the last place [-]."""
 
 
@@ -55,7 +55,7 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
         run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=max(1, round(until / dt / 1000)))
         tension = abs(float(run["rod.multiplier"][-1]) - float(last.value))
         floor = force_floor(integrator, dt, until / dt, m, L, speed)
-        over.append(tension / (SHARE * m * g * g / L * dt * dt + floor))
+        over.append(tension / (ERROR_CONSTANT * m * g * g / L * dt * dt + floor))
         off.append(run.violation.length / L)
         begun.append(abs(float(run["rod.multiplier"][0]) - float(first.value)))
         found = math.dist((run["place.x"][-1], run["place.y"][-1]), place)
@@ -71,13 +71,13 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
         Figure(f"{judgement} of the place above round-off [-]",
                deviation(steps, places, float(rest[-1]), higher), 0.15),
         Figure("error of the place over C dt² and round-off [-]",
-               float(np.max(places / (SHARE * g * steps**2 + rest))), 1.0),
+               float(np.max(places / (ERROR_CONSTANT * g * steps**2 + rest))), 1.0),
         Figure(f"error of the place at dt ≤ {NEAR_STEP:g} s [m]", float(np.max(places[steps <= NEAR_STEP])), NEAR),
         Figure(f"{judgement} of the tension above its round-off floor [-]",
                deviation(steps, found.errors["error of the tension [N]"], floors, higher), 0.15),
         Figure("error of the tension over C dt² and its round-off floor [-]", max(over), 1.0),
         Figure("error of the tension at the start [N]", max(begun), first.accuracy),
-        Figure("|constraint| over L [-]", max(off), CLOSE),
+        Figure("|constraint| over L [-]", max(off), CONSTRAINT_RTOL),
     ]  # fmt: skip
     if hasattr(integrator, "tolerance"):
         figures.append(_refusal(integrator, model, start, min(numbers["dts"])))
@@ -89,10 +89,12 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
 def _refusal(integrator: Any, model: mbd.Model, start: mbd.State, dt: float) -> Figure:
     """Whether a tolerance that cannot be met stops the run and tells what can be met: 0 if so."""
     what = "runs that go on, or stop without saying what is attainable, under a tolerance below round-off"
-    run = mbd.simulate(model, start, _with_tolerance(integrator, TOO_SMALL), dt=dt, until=50 * dt, on_failure="return")
+    run = mbd.simulate(
+        model, start, _with_tolerance(integrator, UNREACHABLE_TOLERANCE), dt=dt, until=50 * dt, on_failure="return"
+    )
     number = r"([\d.]+(?:e[-+]?\d+)?)"
     match = re.search(rf"stagnated at round-off: residual {number}, attainable {number}", run.message)
-    is_named = match is not None and all(TOO_SMALL < float(each) < 1e-8 for each in match.groups())
+    is_named = match is not None and all(UNREACHABLE_TOLERANCE < float(each) < 1e-8 for each in match.groups())
     return Figure(what, 0.0 if is_named and not run.success else 1.0, 0.0)
 
 

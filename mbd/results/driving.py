@@ -6,9 +6,9 @@ told over the forces of the motion,
 
 ``e_k = max |λ_k − λ'_k| / F``,  F the largest |λ| of all drives of its unit in the run,
 
-but no less than `LEAST` of ``|B_k| (|M a| + |f| + |R λ|) / B_k²``, the terms that cancel in it, and of ``m_k / T²``,
-the force that moves its inertia ``m_k = |B_k| |M| |B_k| / (B_k²)²`` by 1 m or 1 rad in the length T of the run. A drive
-that needs no force at all is right within that.
+but no less than `FORCE_RTOL` of ``|B_k| (|M a| + |f| + |R λ|) / B_k²``, the terms that cancel in it, and of
+``m_k / T²``, the force that moves its inertia ``m_k = |B_k| |M| |B_k| / (B_k²)²`` by 1 m or 1 rad in the length T of
+the run. A drive that needs no force at all is right within that.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 __all__ = ["drives_of", "driving_rows", "forces_told", "is_wholly_driven", "own_share", "share"]
 
-LEAST = 1e-5
+FORCE_RTOL = 1e-5
 """Force of a drive, over the terms that cancel in it, below which it is measured by these [-]."""
-FREE = 1e-9
+FREE_MOTION_RTOL = 1e-9
 """Part of a coordinate in a motion that all rows allow from which it is free [-]."""
 
 
@@ -120,7 +120,7 @@ def _forces(columns: ModelColumns, drives: list[int], stored: Rows) -> Vector:
     largest = np.max(np.abs(record.lam[:, drives]), axis=0, initial=0.0)
     units = np.array([rows[k].unit for k in drives])
     together = np.array([np.max(largest[units == unit]) for unit in units])
-    return np.asarray(np.maximum(together, LEAST * least))
+    return np.asarray(np.maximum(together, FORCE_RTOL * least))
 
 
 def forces_told(run: Trajectory) -> str:
@@ -146,4 +146,4 @@ def is_wholly_driven(run: Trajectory) -> bool:
     scaled: Matrix = B[:, bilateral, : equations.n_v] / np.where(weight > 0.0, weight, 1.0)[:, None]
     size = np.linalg.norm(scaled, axis=2, keepdims=True)
     unit = np.divide(scaled, size, out=np.zeros_like(scaled), where=size > 0.0)
-    return bool(np.max(np.sum(np.linalg.svd(unit, compute_uv=False) > FREE, axis=1)) == equations.n_v)
+    return bool(np.max(np.sum(np.linalg.svd(unit, compute_uv=False) > FREE_MOTION_RTOL, axis=1)) == equations.n_v)

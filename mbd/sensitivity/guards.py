@@ -17,11 +17,11 @@ from mbd.errors import CapabilityError
 from mbd.results.record import EventRecord
 from mbd.sensitivity.run_data import refused, sided
 
-__all__ = ["GRAZE", "Trigger", "refused_graze", "trigger"]
+__all__ = ["GRAZING_RTOL", "Trigger", "refused_graze", "trigger"]
 
 Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped", "watched"]
 
-GRAZE = 1e-7
+GRAZING_RTOL = 1e-7
 """Rate of a guard over the sum of its terms below which it has no derivative [-]."""
 
 

@@ -15,7 +15,7 @@ from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.kernel.contact.impact import APPROACH, MOST_BLOWS
 from mbd.sensitivity.motion import Mode, Motion
-from mbd.sensitivity.phases import EDGE, MOVES, Law, OneSided, Unknown, chosen, speeds, undecided
+from mbd.sensitivity.phases import BRANCH_RTOL, DERIVATIVE_RTOL, Law, OneSided, Unknown, chosen, speeds, undecided
 from mbd.sensitivity.programs import Programs
 
 __all__ = ["Struck", "poisson", "sequential"]
@@ -91,7 +91,8 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
         if most <= APPROACH * fastest or most < 1e-14:
             edges = [
                 c for c, k in normal.items()
-                if c not in held and abs(speed[k]) <= EDGE * fastest and np.any(np.abs(of_speed[k]) > MOVES * size)
+                if c not in held and abs(speed[k]) <= BRANCH_RTOL * fastest
+                and np.any(np.abs(of_speed[k]) > DERIVATIVE_RTOL * size)
             ]  # fmt: skip
             if edges:
                 raise OneSided(undecided([contacts[c].name for c in edges]))
@@ -109,7 +110,7 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
 
 def _refuse_ties(names: Sequence[str], changes: Sequence[Vector], terms: Vector) -> None:
     """Contacts approach equally fast, and a direction tells one of them from another."""
-    if any(np.any(np.abs(change - changes[0]) > MOVES * terms) for change in changes[1:]):
+    if any(np.any(np.abs(change - changes[0]) > DERIVATIVE_RTOL * terms) for change in changes[1:]):
         listed = " and ".join(repr(name) for name in names)
         raise OneSided(
             f"{listed} approach equally fast in its sequence, and a change decides which strikes first: it has "

@@ -24,17 +24,17 @@ from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.state import State
 from mbd.tape.node import Node
 
-__all__ = ["AT_ONCE", "refuse_sided_end", "refuse_sided_start", "sided_end", "with_both_sides"]
+__all__ = ["END_RTOL", "refuse_sided_end", "refuse_sided_start", "sided_end", "with_both_sides"]
 
-AT_ONCE = 1e-10
+END_RTOL = 1e-10
 """Share of a run within which an event counts as one at its start or end [-]."""
 ROUND_OFF, GRAZE = 1e-12, 1e-7
 """Velocity over the sum of its terms that is rest, and rate of a guard over its terms below which it grazes [-]."""
-MOVES = 1e-9
+GUARD_RTOL = 1e-9
 """Change of a guard over the sum of its terms below which a direction leaves it where it is [-]."""
 STEP, LEVELS = 1e-4, 4
 """Change of what a run is differentiated by, over it or 1, to the runs on each side, and how many, each half as far."""
-JUMP = 1e-6
+JUMP_RTOL = 1e-6
 """Difference of a result from its limit on a side, relative to 1 or the result, above which it jumps there."""
 MAX_SHOWN = 4
 """Values in the sentence of a refusal at most [-]."""
@@ -56,7 +56,7 @@ class _Watched:
             np.abs(slopes) @ np.abs(still),
         )
         changes = np.max(np.abs(slopes @ Z), axis=1, initial=0.0)
-        self.moves = changes > MOVES * np.max(np.abs(slopes) @ np.abs(Z), axis=1, initial=0.0)
+        self.moves = changes > GUARD_RTOL * np.max(np.abs(slopes) @ np.abs(Z), axis=1, initial=0.0)
 
     def firing(self, within: float) -> Iterator[str]:
         """Names of the contacts and events that fire within so short a time, or would do if nothing were changed."""
@@ -107,7 +107,7 @@ def refuse_sided_start(rows: RunRows, programs: Programs, motion: Motion, mode: 
     """
     if not _is_any(programs):
         return
-    watched, within = _Watched(programs, motion, mode, rates), AT_ONCE * _duration(rows)
+    watched, within = _Watched(programs, motion, mode, rates), END_RTOL * _duration(rows)
     if names := dict.fromkeys(watched.starting()):
         raise sided(
             f"{_listed(names)} starts at rest and slides at once, and a change of its velocity decides which way"
@@ -125,7 +125,7 @@ def refuse_sided_end(
     """
     until: Any
     until, end = rows.record.settings.get("until"), float(rows.record.time[-1])
-    within = AT_ONCE * _duration(rows)
+    within = END_RTOL * _duration(rows)
     if not is_number(until) or end < float(until) - within or not _is_any(programs):
         return
     names = [name for name, before in instants if end - before.t <= within and np.any(before.tangent.t != 0.0)]
@@ -184,7 +184,7 @@ def with_both_sides(
         for j, name in enumerate(of):
             (below, low), (above, high) = (side[:, j] for side in sides)
             found[name, way.name] = float(below), float(above)
-            jumps = abs(low - high) > JUMP * max(1.0, abs(low))
+            jumps = abs(low - high) > JUMP_RTOL * max(1.0, abs(low))
             if jumps or not np.isclose(below, above, rtol=1e-6, atol=1e-9):
                 shown.append(f"d({name})/d({way.name}) is {below:.6g} below and {above:.6g} above"
                              + (f", where it jumps from {low:.6g} to {high:.6g}" if jumps else ""))  # fmt: skip

@@ -17,7 +17,7 @@ from mbd.sensitivity.run_data import RunRows, refused
 
 __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
 
-SAME = 1e-7
+RESULT_RTOL = 1e-7
 """Difference of a result from that of the run, over its size, that is round-off [-]."""
 
 
@@ -101,7 +101,7 @@ def _result(rows: RunRows, programs: Programs, found: Passed, rates: Rates, name
     at = found.motion.at(found.mode, rates.rate, rates.lam)
     at.lam, at.anchors = rates.lam, _with_turns(rows, programs, at.anchors)
     value, slopes = programs.result(name, at)
-    if not abs(value - wanted[-1]) <= SAME * max(1.0, float(np.max(np.abs(wanted)))):
+    if not abs(value - wanted[-1]) <= RESULT_RTOL * max(1.0, float(np.max(np.abs(wanted)))):
         raise refused(f"{name!r} is {wanted[-1]:.9g} at its end, which the pass does not find again ({value:.9g})")
     return value, slopes @ found.motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
 

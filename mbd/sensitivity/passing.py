@@ -19,7 +19,7 @@ from mbd.integrators.stepping import own_scheme
 from mbd.kernel.records import TABLE
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.sensitivity.motion import Motion, Rates, Tangent
-from mbd.sensitivity.one_sided import AT_ONCE, sided_end
+from mbd.sensitivity.one_sided import END_RTOL, sided_end
 from mbd.sensitivity.passed import Instant, Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.resets import after_reset
@@ -28,16 +28,16 @@ from mbd.sensitivity.tangent.margins import refuse_turning_points
 from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
 from mbd.simulation.run.idle import keep_idle
-from mbd.simulation.simulate import INSTANT
+from mbd.simulation.simulate import INSTANT_RTOL
 
 __all__ = ["AnotherRun", "tangent_run"]
 
 OWN = ("contact", "impact", "locate", "store", "rest_speed")
 FOLLOWING = ("allowed", "longest", "driven")
 CLOCK = TABLE.places["time"][1]
-STEP = 1e-4
+DIFFERENCE_STEP = 1e-4
 """Size of an increment by which q ⊕ x is differentiated with an error of its sixth power [-]."""
-SAME = 1e-6
+RUN_END_RTOL = 1e-6
 """Difference of the ends of the run and of that with derivatives, over the largest coordinate or 1, that is none."""
 
 
@@ -63,12 +63,15 @@ class Charted:
         """∂(q ⊕ x)/∂x (n_q, n_v) at x = 0."""
         if self.programs.mechanism.vector:
             return np.eye(len(q))
-        compose, units = self.programs.equations.configuration.compose, STEP * np.eye(self.programs.columns.n_v)
+        compose, units = (
+            self.programs.equations.configuration.compose,
+            DIFFERENCE_STEP * np.eye(self.programs.columns.n_v),
+        )
         parts = [
             sum(w * (compose(q, k * unit) - compose(q, -k * unit)) for k, w in ((1, 45.0), (2, -9.0), (3, 1.0)))
             for unit in units
         ]
-        return np.array(parts).T / (60.0 * STEP)
+        return np.array(parts).T / (60.0 * DIFFERENCE_STEP)
 
     def along(self, q: Vector, of_q: Matrix) -> Matrix:
         """Derivatives along velocities (n_v, D)."""
@@ -177,7 +180,7 @@ def _again(rows: RunRows) -> TangentRun:
     if dt is None:
         own |= {name: settings[name] for name in FOLLOWING}
         length = 1.0 if isinstance(until, str | tuple) else (float(until) - float(start.time)) or 1.0
-        dt = INSTANT * min(length, 1.0)
+        dt = INSTANT_RTOL * min(length, 1.0)
     end, stop = end_of(until, rows.manager, dt, start.time)
     known = dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
     model = SimpleNamespace(parameters=known)
@@ -230,7 +233,7 @@ def _require_same(rows: RunRows, run: TangentRun) -> None:
         raise AnotherRun("the same run with derivatives has other events, by round-off")
     q = rows.record.q[-1]
     off = float(np.max(np.abs(q - run.kernel.q[: len(q)]), initial=0.0))
-    if run.stored != len(rows.record.time) or not off <= SAME * max(1.0, float(np.max(np.abs(q), initial=0.0))):
+    if run.stored != len(rows.record.time) or not off <= RUN_END_RTOL * max(1.0, float(np.max(np.abs(q), initial=0.0))):
         raise AnotherRun("the same run with derivatives ends elsewhere, by round-off")
 
 
@@ -239,7 +242,7 @@ def _refuse_event_at_end(rows: RunRows, run: TangentRun) -> None:
     counts = len(rows.run.events), len(run.events)
     last = (rows.run.events if counts[0] > counts[1] else run.events)[-1]
     end, start = float(rows.record.time[-1]), float(rows.record.time[0])
-    if counts[0] != counts[1] and end - last.time <= AT_ONCE * (end - start):
+    if counts[0] != counts[1] and end - last.time <= END_RTOL * (end - start):
         raise sided_end([last.name], end)
 
 

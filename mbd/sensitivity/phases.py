@@ -22,9 +22,9 @@ from mbd.tape.derivatives import live
 
 __all__ = ["Choice", "Law", "OneSided", "Phase", "Unknown", "chosen", "speeds", "undecided"]
 
-EDGE = 1e-9
+BRANCH_RTOL = 1e-9
 """What an impulse or a velocity is relative to its terms where the branch of its law is not certain [-]."""
-MOVES = 1e-8
+DERIVATIVE_RTOL = 1e-8
 """Derivative, relative to its terms, that moves off such an edge [-]."""
 ROUND_OFF = 1e-11
 """What impulses and velocities may miss of their laws [-]."""
@@ -213,7 +213,7 @@ def _faults(programs: Programs, phase: Phase, mode: Mode, choice: Choice, law: L
         equations = programs.equations
         if value < -ROUND_OFF * size:
             found.append((kind, k))
-        elif abs(value) <= EDGE * size and np.max(np.abs(change), initial=0.0) > MOVES * sizes:
+        elif abs(value) <= BRANCH_RTOL * size and np.max(np.abs(change), initial=0.0) > DERIVATIVE_RTOL * sizes:
             edges.append(equations.contacts[k].name if kind == "contact" else equations.frictions[k].name)
     if edges and not found:
         raise OneSided(undecided(edges))

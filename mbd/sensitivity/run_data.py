@@ -22,9 +22,9 @@ from mbd.results.stored_states import StoredStates
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode
 
-__all__ = ["HELD", "RunRows", "Source", "refused", "sided"]
+__all__ = ["ADVICE", "RunRows", "Source", "refused", "sided"]
 
-HELD = "mbd.sensitivities(…, controllers='held') leaves that out: what they wrote is then held as it was"
+ADVICE = "mbd.sensitivities(…, controllers='held') leaves that out: what they wrote is then held as it was"
 """What may be asked for where controllers are refused."""
 
 
@@ -71,7 +71,7 @@ class RunRows:
         memory = getattr(record.final, "memory", None)
         sampled = memory is not None and memory.controllers.get("samples")
         if not self.controllers and (record.parameter_changes or sampled):
-            raise refused("controllers decide in it, whose feedback is not differentiated", HELD)
+            raise refused("controllers decide in it, whose feedback is not differentiated", ADVICE)
 
     @cached_property
     def controllers(self) -> Sequence[Any]:

@@ -17,7 +17,7 @@ from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.one_sided import with_both_sides
 from mbd.sensitivity.outputs import lines_of, taken_apart, usual
 from mbd.sensitivity.result import Sensitivities
-from mbd.sensitivity.run_data import HELD, RunRows, Source, refused
+from mbd.sensitivity.run_data import ADVICE, RunRows, Source, refused
 from mbd.sensitivity.sequence import amounts_of, changed_sequences
 from mbd.sensitivity.starts import restitution_names
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names, whole_names
@@ -247,7 +247,7 @@ def _check_controllers(own: Sequence[Any], asked: Any, names: Collection[str]) -
         them = ", ".join(repr(each.name) for each in own)
         raise refused(
             f"its controllers ({them}) change parameters as they read results, which is not differentiated",
-            HELD,
+            ADVICE,
         )
     for each in own:
         for name in each.writes:

@@ -18,13 +18,13 @@ from mbd.state import State, malformed
 
 __all__ = ["MAX_WAIT", "check_arguments", "end_of"]
 
-HUGE = 1e6
+MAX_STEP_RATIO = 1e6
 """Step over the latest time above which a run is refused: ends and events are told apart to 1e-12 dt [-]."""
 
 MAX_WAIT = 1_000_000
 """Steps in which an event must happen that ends a run without a latest time [-]."""
 
-LARGEST_ERROR = 1e30
+MAX_ERROR = 1e30
 """Error of coordinates above which nobody can mean to ask for it; products with it must stay finite [m, rad]."""
 
 CHOICES = {
@@ -69,7 +69,7 @@ def _numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any,
         faults.append(
             f"give dt={shown(dt)} for fixed steps or tol={shown(tol)} for steps that follow their error, not both"
         )
-    elif tol is not None and (not is_number(tol) or not 0.0 < tol <= LARGEST_ERROR):
+    elif tol is not None and (not is_number(tol) or not 0.0 < tol <= MAX_ERROR):
         faults.append(f"tol must be a positive error of coordinates [m, rad], not {shown(tol)}; 1e-6 is common")
     elif tol is not None and store != 1:
         faults.append(f"tol= compares runs at all their steps; use store=1, not {shown(store)}")
@@ -100,9 +100,9 @@ def _times(start: Any, dt: Any, until: Any) -> list[str]:
         return [f"until = {last:g} s lies before the start at {begin:g} s"]
     if is_number(dt) and 0.0 < dt < 8.0 * np.spacing(max(abs(float(begin)), abs(float(last)))):
         return [f"dt = {dt:g} s is too small to be told apart at t = {last:g} s; use a larger dt or an earlier end"]
-    if is_number(dt) and math.isfinite(dt) and last > begin and dt > HUGE * max(abs(begin), abs(last)):
-        return [f"dt = {dt:g} s is more than {HUGE:g} times the end at t = {last:g} s, and too large for round-off to "
-                "tell one from the other; use a smaller dt"]  # fmt: skip
+    if is_number(dt) and math.isfinite(dt) and last > begin and dt > MAX_STEP_RATIO * max(abs(begin), abs(last)):
+        return [f"dt = {dt:g} s is more than {MAX_STEP_RATIO:g} times the end at t = {last:g} s, and too large for "
+                "round-off to tell one from the other; use a smaller dt"]  # fmt: skip
     return []
 
 

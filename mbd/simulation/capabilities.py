@@ -77,7 +77,7 @@ TOGETHER: dict[tuple[tuple[str, str], tuple[str, str]], str] = {
 }
 """Pairs of arguments that exclude each other."""
 
-CHARTS = "joints whose coordinates do not add, such as those of free rotations, have not"
+CHARTED_JOINTS = "joints whose coordinates do not add, such as those of free rotations, have not"
 """Why a scheme that knows vectors only is refused."""
 
 WITH_TOLERANCE: dict[tuple[str, str], str] = {
@@ -115,7 +115,7 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
             "could act; use contact='events'"
         )
     if equations.compose is not None and not scheme.any_chart:
-        found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTS}; use mbd.HHT(0.05)")
+        found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTED_JOINTS}; use mbd.HHT(0.05)")
     return found
 
 

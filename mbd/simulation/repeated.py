@@ -28,7 +28,7 @@ from mbd.state import State
 
 __all__ = ["End", "RepeatedRun"]
 
-LINES = 32
+MAX_EVENTS = 32
 """Events of a run of many that are kept; one with more is made alone [-]."""
 
 
@@ -133,7 +133,7 @@ class RepeatedRun:
                 known.append(known[-1])
         vectors = np.array([vector for _, vector in known]).reshape(len(each), -1)
         lines = np.array([start_line(self._many.run, start) for start in starts]).reshape(len(each), -1)
-        ends = self._many(lines, vectors, LINES)
+        ends = self._many(lines, vectors, MAX_EVENTS)
         self._reset_ends(ends, vectors)
         return [self._end(ends, k, start, each[k]) for k, start in enumerate(starts)]
 
@@ -164,7 +164,7 @@ class RepeatedRun:
     def _end(self, ends: Ends, k: int, start: State, values: dict[str, float]) -> End:
         """The end of the k-th run; one that Python has to make, or to explain, is made again."""
         run, status = self._many.run, int(ends.status[k])
-        if status not in (codes.DONE, codes.EVENT) or ends.events[k] > LINES or run.mechanism.equations.facings:
+        if status not in (codes.DONE, codes.EVENT) or ends.events[k] > MAX_EVENTS or run.mechanism.equations.facings:
             return self(start, values)
         events = run.log.events(ends.lines[k, : ends.n_lines[k]], 0)
         number = int(ends.stopped_by[k])

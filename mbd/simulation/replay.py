@@ -27,7 +27,7 @@ from mbd.state import State
 __all__ = ["Iteration", "Replay", "Try", "replay"]
 
 
-SHOWN = 10
+MAX_SHOWN = 10
 """Iterations of a try that a printed replay shows; `Replay.tries` has them all."""
 
 
@@ -87,7 +87,9 @@ class Replay:
         for number, one in enumerate(self.tries, 1):
             lines.append(f"  try {number}, step to t = {one.time:.9g} s; largest residuals:")
             shown = [f"    {place:3}  {_line(iteration)}" for place, iteration in enumerate(one.iterations)]
-            lines += shown if len(shown) <= SHOWN else [*shown[: SHOWN // 2], "      …", *shown[-SHOWN // 2 :]]
+            lines += (
+                shown if len(shown) <= MAX_SHOWN else [*shown[: MAX_SHOWN // 2], "      …", *shown[-MAX_SHOWN // 2 :]]
+            )
         if not self.tries:
             lines.append("  no Newton iteration of mbd took place; what an integrator of your own solves is its own")
         return "\n".join(lines)

@@ -35,17 +35,17 @@ from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.run.strategy import chosen
 from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
 from mbd.simulation.tolerance.judged import judged
-from mbd.simulation.tolerance.search import LARGEST
+from mbd.simulation.tolerance.search import MAX_STEP_SHARE
 from mbd.simulation.tolerance.trials import Trial
 from mbd.state import State, of_model
 
 __all__ = ["REST_SPEED", "laid_out", "prepared", "simulate"]
 
-LONGEST = 0.1
+FIRST_STEP_SHARE = 0.1
 """Longest step that follows its error in a first run, over the length of the run [-]."""
-SHORTEST_CAP = 0.01
+MIN_STEP_LIMIT_RATIO = 0.01
 """Least by which that shrinks where less error is allowed: it bounds the steps of a motion that needs none [-]."""
-INSTANT = 1e-3
+INSTANT_RTOL = 1e-3
 """A short time where steps follow their error, over the length of the run or 1 s: for differences, and as `dt` [-]."""
 REST_SPEED = 1e-6
 """Approach speed [m/s, rad/s] below which a contact closes without rebound and releases nobody: ends Zeno sequences."""
@@ -221,14 +221,14 @@ class _Motion:
         length = 1.0 if isinstance(self.until, str | tuple) else (float(self.until) - self.start.time) or 1.0
         finer = scheme.order() / scheme.error_order()  # power of the allowed error with which that of the run falls
         first, power = first_allowed(tol, length, finer), 1.0 / scheme.error_order()
-        longest = LONGEST * length
+        longest = FIRST_STEP_SHARE * length
 
         def trial(allowed: float, most: float = np.inf) -> Trial:
             # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
-            share = min(max((allowed / first) ** power, SHORTEST_CAP), LARGEST / LONGEST)
+            share = min(max((allowed / first) ** power, MIN_STEP_LIMIT_RATIO), MAX_STEP_SHARE / FIRST_STEP_SHARE)
             more = {"tol": tol, "tol_of": names, "driven": driven, "allowed": allowed, "longest": longest * share}
-            run, trajectory, problem = self.run(INSTANT * min(length, 1.0), more, most)
-            return Trial(allowed, trajectory, problem, run, run.room, widest=share == LARGEST / LONGEST)
+            run, trajectory, problem = self.run(INSTANT_RTOL * min(length, 1.0), more, most)
+            return Trial(allowed, trajectory, problem, run, run.room, widest=share == MAX_STEP_SHARE / FIRST_STEP_SHARE)
 
         found = calibrated(trial, tol, first, finer, scheme.order(), names)
         trajectory = found.trial.run

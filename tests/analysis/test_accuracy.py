@@ -30,7 +30,7 @@ G = 9.81
 def quick():
     """A coarse reference is enough for small scenes; nothing is timed twice."""
     patch = pytest.MonkeyPatch()
-    for place, name, value in ((choices, "LEAST_ROWS", 150), (choices, "MOST_ROWS", 300), (points, "REPEATS", 1),
+    for place, name, value in ((choices, "MIN_ROWS", 150), (choices, "MAX_ROWS", 300), (points, "MAX_REPEATS", 1),
                                (lab, "MAX_TIMING_SECONDS", 0.0)):  # fmt: skip
         patch.setattr(place, name, value)
     yield

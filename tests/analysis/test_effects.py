@@ -25,7 +25,7 @@ OUTPUTS = ("hip.angle", "knee.angle")
 def quick():
     """Nothing here judges times."""
     patch = pytest.MonkeyPatch()
-    for name, value in (("LEAST_ROUNDS", 2), ("MOST_ROUNDS", 2)):
+    for name, value in (("MIN_ROUNDS", 2), ("MAX_ROUNDS", 2)):
         patch.setattr(timing, name, value)
     patch.setattr(lab, "STEPS", (50, 50))
     yield

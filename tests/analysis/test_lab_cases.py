@@ -30,7 +30,7 @@ SCHEMES = (mbd.HHT(alpha=0.05), mbd.RadauIIA(), mbd.RungeKutta853())
 def quick():
     """Small scenes need few rows of the reference; nothing is timed twice."""
     patch = pytest.MonkeyPatch()
-    for place, name, value in ((choices, "LEAST_ROWS", 150), (choices, "MOST_ROWS", 300), (points, "REPEATS", 1),
+    for place, name, value in ((choices, "MIN_ROWS", 150), (choices, "MAX_ROWS", 300), (points, "MAX_REPEATS", 1),
                                (laboratory, "MAX_TIMING_SECONDS", 0.0)):  # fmt: skip
         patch.setattr(place, name, value)
     yield
@@ -219,8 +219,8 @@ def test_f4_a_rimless_wheel() -> None:
     [pytest.param("h1-knee-stop-gap-law", "gap", marks=pytest.mark.slow), ("h1b-knee-stop-unilateral", "pull")],
 )
 def test_h1_a_knee_stop_with_two_laws_of_release(name: str, release: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(choices, "LEAST_ROWS", 1500)  # a contact lasts 13 ms, and runs are polynomials between rows
-    monkeypatch.setattr(choices, "MOST_ROWS", 1500)
+    monkeypatch.setattr(choices, "MIN_ROWS", 1500)  # a contact lasts 13 ms, and runs are polynomials between rows
+    monkeypatch.setattr(choices, "MAX_ROWS", 1500)
     reference = case(name)
     p, s, times = reference.definition, reference.start, reference["event times"]
     model = knee_leg((p["m1"], p["m2"]), (p["L1"], p["L2"]), p["g"], p["k"], p["c"], release)

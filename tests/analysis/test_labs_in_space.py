@@ -26,8 +26,8 @@ def quick():
     """Nothing here judges times, and few rows are enough."""
     patch = pytest.MonkeyPatch()
     for place, name, value in (
-        (choices, "LEAST_ROWS", 150), (choices, "MOST_ROWS", 300), (points, "REPEATS", 1),
-        (accuracy_lab, "MAX_TIMING_SECONDS", 0.0), (timing, "LEAST_ROUNDS", 2), (timing, "MOST_ROUNDS", 2),
+        (choices, "MIN_ROWS", 150), (choices, "MAX_ROWS", 300), (points, "MAX_REPEATS", 1),
+        (accuracy_lab, "MAX_TIMING_SECONDS", 0.0), (timing, "MIN_ROUNDS", 2), (timing, "MAX_ROUNDS", 2),
         (lab, "STEPS", (50, 50)),
     ):  # fmt: skip
         patch.setattr(place, name, value)

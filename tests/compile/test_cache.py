@@ -155,7 +155,7 @@ def test_a_reader_sees_an_entry_whole_or_not_at_all(tmp_path):
 
 def test_the_oldest_entries_go_when_there_are_too_many(tmp_path, monkeypatch):
     cache = ObjectCache(tmp_path)
-    monkeypatch.setattr(caching, "LIMIT", 3000)
+    monkeypatch.setattr(caching, "MAX_BYTES", 3000)
     for age, key in enumerate(("new", "middle", "old")):
         cache.store(key, bytes(900))
         os.utime(tmp_path / f"{key}.object", (1e9 - age, 1e9 - age))

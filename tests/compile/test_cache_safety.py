@@ -134,7 +134,7 @@ def test_passes_and_versions_are_part_of_the_key(monkeypatch):
 
 def test_what_was_used_last_stays_and_the_kernel_longest(tmp_path, monkeypatch):
     cache = ObjectCache(tmp_path)
-    monkeypatch.setattr(caching, "LIMIT", 3000)
+    monkeypatch.setattr(caching, "MAX_BYTES", 3000)
     cache.store("kernel", bytes(900), lasting=True)
     for key in ("used", "unused"):
         cache.store(key, bytes(900))

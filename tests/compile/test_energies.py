@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.compile.energies import FEW, OFTEN
+from mbd.compile.energies import MIN_CALLS, MIN_STATES
 from mbd.compile.mechanisms import mechanism_of
 from mbd.results.stored_states import StoredStates
 
@@ -33,10 +33,10 @@ def test_machine_code_and_numpy_agree(spatial):
     inputs = StoredStates.inputs(record.rows(np.zeros((len(record.time), mechanism.layout.n_anchors))))
     energies.calls = 0
     plain = energies(inputs, record.parameters)
-    energies.calls = OFTEN
+    energies.calls = MIN_CALLS
     machine = energies(inputs, record.parameters)
     several = energies(inputs, np.tile(record.parameters, (len(record.time), 1)))
-    assert len(record.time) <= FEW
+    assert len(record.time) <= MIN_STATES
     for a, b, c in zip(plain, machine, several, strict=True):
         np.testing.assert_allclose(b, a, rtol=0.0, atol=1e-14 * np.max(np.abs(a)))
         np.testing.assert_array_equal(b, c)
@@ -46,5 +46,5 @@ def test_the_plain_twin_has_no_machine_code():
     model, start = scene(False)
     mechanism = mechanism_of(model, "python")
     energies, inputs = mechanism.energies, {"t": np.zeros(1), "q": start.q[None], "v": start.v[None]}
-    energies.calls = OFTEN
+    energies.calls = MIN_CALLS
     assert energies(inputs | {"z": np.zeros((1, 0))}, mechanism.parameters())[0] > 0.0

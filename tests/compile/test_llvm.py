@@ -15,7 +15,7 @@ from mbd.compile.host import host
 from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Library, call, emit_object, load_object
-from mbd.compile.lowering import LARGE, MANY_RUNS, MANY_ZEROS
+from mbd.compile.lowering import MAX_OPERATIONS, MIN_RUNS, MIN_ZEROS
 from mbd.errors import ModelError, UnknownNameError
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape
@@ -50,7 +50,7 @@ def test_big_functions_are_cut_and_small_ones_are_not():
     assert "@mbd.r.1" not in Module({"r": small.outputs}, small.layout).text()
     text = Module({"r": big.outputs}, big.layout).text()
     assert "@mbd.r.1(" in text
-    whole = by_llvm({"r": big.outputs}, big.layout, large=10 * LARGE)["r"]
+    whole = by_llvm({"r": big.outputs}, big.layout, large=10 * MAX_OPERATIONS)["r"]
     cut = by_llvm({"r": big.outputs}, big.layout)["r"]
     assert np.array_equal(results(whole, big), results(cut, big))
 
@@ -60,8 +60,8 @@ def test_big_functions_are_cut_and_small_ones_are_not():
 def test_values_among_many_runs_of_zeros_keep_their_bits(graph):
     """Zeros are then cleared at the beginning, in one piece and in parts."""
     alone, zero = run(by_llvm({"f": graph.outputs})["f"], graph), graph.outputs[0].tape.zero
-    for runs in (MANY_RUNS - 1, MANY_RUNS, 3 * MANY_RUNS):
-        gaps = [(graph.outputs[k % len(graph.outputs)], MANY_ZEROS * (k > 2) + k % 3) for k in range(runs + 6)]
+    for runs in (MIN_RUNS - 1, MIN_RUNS, 3 * MIN_RUNS):
+        gaps = [(graph.outputs[k % len(graph.outputs)], MIN_ZEROS * (k > 2) + k % 3) for k in range(runs + 6)]
         outputs = [node for output, gap in gaps for node in (output, *[zero] * gap)]
         expected = np.concatenate([[alone[k % len(alone)], *[0.0] * gap] for k, (_, gap) in enumerate(gaps)])
         mixed = Graph(tuple(outputs), graph.block, graph.parameters)
@@ -70,7 +70,7 @@ def test_values_among_many_runs_of_zeros_keep_their_bits(graph):
 
 
 @pytest.mark.parametrize("level", [0, 2])
-@pytest.mark.parametrize("between", [3, MANY_ZEROS, MANY_ZEROS + 1, MANY_ZEROS + 2, MANY_ZEROS + 3, 100])
+@pytest.mark.parametrize("between", [3, MIN_ZEROS, MIN_ZEROS + 1, MIN_ZEROS + 2, MIN_ZEROS + 3, 100])
 def test_zeros_side_by_side_are_all_written_and_nothing_else_is(between, level):
     tape = Tape()
     one = tape.input("t") + 1.0

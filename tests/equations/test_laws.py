@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.equations import derive
-from mbd.equations.magnitudes import SPREAD
+from mbd.equations.magnitudes import MAX_SUM_RATIO
 from mbd.equations.programs import accelerations, scales
 from mbd.testing import check_model, trees
 from tests.equations.mechanisms import four_bar, furnished, leg, random_tree, walker
@@ -108,7 +108,7 @@ def test_terms_do_not_grow_with_turns_by_quaternions(links):
         for k in range(3 * links):
             point |= {("x", k): 0.1 * motion * rng.normal(), ("v", k): motion, ("a", k): motion}
         turning = np.sqrt(3.0) * motion * links
-        assert 1.0 < at(scales(equations), point).max() < SPREAD * 2.0 * (9.81 + turning + turning**2)
+        assert 1.0 < at(scales(equations), point).max() < MAX_SUM_RATIO * 2.0 * (9.81 + turning + turning**2)
 
 
 def largest_scale(links):

@@ -59,7 +59,7 @@ def test_implicit_steps_whose_tangent_does_not_fit_are_refused_before_it_is_deri
     model = chain(count)
     start = mbd.assemble(model)
     derived = len(mechanism_of(model).equations.tape.nodes)
-    monkeypatch.setattr(sizes, "LARGE", 1e3)
+    monkeypatch.setattr(sizes, "MIN_CHECKED_OPERATIONS", 1e3)
     monkeypatch.setattr(sizes, "available", lambda: 0.9 * sizes.BYTES_OF_TANGENT * derived)
     with pytest.raises(mbd.ModelError, match=r"tangent of implicit steps needs at least .* MB.*RungeKutta853"):
         mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=0.01)
@@ -71,7 +71,7 @@ def test_explicit_steps_derive_no_tangent_that_does_not_fit(monkeypatch):
     """Not even for an order of elimination, which would pay for chains beside each other."""
     model = chain(24, spread=4)
     start = mbd.assemble(model)
-    monkeypatch.setattr(sizes, "LARGE", 1e3)
+    monkeypatch.setattr(sizes, "MIN_CHECKED_OPERATIONS", 1e3)
     monkeypatch.setattr(sizes, "available", lambda: 1.0)
     monkeypatch.setattr(programs, "newton", lambda *_: pytest.fail("it needs none"))
     assert mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-3, until=0.005).success
@@ -82,7 +82,7 @@ def test_a_tangent_that_a_run_needs_late_ends_it_with_what_it_has(monkeypatch, b
     """Factors in straight-line code suffice until a wall is met; plain Python has none, and is told at once."""
     model, start = stiff(backend)
     rooms = iter([1e12])
-    monkeypatch.setattr(sizes, "LARGE", 0.0)
+    monkeypatch.setattr(sizes, "MIN_CHECKED_OPERATIONS", 0.0)
     monkeypatch.setattr(sizes, "available", lambda: next(rooms, 1.0))
     if backend == "python":
         next(rooms)
@@ -100,7 +100,7 @@ def test_a_contact_that_closes_without_room_for_its_tangent_ends_the_run_with_wh
     model.constrain(mbd.Unilateral("floor", mbd.touchdown(body.origin)))
     start = mbd.assemble(model, {"flight.y": 0.1})
     rooms = iter([1e12])
-    monkeypatch.setattr(sizes, "LARGE", 0.0)
+    monkeypatch.setattr(sizes, "MIN_CHECKED_OPERATIONS", 0.0)
     monkeypatch.setattr(sizes, "available", lambda: next(rooms, 1.0))
     with pytest.raises(mbd.MemoryLimitError, match="tangent of implicit steps needs") as told:
         mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=1.0)

@@ -168,7 +168,7 @@ def test_a_chain_of_loops_moves_as_with_dense_factors(scheme, monkeypatch):
     ordered = fall(scheme)
     assert ordered.stats["compiled"]
     assert ordered.stats["pivoted"] == 0
-    monkeypatch.setattr(orders, "SMALLEST", 10**9)
+    monkeypatch.setattr(orders, "MIN_UNKNOWNS", 10**9)
     assert_same_run(ordered, fall(scheme))
 
 

@@ -62,7 +62,7 @@ def test_both_ways_of_factoring_take_the_same_steps(motion, scheme, monkeypatch)
     straight = motion(scheme)
     assert straight.stats["compiled"]
     assert straight.stats["pivoted"] == 0
-    monkeypatch.setattr(programs, "LARGEST", 0)
+    monkeypatch.setattr(programs, "MAX_UNKNOWNS", 0)
     searched = motion(scheme)
     assert searched.stats["steps"] == straight.stats["steps"]
     assert searched.stats["iterations"] == pytest.approx(
@@ -165,7 +165,7 @@ def test_a_tiny_mass_in_a_row_moves_as_it_must(light, form):
 def test_passing_a_pose_without_rank_is_noticed_either_way(monkeypatch):
     found = slider_crank(1.0)
     straight = mbd.simulate(*found.start, mbd.HHT(0.05), dt=2e-3, until=found.until)
-    monkeypatch.setattr(programs, "LARGEST", 0)
+    monkeypatch.setattr(programs, "MAX_UNKNOWNS", 0)
     found = slider_crank(1.0)
     searched = mbd.simulate(*found.start, mbd.HHT(0.05), dt=2e-3, until=found.until)
     assert straight.stats["singular_steps"] == searched.stats["singular_steps"] > 0
@@ -184,7 +184,7 @@ def test_factors_of_a_walker_cost_less_than_its_tangent(stabilized):
 
 def test_large_systems_are_left_to_loops():
     model = mbd.Model("train")
-    for k in range(programs.LARGEST + 1):
+    for k in range(programs.MAX_UNKNOWNS + 1):
         wagon = mbd.PointMass(f"wagon {k}", mass=1.0)
         model.connect(mbd.Prismatic(f"track {k}", model.ground.origin, wagon.origin))
     assert programs.correction(derive(model), (), (), True) is None

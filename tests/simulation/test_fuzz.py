@@ -54,7 +54,7 @@ def test_a_scene_is_made_again_from_its_seed():
 def test_events_that_follow_each_other_without_end_are_bounded(monkeypatch):
     from mbd.simulation.diagnostics import failures
 
-    monkeypatch.setattr(failures, "MOST_EVENTS", 10)
+    monkeypatch.setattr(failures, "MAX_EVENTS_PER_STEP", 10)
     model, ball = mbd.Model("ball"), mbd.PointMass("ball", 1.0)
     model.connect(mbd.Prismatic("flight", model.ground.origin, ball.origin, axis=(0, 1, 0)))
     model.constrain(mbd.Unilateral("floor", mbd.height(ball.origin), restitution=0.9))

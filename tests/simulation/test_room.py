@@ -80,7 +80,7 @@ def test_a_tolerance_takes_the_steps_that_loose_runs_foresee_or_more(stiffness, 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(room, "available", lambda: 4.0 * 8 * 5 * 200.0)
         patch.setattr(room, "EARLIEST", 64)
-        patch.setattr(tolerance, "LONG", 100)
+        patch.setattr(tolerance, "MANY_ROWS", 100)
         needed = refused()
     reached = taken["steps"] * (taken["tolerance"]["estimated"] / tol) ** 0.5
     assert 0.05 < needed / reached < 2.0  # less where errors of loose runs have the size of the motion

@@ -33,7 +33,7 @@ PROBES = (2000, 20000, 200000)
 """Steps of the run that looks for time scales, until one succeeds."""
 PROBE_STEP = 1e-3
 """Its step where the end is an event [s]."""
-LEAST_ROWS, MOST_ROWS = 1500, 4000
+MIN_ROWS, MAX_ROWS = 1500, 4000
 """Rows of the reference."""
 
 
@@ -113,7 +113,7 @@ def plan(
     named = dict(schemes) if isinstance(schemes, Mapping) else {label(scheme): scheme for scheme in schemes}
     span = float(probe.time[-1]) - start.time
     settings, skipped = _settings(named, able, probe, span, dts, tols, target)
-    step = float(np.clip(steps_of(probe, span)[0], span / MOST_ROWS, span / LEAST_ROWS))
+    step = float(np.clip(steps_of(probe, span)[0], span / MAX_ROWS, span / MIN_ROWS))
     columns = (probe.record.q, probe.record.v, probe.record.z)
     sizes = np.concatenate([np.max(np.abs(column), axis=0, initial=0.0) for column in columns])
     sizes = np.where(sizes > 1e-6, sizes, np.max(sizes, initial=0.0) or 1.0)

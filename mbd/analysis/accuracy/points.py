@@ -29,7 +29,7 @@ __all__ = ["MIN_REPORTED_OVER_BOUND", "Point", "Setting", "Subject", "measured"]
 CLOCK = perf_counter if sys.platform == "win32" else thread_time
 """Processor time of the thread [s]; wall time where the system counts the other in steps of 16 ms."""
 
-REPEATS, ENOUGH = 5, 0.2
+MAX_REPEATS, MAX_REPEAT_SECONDS = 5, 0.2
 """A run is repeated up to this many times, but not once this much wall time [s] is spent on it."""
 
 
@@ -146,7 +146,7 @@ def measured(
     """Run a scheme, some times over, and judge it; `KeyboardInterrupt` where the user stopped it."""
     spent, best = 0.0, None
     point = Point(label, setting.dt, tol=setting.tol)
-    for _ in range(REPEATS):
+    for _ in range(MAX_REPEATS):
         try:
             latest = subject.run(scheme, setting, share)
         except MbdError as error:
@@ -156,7 +156,7 @@ def measured(
         if best is None or latest.seconds < best.seconds:
             best = latest
         spent += latest.wall
-        if spent > ENOUGH and not latest.compiled:
+        if spent > MAX_REPEAT_SECONDS and not latest.compiled:
             break
     assert best is not None
     run = best.run

@@ -11,7 +11,7 @@ from mbd.analysis.accuracy.points import Point
 
 __all__ = ["folds", "retimed"]
 
-ROUNDS, SHORT = 10, 0.3
+MAX_ROUNDS, MIN_TIMED_SECONDS = 10, 0.3
 """Rounds over all points, the quickest first, that time each once more until it took this much time [s]."""
 
 COUNTS = ("steps", "iterations", "tangents", "residuals", "factorizations", "events")
@@ -41,14 +41,14 @@ def retimed(
             if spent + point.seconds >= until:
                 return False
             share(min(spent / patience, 1.0))
-            if turn * point.seconds <= SHORT:
+            if turn * point.seconds <= MIN_TIMED_SECONDS:
                 found[place] = replace(point, seconds=min(point.seconds, once(point)))
         return True
 
-    for turn in range(ROUNDS):
+    for turn in range(MAX_ROUNDS):
         if not again(places, turn, 0.8 * patience):
             break
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         folded = sorted({place for pair in folds(found) for place in pair})
         if not folded or not again(folded, 0, patience):
             break

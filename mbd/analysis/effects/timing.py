@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Pair", "Timing", "timed"]
 
-LEAST_ROUNDS, MOST_ROUNDS = 5, 15
+MIN_ROUNDS, MAX_ROUNDS = 5, 15
 """Times that each run is made; beyond the least only while there is time left."""
 MAX_TIMING_SECONDS = 8.0
 """Wall time for all rounds [s]."""
@@ -45,14 +45,14 @@ def timed(pairs: Sequence[Pair | None], share: Callable[[float], None]) -> list[
     """
     taken: list[tuple[list[float], list[float]]] = [([], []) for _ in pairs]
     began, rounds = perf_counter(), 0
-    while rounds < MOST_ROUNDS:
+    while rounds < MAX_ROUNDS:
         spent = perf_counter() - began
-        if rounds >= LEAST_ROUNDS and spent * (rounds + 1) / rounds > MAX_TIMING_SECONDS:
+        if rounds >= MIN_ROUNDS and spent * (rounds + 1) / rounds > MAX_TIMING_SECONDS:
             break
         for place, pair in enumerate(pairs):
             for times, run in zip(taken[place], pair or (), strict=False):
                 times.append(_nanoseconds(run))
-            done = (rounds + (place + 1) / len(pairs)) / MOST_ROUNDS
+            done = (rounds + (place + 1) / len(pairs)) / MAX_ROUNDS
             share(min(1.0, max(done, (perf_counter() - began) / MAX_TIMING_SECONDS)))
         rounds += 1
     share(1.0)

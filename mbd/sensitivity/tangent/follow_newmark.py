@@ -9,10 +9,10 @@ from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.schemes.iteration import finish
 from mbd.sensitivity.tangent.words import (
-    FOLLOWED,
+    CORRECTION_RTOL,
+    MAX_CONTRACTION,
     MAX_CORRECTIONS,
     NOT_FOLLOWED,
-    STALLED,
     derivative_of,
     is_differentiated,
     largest_derivative,
@@ -116,7 +116,7 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
                 largest = max(largest, largest_derivative(K.block[K.o_a + i]))
         for k in range(m):
             K.block[K.o_lam + K.rows[k]] += K.rhs[n + k]
-        if exact or change_of <= FOLLOWED * largest or change_of > STALLED * before:
+        if exact or change_of <= CORRECTION_RTOL * largest or change_of > MAX_CONTRACTION * before:
             break
         before = change_of
     finish(K, h)

@@ -17,10 +17,10 @@ from mbd.kernel.schemes.stages import (
     predict_stages,
 )
 from mbd.sensitivity.tangent.words import (
-    FOLLOWED,
+    CORRECTION_RTOL,
+    MAX_CONTRACTION,
     MAX_CORRECTIONS,
     NOT_FOLLOWED,
-    STALLED,
     derivative_of,
     largest_derivative,
     metric_place,
@@ -127,7 +127,7 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
             for j in range(n):
                 change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
                 largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
-        if change <= FOLLOWED * largest or change > STALLED * before:
+        if change <= CORRECTION_RTOL * largest or change > MAX_CONTRACTION * before:
             break
         before = change
     status = complete(K, h, t1, m, False, False)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mbd.sensitivity.guards import GRAZE, Trigger, refused_graze, trigger
+from mbd.sensitivity.guards import GRAZING_RTOL, Trigger, refused_graze, trigger
 from mbd.sensitivity.motion import Motion, Rates
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_start
 from mbd.sensitivity.programs import Programs
@@ -86,7 +86,7 @@ def _fired(rows: RunRows, programs: Programs, row: int, motion: Motion, rates: R
               "stuck": first + k}  # fmt: skip
     place = places.get(fired.kind)
     slowest = float(rows.record.settings.get("rest_speed", 1e-6)) if fired.kind == "closed" else 0.0
-    if place is not None and not abs(growth[place]) > max(GRAZE * terms[place], slowest):
+    if place is not None and not abs(growth[place]) > max(GRAZING_RTOL * terms[place], slowest):
         raise refused_graze(fired, motion.t, float(growth[place]), float(terms[place]))
     if fired.kind == "closed" and equations.contacts[k].kind != "penalty":
         refuse_sided_impact(rows, programs, motion, mode, rows.events[row], k)

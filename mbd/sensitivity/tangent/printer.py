@@ -40,7 +40,7 @@ HELD_PLACES = frozenset(
     TABLE.places[name] for name in ("step", "next_step", "substep", "turning_step", "begun_step", "step_taken")
 )
 """The same of single numbers: steps that follow an error are held as they were."""
-PLAIN = "plain_"
+PLAIN_PREFIX = "plain_"
 """What names of arrays begin with that are given without derivatives."""
 BUNDLES = {kind: f"{{ {LLVM[kind]}, {more} }}" for kind, more in WITH_TANGENT.items()}
 """What functions return that return reals, or the address of an array."""
@@ -249,7 +249,7 @@ class TangentBody(Body):
     @staticmethod
     def is_held(node: tree.Element) -> bool:
         """Whether an element has no derivatives, or is no real."""
-        if isinstance(node.array, tree.Local) and node.array.name.startswith(PLAIN):
+        if isinstance(node.array, tree.Local) and node.array.name.startswith(PLAIN_PREFIX):
             return True
         if node.kind != "real" or not isinstance(node.array, tree.Field):
             return node.kind != "real"

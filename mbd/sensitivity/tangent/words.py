@@ -9,16 +9,17 @@ from __future__ import annotations
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
-    "FOLLOWED", "MAX_CORRECTIONS", "NOT_FOLLOWED", "STALLED", "at_root", "derivative_of", "every_row_place",
+    "CORRECTION_RTOL", "MAX_CONTRACTION", "MAX_CORRECTIONS", "NOT_FOLLOWED", "at_root", "derivative_of",
+    "every_row_place",
     "is_differentiated", "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
     "solution_place", "solve_plain", "step_place", "takes_part", "without_tangent",
 ]  # fmt: skip
 
 NOT_FOLLOWED = -3
 """Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
-FOLLOWED = 1e-12
+CORRECTION_RTOL = 1e-12
 """Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
-STALLED = 0.9
+MAX_CONTRACTION = 0.9
 """Part of the last correction of derivatives above which the next one is round-off [-]."""
 MAX_CORRECTIONS = 12
 """Corrections of derivatives with matrices that are not quite those of the solution [-]."""

@@ -14,7 +14,7 @@ from mbd.compile.python import array_function
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.kernel import codes
-from mbd.simulation.diagnostics.energy import TELLING, UNDRIVEN, kinds_of
+from mbd.simulation.diagnostics.energy import REPORTED_SHARE, UNDRIVEN, kinds_of
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.many_runs import Ends
 from mbd.simulation.simulate import simulate
@@ -93,5 +93,5 @@ def needs_judgement(
         rise = np.diff(kinetic + potential, axis=0)[0]
         owned = kinetic[0] + np.maximum(potential[0] - potential[1], 0.0)
         noise = 1e-9 * np.max(np.abs(kinetic) + np.abs(potential), axis=0)
-        doubtful |= whole & ~(rise <= TELLING * owned + noise)
+        doubtful |= whole & ~(rise <= REPORTED_SHARE * owned + noise)
     return doubtful

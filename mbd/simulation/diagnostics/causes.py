@@ -29,9 +29,9 @@ from mbd.tape.evaluate import evaluate
 
 __all__ = ["CAUSES", "Cause", "Words", "cause_of", "last_events"]
 
-RUSHING = 3.0
+MAX_RATE_CHANGE = 3.0
 """Change of a rate in a step over the largest so far, above which dt is reported not to resolve the motion [-]."""
-SLOW = 1e-3
+MIN_RATE = 1e-3
 """Largest rate so far [m/s, rad/s] below which that is not asked: a start from rest is no motion that runs away."""
 
 
@@ -255,11 +255,11 @@ class Words:
     def rushing(self) -> str:
         """What a fixed step makes of velocities, where that is far more than any has been so far; '' elsewhere."""
         values = self.v
-        if values.adaptive or self.swiftest < SLOW:
+        if values.adaptive or self.swiftest < MIN_RATE:
             return ""
         gains = np.abs(values.rate[: values.n_v]) * values.dt
         times = float(np.max(gains, initial=0.0)) / self.swiftest
-        if not RUSHING < times < np.inf:
+        if not MAX_RATE_CHANGE < times < np.inf:
             return ""
         name = self.stepper.mechanism.equations.velocity_names[int(np.argmax(gains))]
         return (

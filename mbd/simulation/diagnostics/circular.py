@@ -26,15 +26,15 @@ from mbd.tape.node import Node
 if TYPE_CHECKING:
     from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["NEARLY", "circular_laws", "multipliers_in"]
+__all__ = ["NEARLY_SINGULAR_RTOL", "circular_laws", "multipliers_in"]
 
-LEFT = 0.01
+SINGULAR_RTOL = 0.01
 """Part of the determinant without the law below which it counts as zero [-]."""
-NEARLY = 0.6
+NEARLY_SINGULAR_RTOL = 0.6
 """The same where a run has failed, so that it has come near to zero [-]."""
 
 
-def circular_laws(stepper: Stepper, least: float = LEFT) -> str:
+def circular_laws(stepper: Stepper, least: float = SINGULAR_RTOL) -> str:
     """A sentence that names the laws whose forces act back too strongly on what they read now; '' if none do."""
     equations = stepper.mechanism.equations
     if not equations.held_forces or not law_forces(equations):
@@ -54,7 +54,11 @@ def circular_laws(stepper: Stepper, least: float = LEFT) -> str:
         return ""
     names = [effect.name for effect in equations.effects if multipliers_in(effect.generalized())]
     s = "s" * (len(names) == 1)
-    end = ", so that no force or several satisfy both" if ratio < LEFT else ", and by more as the loop gain comes to 1"
+    end = (
+        ", so that no force or several satisfy both"
+        if ratio < SINGULAR_RTOL
+        else ", and by more as the loop gain comes to 1"
+    )
     return (
         f"{', '.join(map(repr, names))} read{s} {', '.join(map(repr, equations.held_forces))} and change{s} it at once "
         f"by {1.0 - ratio:.3g} of what it is (the loop gain){end}; make the law weaker, or let it follow the force "

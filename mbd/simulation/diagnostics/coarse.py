@@ -10,7 +10,7 @@ from mbd.simulation.run.data import RunData
 
 __all__ = ["coarse_steps", "percent"]
 
-BLIND = 0.1
+ADVISED_STEP_RATIO = 0.1
 """Step that is advised, over the present one, where forces do not show one [-]."""
 
 
@@ -45,7 +45,7 @@ def _resolving_step(run: RunData, record: Record, row: int) -> float:
     ``ω² = max |Δa|/|Δq|`` along the cubic through both rows, as far as the kinetic energy reaches against the forces.
     """
     system, h = run.stepper.system, float(record.time[row] - record.time[row - 1])
-    blind = BLIND * run.dt
+    blind = ADVISED_STEP_RATIO * run.dt
     if not run.mechanism.vector or not h > 0.0:
         return blind
     mode = run.manager.mode(record.closed[row])

@@ -45,15 +45,15 @@ __all__ = ["EnergyWatch", "Judgement", "judgement", "kinds_of"]
 
 SPREAD, EARLY = 30, tuple(2**k for k in range(10))
 """Rows of a look: so many from the last look to now, and the first rows of a run at these numbers."""
-TELLING = 0.1
+REPORTED_SHARE = 0.1
 """Share of the energy that a mechanism has, above which a note tells what the scheme gained or lost [-]."""
-TELLING_GAIN = 0.02
+REPORTED_NONSMOOTH_GAIN = 0.02
 """The same of a gain in non-smooth steps, whose errors are of the size of dt [-]."""
-ABSURD = 1e6
+MAX_GAIN_RATIO = 1e6
 """Gain of energy over all that there was before, above which a single row is a verdict [-]."""
-LEAP = 100.0
+MAX_DRIVEN_RISE = 100.0
 """Rise of energy over all earlier swings that looks strange where something is driven [-]."""
-MOVED = 1e-6
+MIN_MOTION = 1e-6
 """Way of the fastest coordinate [m, rad] below which a mechanism is at rest, and its energy round-off."""
 UNDRIVEN = frozenset({"joint loss", "damper", "friction", "penalty"})
 """Kinds of works that take energy, or give back what they took."""
@@ -92,14 +92,14 @@ def judgement(
     hidden : whether losses may hide a gain, which then counts, too, though not as a verdict
 
     A row alone, as next to a singular configuration, is no verdict: of those from the first one on, at least two
-    and at least half must say the same, unless its gain is `ABSURD` times all energy until then.
+    and at least half must say the same, unless its gain is `MAX_GAIN_RATIO` times all energy until then.
     """
     givers = [part.energy for part in ledger.parts if part.name not in lending and not part.withheld]
     given = sum((np.maximum.accumulate(np.maximum(energy, 0.0)) for energy in givers), np.zeros(len(way)))
     fallen = np.maximum.accumulate(ledger.potential[0] - ledger.potential)
     owned = ledger.kinetic[0] + fallen + given
     noise = EQUAL_RTOL * np.maximum.accumulate(np.abs(ledger.kinetic) + np.abs(ledger.potential))
-    moves = np.maximum.accumulate(way) > MOVED
+    moves = np.maximum.accumulate(way) > MIN_MOTION
     gain = np.where(moves, np.maximum(ledger.total - ledger.total[0] - given - noise - doubt[0], 0.0), 0.0)
     loss = np.where(moves, np.maximum(-ledger.numerical - noise - doubt[1], 0.0), 0.0)
     bad = gain > owned
@@ -107,7 +107,7 @@ def judgement(
     size = np.abs(ledger.kinetic) + np.abs(ledger.potential)
     before = np.maximum.accumulate(np.concatenate([[0.0], size[:-1]]))
     known = np.maximum(owned, before)
-    absurd = (known > 0.0) & (gain > ABSURD * known)
+    absurd = (known > 0.0) & (gain > MAX_GAIN_RATIO * known)
     firm = absurd | (bad & (rest >= 2) & (2 * rest >= np.arange(len(bad), 0, -1)))
     if firm.any():
         row = int(np.argmax(firm))
@@ -161,7 +161,7 @@ class EnergyWatch(EnergyFindings):
         self._cleared = float(np.nanmax(ledger.total - ledger.total[0]))
         if found.row >= 0:
             self.problem, self.row = _sentence(run, found), found.row
-        elif abs(found.share) > TELLING or found.share > _telling_gain(run):
+        elif abs(found.share) > REPORTED_SHARE or found.share > _telling_gain(run):
             self.note, self.share = _note(found), found.share
         return self.problem
 
@@ -230,7 +230,7 @@ class EnergyWatch(EnergyFindings):
     def _is_suspicious(self, run: RunData) -> bool:
         """Whether only the ledger can tell that the energies seen are right."""
         kinetic, potential, way = self._seen.T
-        if np.max(way) <= MOVED:
+        if np.max(way) <= MIN_MOTION:
             return False
         total = kinetic + potential
         fallen = np.maximum.accumulate(potential[0] - potential)
@@ -238,8 +238,8 @@ class EnergyWatch(EnergyFindings):
         owned = kinetic[0] + fallen
         rise = total - total[0]
         risen = ~(rise <= np.maximum(_telling_gain(run) * owned + noise, 2.0 * self._cleared))  # NaN is strange too
-        sunk = rise < -TELLING * owned[-1] - noise
-        if run.kernel.strategy == 1 and self._lifted(run) > TELLING_GAIN * float(np.max(owned)) + noise:
+        sunk = rise < -REPORTED_SHARE * owned[-1] - noise
+        if run.kernel.strategy == 1 and self._lifted(run) > REPORTED_NONSMOOTH_GAIN * float(np.max(owned)) + noise:
             return True
         if not (risen.any() or sunk.any()):
             return False
@@ -248,13 +248,13 @@ class EnergyWatch(EnergyFindings):
             sudden = bool(run.parameter_changes) or any(event.kind in ("closed", "event") for event in run.events)
             return bool(risen.any()) or not (kinds or sudden)
         swing = kinetic[0] + _swing(kinetic) + _swing(potential)
-        large_rise = rise[1:] > LEAP * swing[:-1]
+        large_rise = rise[1:] > MAX_DRIVEN_RISE * swing[:-1]
         return bool(np.any(large_rise[3:] & risen[4:]))
 
 
 def _telling_gain(run: RunData) -> float:
     """Share of the energy that a mechanism has, above which a note tells what the scheme gained [-]."""
-    return TELLING_GAIN if run.kernel.strategy == 1 else TELLING
+    return REPORTED_NONSMOOTH_GAIN if run.kernel.strategy == 1 else REPORTED_SHARE
 
 
 def _way(q: Vector, start: Vector) -> Vector:

@@ -9,7 +9,7 @@ from mbd.kernel import codes
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
 from mbd.simulation.diagnostics.causes import Words, cause_of, last_events
-from mbd.simulation.diagnostics.circular import NEARLY, circular_laws
+from mbd.simulation.diagnostics.circular import NEARLY_SINGULAR_RTOL, circular_laws
 from mbd.simulation.diagnostics.jamming import may_jam
 from mbd.simulation.diagnostics.residuals import residuals_of
 from mbd.simulation.run.data import RunData
@@ -18,7 +18,7 @@ from mbd.state import State
 
 __all__ = ["attempt", "crowded", "explanation"]
 
-MOST_EVENTS = 5000
+MAX_EVENTS_PER_STEP = 5000
 """Events within one dt above which a run stops: they follow each other ever faster, or are located too roughly [-]."""
 
 STALLED = frozenset({codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.TOO_TIGHT, codes.TOO_NEAR,
@@ -72,16 +72,16 @@ def explanation(
     what = beyond or cause_of(Words(stepper, status, events, places or {}, swiftest), status)
     if status in STALLED and not beyond:
         what = may_jam(stepper) + what
-    if circular := circular_laws(stepper, NEARLY):
+    if circular := circular_laws(stepper, NEARLY_SINGULAR_RTOL):
         what = f"{circular}; {what}"
     return f"t = {time:.9g} s (last accepted {now:.9g} s): {what}"
 
 
 def crowded(events: Sequence[EventRecord], now: float, dt: float) -> str:
     """A sentence if there were too many events within the last dt, '' otherwise."""
-    if len(events) <= MOST_EVENTS or events[-MOST_EVENTS].time < now - dt:
+    if len(events) <= MAX_EVENTS_PER_STEP or events[-MAX_EVENTS_PER_STEP].time < now - dt:
         return ""
     return (
-        f"t = {now:.9g} s: more than {MOST_EVENTS} events within one dt: {last_events(events)}; use a smaller dt, "
-        "or where it applies a softer stiffness, a larger rest_speed or locate='root'"
+        f"t = {now:.9g} s: more than {MAX_EVENTS_PER_STEP} events within one dt: {last_events(events)}; use a "
+        "smaller dt, or where it applies a softer stiffness, a larger rest_speed or locate='root'"
     )

@@ -15,9 +15,9 @@ from mbd.simulation.run.data import RunData
 
 __all__ = ["Matrices", "fastest", "free_motions", "matrices", "resolving_dt", "sane_rows", "stability"]
 
-LARGEST = 40
+MAX_UNKNOWNS = 40
 """Coordinates and states above which the tangents take too long to derive and compile for a sentence [-]."""
-SANE = 1e6
+MAX_SPEED_GROWTH = 1e6
 """Growth of speeds since the start above which a state is no longer one of the mechanism [-]."""
 
 
@@ -46,7 +46,7 @@ class Matrices:
 def matrices(run: RunData, record: Record, row: int) -> Matrices | None:
     """Those at a row of a run; None where they cannot be evaluated, or are too large to derive them for this alone."""
     system = run.stepper.system
-    if run.kernel.n > LARGEST:
+    if run.kernel.n > MAX_UNKNOWNS:
         return None
     mode = run.manager.mode(record.closed[row])
     active = list(system.active(mode)[0])
@@ -98,7 +98,7 @@ def sane_rows(run: RunData) -> list[int]:
     n_q, n_v = run.kernel.n_q, run.kernel.n_v
     speeds: Vector = np.max(np.abs(run.table[: run.stored, 1 + n_q : 1 + n_q + n_v]), axis=1, initial=0.0)
     early = speeds[: max(2, len(speeds) // 100)]
-    wild = np.flatnonzero(~(speeds <= SANE * max(1e-3, float(early[0]) if len(early) else 0.0)))
+    wild = np.flatnonzero(~(speeds <= MAX_SPEED_GROWTH * max(1e-3, float(early[0]) if len(early) else 0.0)))
     last = int(wild[0]) if len(wild) else len(speeds)
     last = min(last, run.energy.row) if run.energy.row > 0 else last
     return sorted(set(np.linspace(0, last - 1, 6).astype(int).tolist())) if last > 0 else []
@@ -108,7 +108,7 @@ def stability(run: RunData, record: Record) -> str:
     """What bounds dt, where an explicit scheme took steps above its limit of stability; '' elsewhere."""
     if not run.kernel.explicit or run.kernel.adaptive or run.kernel.mode_id < 0:
         return ""
-    if run.kernel.n > LARGEST:
+    if run.kernel.n > MAX_UNKNOWNS:
         return "; steps of an explicit scheme may be above its limit of stability: try dt/4, tol=, or mbd.RadauIIA()"
     rate = fastest(run, record, sane_rows(run))
     if rate * run.dt <= run.stepper.own.abilities.stability:

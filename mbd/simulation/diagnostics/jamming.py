@@ -29,7 +29,7 @@ __all__ = ["may_jam"]
 
 DIRECTIONS = 180
 """Directions of the force in a pin that are tried [-]."""
-LEFT = 0.01
+SINGULAR_RTOL = 0.01
 """Part of the determinant without friction below which it counts as zero [-]."""
 
 
@@ -67,7 +67,7 @@ def _locks(stepper: Stepper, f: int, loads: list[int]) -> bool:
     slips[f] = stepper.kernel.slip[f]
     for direction in _directions(len(loads)):
         sign, size = _determinant(stepper, slips, loads, direction)
-        if np.isfinite(size) and sign * free[0] * np.exp(min(size - free[1], 50.0)) < LEFT:
+        if np.isfinite(size) and sign * free[0] * np.exp(min(size - free[1], 50.0)) < SINGULAR_RTOL:
             return True
     return False
 

@@ -29,28 +29,28 @@ from mbd.topology.doubts import doubts
 
 __all__ = ["notes_of"]
 
-RESOLVED = 10.0
+RESOLVED_STEPS = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
-HALVING = 3.0
+HALVING_RATIO = 3.0
 """An impact over the time in which half of its speed is gone: half a sine has cos(π/3) = ½ [-]."""
 
-BLIND = 2.0
+UNRESOLVED_STEPS = 2.0
 """Steps of a penalty contact below which its impact is the scheme's, not the law's: the run's message says so [-]."""
 
-TAKEN = 0.5
+MAX_LOSS_SHARE = 0.5
 """Share of its energy that a scheme may take from a mechanism before the run's message says so [-]."""
 
-OVERSHOT = 1e-8
+PENETRATION_ATOL = 1e-8
 """Depth at which a contact may close that is no more than round-off of large coordinates [m, rad]."""
 
 
-LOOKED_AT = 8
+MAX_IMPACTS = 8
 """Impacts of a contact from which the step that resolves them is found."""
 
-PUSHING = 0.02
+MAX_PUSH_SHARE = 0.02
 """Share of its largest force with which a muscle may push before a run tells so [-]."""
 
-TELLING = 1e-4
+REPORTED_VELOCITY_ERROR = 1e-4
 """Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
 
 RESTARTED = (
@@ -65,7 +65,7 @@ DAMAGED = (
 )
 """Of a run that goes on from a state whose memory no run has written."""
 
-MOVED = 0.05
+MIN_MOTION = 0.05
 """Way [m, rad] beyond which rows that still depend on each other do so anywhere."""
 STALLED = "n_stalled"
 """Steps of another size than dt for no reason that is counted alone."""
@@ -92,9 +92,9 @@ COUNTED = (
 """Counts of the kernel, and what to say where they are not zero."""
 
 
-UNKNOWN = 1.0
+MAX_RATE_ERROR = 1.0
 """Estimated error of a rate, over the rate, in a step that is not resolved, above which a run is in doubt [-]."""
-WRONG = 0.5
+MAX_ENERGY_SHARE = 0.5
 """Share of the energy that a scheme has given or taken above which a run is in doubt [-]."""
 
 
@@ -107,7 +107,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
     slid = loaded and any(code.given_rows for code in run.stepper.modes)
-    moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MOVED for part in blocks(record.q))
+    moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MIN_MOTION for part in blocks(record.q))
     readers = readers_of(equations, run.stepper.dependent)
     dependent = redundancy(equations.rows, run.stepper.dependent, slid, moved, _left_singular(run), readers)
     notes += [dependent] if dependent else singular_start(run)
@@ -123,11 +123,11 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     notes += unresolved
     doubts = _energy_lost(run, record)
     notes += doubts or ([run.energy.note] if run.energy.note else [])
-    doubts += [run.energy.note] if run.energy.note and abs(run.energy.share) > WRONG and not doubts else []
-    doubts += unresolved if run.kernel.coarsest_change > UNKNOWN else []
+    doubts += [run.energy.note] if run.energy.note and abs(run.energy.share) > MAX_ENERGY_SHARE and not doubts else []
+    doubts += unresolved if run.kernel.coarsest_change > MAX_RATE_ERROR else []
     notes += [run.room.note] if run.room.note else []
     spent = float(run.kernel.error_sum)
-    if spent > TELLING and not run.kernel.adaptive:
+    if spent > REPORTED_VELOCITY_ERROR and not run.kernel.adaptive:
         notes.append(
             f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
             "motion; use a smaller dt, or tol="
@@ -142,7 +142,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
         notes += _ignored(run, number, contact)
-        if run.kernel.closing_gap[number] < -0.5 * OVERSHOT:
+        if run.kernel.closing_gap[number] < -0.5 * PENETRATION_ATOL:
             notes += _overshot(run, columns, contact)
         notes += short
         if run.kernel.row_bounds[1 + number] > 0.0:
@@ -170,7 +170,7 @@ def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]
                 f"muscle {name!r} pushes: its path is {length:.3g} m long and its tendon alone {tendon:.3g} m; "
                 "lengths are in metres, and fibers and tendon together are about as long as the path"
             )
-        elif force < -PUSHING * most and muscle.is_elastic:
+        elif force < -MAX_PUSH_SHARE * most and muscle.is_elastic:
             slack.append(
                 f"muscle {name!r} begins out of equilibrium and pushes with {-force:.3g} N until its fibers have taken "
                 f"up the slack; position={{'{name}.fiber_length': muscle.fiber_at(state['{name}.length'], "
@@ -198,7 +198,7 @@ def _uncounted(run: RunData, record: Record) -> list[str]:
 
 def _energy_lost(run: RunData, record: Record) -> list[str]:
     """The note on the energy with the dt that resolves the fastest motion, where most of the energy is gone."""
-    if not run.energy.share < -TAKEN or run.kernel.adaptive:
+    if not run.energy.share < -MAX_LOSS_SHARE or run.kernel.adaptive:
         return []
     rate = fastest(run, record, sane_rows(run))
     text = f": dt = {run.dt:g} s does not resolve its fastest motion of {rate:.3g} rad/s, dt below "
@@ -246,7 +246,7 @@ def _overshot(run: RunData, columns: ModelColumns, contact: Contact) -> list[str
         return []
     (gaps,) = columns.evaluate([contact.gap], columns.part(np.array(rows), [contact.gap]))
     worst = int(np.argmin(gaps))
-    if not gaps[worst] < -OVERSHOT:
+    if not gaps[worst] < -PENETRATION_ATOL:
         return []
     return [
         f"{contact.name!r} closed {-gaps[worst]:.2g} {contact.unit} below its surface at t = "
@@ -261,7 +261,7 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
     events = [event for event in run.events if event.name == contact.name]
     least = float(run.kernel.least_contact_step[number])
     if least > 0.0:
-        safe = dt_of_impacts(run, record, number, _closings(record, events)[:LOOKED_AT])
+        safe = dt_of_impacts(run, record, number, _closings(record, events)[:MAX_IMPACTS])
         took = f"{contact.name!r} took steps of down to {least:.2g} s while it was closed"
         softer = "a softer stiffness or mbd.Unilateral needs none of them"
         if not safe < run.dt:
@@ -270,19 +270,19 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
     spans = [b.time - a.time for a, b in pairwise(events) if (a.kind, b.kind) == ("closed", "opened")]
     shortest = min(spans, default=np.inf)
     text = f"closed for {shortest / run.dt:.2g} steps only"
-    if shortest >= RESOLVED * run.dt and events and events[-1].kind == "closed":
+    if shortest >= RESOLVED_STEPS * run.dt and events and events[-1].kind == "closed":
         half = _halved(run, contact, events[-1].row)
-        shortest = HALVING * half
+        shortest = HALVING_RATIO * half
         text = f"closed to stay and lost half of its speed within {half / run.dt:.2g} steps"
-    if shortest >= RESOLVED * run.dt:
+    if shortest >= RESOLVED_STEPS * run.dt:
         return [], []
-    safe = dt_of_impacts(run, record, number, _closings(record, events)[:LOOKED_AT])
-    safe = safe if np.isfinite(safe) else shortest / RESOLVED
+    safe = dt_of_impacts(run, record, number, _closings(record, events)[:MAX_IMPACTS])
+    safe = safe if np.isfinite(safe) else shortest / RESOLVED_STEPS
     note = (
         f"{contact.name!r} {text}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
         "a softer stiffness, or mbd.Unilateral"
     )
-    return [note], [note] if shortest < BLIND * run.dt else []
+    return [note], [note] if shortest < UNRESOLVED_STEPS * run.dt else []
 
 
 def _closings(record: Record, events: Sequence[EventRecord]) -> list[int]:
@@ -296,8 +296,8 @@ def _halved(run: RunData, contact: Contact, row: int) -> float:
 
     Infinite where that takes longer than a resolved impact, or the run ends before.
     """
-    table = run.table[row : min(run.stored, row + 2 + int(RESOLVED))]
-    table = table[table[:, 0] <= table[0, 0] + RESOLVED / HALVING * run.dt]
+    table = run.table[row : min(run.stored, row + 2 + int(RESOLVED_STEPS))]
+    table = table[table[:, 0] <= table[0, 0] + RESOLVED_STEPS / HALVING_RATIO * run.dt]
     if len(table) < 2:
         return np.inf
     columns = ModelColumns(replace(record_of(run, table), parameter_changes=[]), run.mechanism.equations)

@@ -14,7 +14,7 @@ from mbd.simulation.diagnostics.circular import multipliers_in
 
 __all__ = ["clash", "readers_of", "redundancy"]
 
-MOST_TOLD = 8
+MAX_SHOWN = 8
 """Redundant rows that a note tells one by one."""
 
 
@@ -39,7 +39,7 @@ def redundancy(
         str(Dependence(rows[row].title, tuple((rows[k].title, 1.0) for k in on), row, on))
         for row, on in sorted(dependent.items())
     ]
-    more = ["…"] if len(texts) > MOST_TOLD else []
+    more = ["…"] if len(texts) > MAX_SHOWN else []
     what = (
         "how they share a load is not determined, nor is the drag of friction that slides: multipliers of least norm "
         "are taken"
@@ -55,7 +55,7 @@ def redundancy(
         else "their multipliers are not unique; nor is the motion, if this is a singular configuration, where branches "
         "of motions cross: start beside it"
     )
-    return f"redundant constraints: {len(texts)} ({'; '.join(texts[:MOST_TOLD] + more)}); {what}"
+    return f"redundant constraints: {len(texts)} ({'; '.join(texts[:MAX_SHOWN] + more)}); {what}"
 
 
 def readers_of(equations: Equations, dependent: Mapping[int, tuple[int, ...]]) -> list[str]:
@@ -87,4 +87,4 @@ def clash(rows: Sequence[Row], K: Kernel) -> str:
     found = linear_conflict(jacobian, right, members, units, "velocity", tolerance)
     if found is not None:
         return ", ".join(found.names)
-    return "; ".join(str(row) for row in dependences(jacobian, [member.name for member in members])[:MOST_TOLD])
+    return "; ".join(str(row) for row in dependences(jacobian, [member.name for member in members])[:MAX_SHOWN])

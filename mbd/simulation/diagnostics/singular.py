@@ -18,9 +18,9 @@ from mbd.simulation.run.data import RunData
 
 __all__ = ["at_singular_configuration", "singular_start"]
 
-SMALL = 1e-3
+SINGULAR_RTOL = 1e-3
 """Smallest singular value of the rows there, over that a step away, below which they depend on each other [-]."""
-CLOSE = 0.1
+EVENT_WINDOW = 0.1
 """How far from there something that is to happen may be to be the cause, in steps [-]."""
 SINGULAR_START = 1e-7
 """Smallest singular value of the rows at a start, over the largest, below which branches of motions cross there [-]."""
@@ -105,7 +105,7 @@ def _boundary(run: RunData, most: float) -> tuple[str, float]:
 
 def _cause(run: RunData, away: float) -> str:
     """What is to happen at that time from now, '' if nothing is: a boundary, an event, a contact that closes."""
-    v, near = run.kernel, CLOSE * run.dt
+    v, near = run.kernel, EVENT_WINDOW * run.dt
     cause, time = _boundary(run, np.inf)
     if abs(time - away) < near:
         return cause
@@ -114,7 +114,7 @@ def _cause(run: RunData, away: float) -> str:
     found += [(codes.CLOSE, c, c, contacts + c) for c in range(contacts) if v.closed[c] == 0]
     for kind, index, place, rate in found:
         fall = -values[rate]
-        if fall != 0.0 and abs(values[place] / fall - away) < near + CLOSE * abs(away):
+        if fall != 0.0 and abs(values[place] / fall - away) < near + EVENT_WINDOW * abs(away):
             return _guard(run, kind, index)
     return ""
 
@@ -134,7 +134,7 @@ def _nearest(run: RunData) -> tuple[float, int] | None:
             low = first
     place = 0.5 * (low + high)
     size, row = _smallest(run, place)
-    return (float(place), row) if size < SMALL * max(sizes) else None
+    return (float(place), row) if size < SINGULAR_RTOL * max(sizes) else None
 
 
 def singular_start(run: RunData) -> list[str]:

@@ -10,11 +10,11 @@ from mbd.simulation.run.data import RunData
 
 __all__ = ["bounded_by_stability"]
 
-NEAR = 0.6
+STABILITY_SHARE = 0.6
 """Step over the largest stable one from which stability bounds it: the control of steps stays below that [-]."""
-ITERATIONS = 24
+POWER_ITERATIONS = 24
 """Of the power method, of which the second half tells the growth: of a pair of conjugates its mean [-]."""
-SMALL = 1e-7
+DIFFERENCE_RTOL = 1e-7
 """Change of a state by which derivatives are taken, over its size [-]."""
 
 
@@ -34,7 +34,7 @@ def bounded_by_stability(run: RunData, record: Record) -> list[str]:
     chosen = taken[np.linspace(0, len(taken) - 1, 7).astype(int)[1:-1]]
     with np.errstate(all="ignore"):
         rates = np.array([_rate(run, record, int(row), float(sizes[row])) for row in chosen])
-    stiff = rates * sizes[chosen] > NEAR * limit
+    stiff = rates * sizes[chosen] > STABILITY_SHARE * limit
     if np.mean(stiff) <= 0.5:
         return []
     scheme = type(run.stepper.integrator).__name__
@@ -58,15 +58,17 @@ def _rate(run: RunData, record: Record, row: int, step: float) -> float:
         return np.concatenate([moved[:n_v], rate])
 
     x = np.random.default_rng(0).standard_normal(len(weights)) / weights
-    size = SMALL * max(1.0, float(np.max(np.abs(q), initial=0.0)), step * float(np.max(np.abs(y), initial=0.0)))
+    size = DIFFERENCE_RTOL * max(
+        1.0, float(np.max(np.abs(q), initial=0.0)), step * float(np.max(np.abs(y), initial=0.0))
+    )
     growth = []
     try:
         here = slopes(np.zeros(len(weights)))
-        for _ in range(ITERATIONS):
+        for _ in range(POWER_ITERATIONS):
             x = x * size / np.linalg.norm(weights * x)
             x = slopes(x) - here
             growth.append(float(np.linalg.norm(weights * x)) / size)
     except (ArithmeticError, np.linalg.LinAlgError):
         return 0.0
-    late = np.array(growth[ITERATIONS // 2 :])
+    late = np.array(growth[POWER_ITERATIONS // 2 :])
     return float(np.exp(np.mean(np.log(late)))) if np.isfinite(late).all() and late.all() else 0.0

@@ -21,7 +21,7 @@ __all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
 
 HALF_TURN = np.pi
 """Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
-SIDEWAYS = 1.7321
+MAX_LENGTH_RATIO = 1.7321
 """Largest length of a vector over its largest component, a little more than √3 [-]."""
 
 
@@ -79,7 +79,7 @@ def _largest_ways(record: Record) -> Vector:
 def _divided_steps(run: RunData, record: Record) -> list[str]:
     """A note on each joint whose coordinates do not add for which steps were divided (`mbd.kernel.stepping.charts`)."""
     found = list[str]()
-    if run.dt * SIDEWAYS * float(np.max(np.abs(record.v), initial=0.0)) <= QUARTER_TURN:
+    if run.dt * MAX_LENGTH_RATIO * float(np.max(np.abs(record.v), initial=0.0)) <= QUARTER_TURN:
         return found
     squares = record.v**2
     for name, turning in run.mechanism.turning:

@@ -13,11 +13,11 @@ from mbd.equations.switching_times import Jump
 from mbd.errors import ModelError
 from mbd.kernel import codes
 
-__all__ = ["RESTARTS", "WINDOW", "Boundaries", "without_sharing"]
+__all__ = ["RESTARTS", "WINDOW_STEPS", "Boundaries", "without_sharing"]
 
-NEAR = 8.0 * codes.EPS
+INSTANT_RTOL = 8.0 * codes.EPS
 """Two instants are one where they differ by less, relative: round-off of a sum of steps [-]."""
-WINDOW = 64.0
+WINDOW_STEPS = 64.0
 """Steps before and after a kink in which others are counted [-]."""
 CROWD_OF_JUMPS = 256
 """The same of forces that jump."""
@@ -38,7 +38,7 @@ def _ends_of_steps(jumps: Sequence[Jump], dt: float, follows_tolerance: bool) ->
         if limit == CROWD_OF_JUMPS and follows_tolerance:
             kept += group
         elif group:
-            times, window = np.array([jump.right for jump in group]), WINDOW * dt
+            times, window = np.array([jump.right for jump in group]), WINDOW_STEPS * dt
             around = np.searchsorted(times, times + window) - np.searchsorted(times, times - window)
             kept += [jump for jump, crowd in zip(group, around, strict=True) if crowd <= limit]
     return sorted(kept)
@@ -59,7 +59,7 @@ class Boundaries:
         self.samples = {c.name: 0 for c in self.controllers if c.period is not None}
         self.breaks: Sequence[Jump] = ()
         self.place = 0
-        self.near = min(NEAR * abs(end), 1e-6 * dt)
+        self.near = min(INSTANT_RTOL * abs(end), 1e-6 * dt)
 
     def break_at(self, jumps: Sequence[Jump], now: float, dt: float, follows_tolerance: bool) -> None:
         """End steps at these jumps from now on, but for those about as dense as the steps."""

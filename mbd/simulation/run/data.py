@@ -20,7 +20,7 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
-from mbd.simulation.run.boundaries import WINDOW, Boundaries
+from mbd.simulation.run.boundaries import WINDOW_STEPS, Boundaries
 from mbd.simulation.run.event_log import EventLog
 from mbd.simulation.run.idle import stepper_of
 from mbd.simulation.run.stepper import Stepper
@@ -183,7 +183,7 @@ class RunData:
 
     def _find_breaks(self, now: float) -> None:
         """The instants at which the equations jump with the present parameters, and those in its neighbourhood."""
-        around = WINDOW * self.dt
+        around = WINDOW_STEPS * self.dt
         span = min(self.start.time, now) - around, self.end + around
         highest = max(1, self.integrator.order() - 2)  # a jump of derivative k costs an error of dt^(k + 1)
         jumps = jumps_between(self.mechanism.equations, self.kernel.params, *span, self.dt, highest)

@@ -22,7 +22,7 @@ from mbd.state import Memory, Mode, are_names
 
 __all__ = ["damage", "out_of_range", "sealed"]
 
-UNBOUNDED = 1 << 53
+NO_LIMIT = 1 << 53
 """Most that is counted of anything [-]."""
 ENDLESS = ("sinking", "left")
 """Arrays that may hold infinities where nothing has happened yet."""
@@ -86,7 +86,7 @@ def _are_samples(given: Any) -> bool:
         return False
     samples, states = given["samples"], given["states"]
     counted = isinstance(samples, Mapping) and all(
-        isinstance(name, str) and isinstance(count, int) and 0 <= count < UNBOUNDED for name, count in samples.items()
+        isinstance(name, str) and isinstance(count, int) and 0 <= count < NO_LIMIT for name, count in samples.items()
     )
     return (
         counted
@@ -147,9 +147,9 @@ def _of_state(v: Kernel) -> dict[str, tuple[int, int]]:
     """Least and largest value of each number in `state`; those of rows and lines of results are set to 0 anyway."""
     indices = v.n + max(v.n_rows, v.n_contacts, v.n_frictions)  # columns of rows come after those of velocities
     return {
-        "n_active": (0, v.n_rows), "grid_steps": (0, UNBOUNDED), "restart_due": (0, 2), "n_switches": (0, UNBOUNDED),
-        "steps_since_row": (0, UNBOUNDED), "failure_index": (-1, indices), "n_dropped": (0, v.n_rows),
-        "near_singular": (0, 2), "short_steps": (0, UNBOUNDED), "n_repeats": (0, UNBOUNDED), "plastic_impact": (0, 1),
+        "n_active": (0, v.n_rows), "grid_steps": (0, NO_LIMIT), "restart_due": (0, 2), "n_switches": (0, NO_LIMIT),
+        "steps_since_row": (0, NO_LIMIT), "failure_index": (-1, indices), "n_dropped": (0, v.n_rows),
+        "near_singular": (0, 2), "short_steps": (0, NO_LIMIT), "n_repeats": (0, NO_LIMIT), "plastic_impact": (0, 1),
         "halvings": (0, 16), "halves_left": (0, 1 << 17), "paired_step": (0, 3), "in_substeps": (0, 1),
         "scales_raised": (0, 1), "scales_of_start": (0, 1), "restarted_here": (0, 1), "fallback": (0, 2),
         "estimates_twice": (0, 1),

@@ -22,9 +22,9 @@ from mbd.simulation.run.call_table import ARRAYS
 
 __all__ = ["Plan", "Shelves", "plan_of"]
 
-LINE = 64
+CACHE_LINE_BYTES = 64
 """Length of a cache line [bytes]."""
-NUMBER = 8
+NUMBER_BYTES = 8
 """Length of a number [bytes]."""
 SHELVES: tuple[tuple[tuple[str, ...], Any], ...] = (
     (TABLE.kept_reals, np.float64),
@@ -65,12 +65,15 @@ def _planned(numbers: tuple[int, ...], given: tuple[tuple[str, int], ...]) -> Pl
     wholes, places = list[int](), list[dict[str, slice]]()
     for names, _ in SHELVES:
         own = {name: max(lengths[name], 1) for name in names if name in lengths}
-        lines = (-(LINE // NUMBER) * (-length // (LINE // NUMBER)) for length in own.values())
+        lines = (
+            -(CACHE_LINE_BYTES // NUMBER_BYTES) * (-length // (CACHE_LINE_BYTES // NUMBER_BYTES))
+            for length in own.values()
+        )
         *starts, whole = accumulate(lines, initial=0)
         exact = {name: asked.get(name, 0) if name in MEMORY else length for name, length in own.items()}
         places.append({name: slice(o, o + exact[name]) for name, o in zip(own, starts, strict=True)})
         wholes.append(whole)
-    where = {name: (k, NUMBER * place.start) for k, shelf in enumerate(places) for name, place in shelf.items()}
+    where = {name: (k, NUMBER_BYTES * place.start) for k, shelf in enumerate(places) for name, place in shelf.items()}
     shelf, offset = zip(*[where.get(name, (-1, 0)) for name in ARRAYS], strict=True)
     return Plan(tuple(wholes), tuple(places), np.array(shelf), np.array(offset))
 
@@ -89,11 +92,11 @@ class Shelves:
         self.plan, self.rooms, self.arrays = plan, list[Any](), dict[str, Any]()
         bases = list[int]()
         for (_, kind), length, places in zip(SHELVES, plan.lengths, plan.places, strict=True):
-            room = np.zeros(length + LINE // NUMBER - 1, dtype=kind)  # numpy begins anywhere
+            room = np.zeros(length + CACHE_LINE_BYTES // NUMBER_BYTES - 1, dtype=kind)  # numpy begins anywhere
             address: int = room.ctypes.data
-            first = -address % LINE // NUMBER
+            first = -address % CACHE_LINE_BYTES // NUMBER_BYTES
             shelf = room[first : first + length]
-            bases.append(address + NUMBER * first)
+            bases.append(address + NUMBER_BYTES * first)
             self.rooms.append(shelf)
             self.arrays.update({name: shelf[place] for name, place in places.items()})
         bases.append(0)

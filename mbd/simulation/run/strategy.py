@@ -13,7 +13,7 @@ __all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated"]
 
 ENDLESS = (codes.CHATTER, codes.NO_LOCATION, codes.NO_IMPACT)
 """Failures of locating itself: switches without end at one instant, no root, no set of branches that obeys all laws."""
-CROWDED = 1.0
+MAX_EXCESS_IMPACTS = 1.0
 """Impacts through several contacts, less one for each dt, from which a step that fails is taken to fail of them [-]."""
 
 
@@ -43,7 +43,7 @@ def may_go_on_unlocated(run: RunData, status: int) -> bool:
     v = run.kernel
     if run.limit is not None or not v.auto or v.fallback or status <= codes.NOT_FINITE:
         return False
-    crowded = crowd(v) > CROWDED
+    crowded = crowd(v) > MAX_EXCESS_IMPACTS
     several = np.count_nonzero(v.closed[: v.n_contacts]) >= SEVERAL  # a single one has no other to be told from
     return bool(crowded or (status in ENDLESS and several))
 

@@ -11,27 +11,27 @@ from mbd.dataclass import dataclass
 from mbd.errors import MemoryLimitError
 from mbd.results.columns import asks_for_forces
 from mbd.results.driving import drives_of, forces_told, is_wholly_driven
-from mbd.simulation.tolerance.foresight import LONG, foreseen
-from mbd.simulation.tolerance.search import CHECK, PILOT, REGULAR, WELL, Search
+from mbd.simulation.tolerance.foresight import MANY_ROWS, foreseen
+from mbd.simulation.tolerance.search import CHECK_ERROR_RATIO, LOOSEN_SHARE, MAX_CONDITION, PILOT_ERROR_RATIO, Search
 from mbd.simulation.tolerance.trials import Trial, is_rounding, rounding
 
 __all__ = ["Outcome", "calibrated", "first_allowed"]
 
-FIRST = 0.5
+FIRST_RUN_SHARE = 0.5
 """Local errors of the first run, summed up, over the tolerance [-]."""
-BEYOND = 3.0
+MAX_ERROR_RATIO = 3.0
 """Estimated error over the tolerance above which it counts as missed once repeats are used up [-]."""
 MAX_RUNS = 5
 """Runs in all, unless the last one came much nearer."""
-NEARER = 0.5
+MAX_IMPROVED_RATIO = 0.5
 """Error over that of the most accurate run before up to which a run has come nearer [-]."""
-FAR_FINER = 1.5
+HIGH_ORDER_RATIO = 1.5
 """Order of a scheme over that of its estimate from which runs are much better than their estimates say [-]."""
-HALF_THE_DIGITS = 0.5
+ROUND_OFF_POWER = 0.5
 """Power of a tolerance up to which the error of a run counts that round-off alone keeps from it [-]."""
-GROWING = 1e3
+REPORTED_GROWTH = 1e3
 """Growth of errors above which a run says so [-]."""
-ASK = "ask for less accuracy or a shorter time, or take a scheme of higher order, RungeKutta853 or RadauIIA"
+ADVICE = "ask for less accuracy or a shorter time, or take a scheme of higher order, RungeKutta853 or RadauIIA"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Outcome:
 
 def first_allowed(tol: float, length: float, power: float) -> float:
     """Local error per second of a first run: `tol` over its length, less where κ is far above 1 [m/s, rad/s]."""
-    return FIRST * (max(tol, tol ** (1.0 / power)) if power > FAR_FINER else tol) / length
+    return FIRST_RUN_SHARE * (max(tol, tol ** (1.0 / power)) if power > HIGH_ORDER_RATIO else tol) / length
 
 
 def calibrated(
@@ -60,21 +60,21 @@ def calibrated(
     power : κ; order : of the scheme
     names : of the results that the tolerance holds for; every coordinate without
     """
-    regular = power <= REGULAR
-    ratio = PILOT if regular else CHECK ** (1.0 / power)
+    regular = power <= MAX_CONDITION
+    ratio = PILOT_ERROR_RATIO if regular else CHECK_ERROR_RATIO ** (1.0 / power)
     search = Search(tol, power, order, regular, ratio, names)
-    first = run(PILOT * allowed, LONG) if regular else run(allowed)
+    first = run(PILOT_ERROR_RATIO * allowed, MANY_ROWS) if regular else run(allowed)
     if first.room.is_long:
         loose, refused = foreseen(run, first, tol, power, order, names)
         if refused or (loose and loose[-1].source.interrupted):
             return _given_up(loose, search, refused)
-        first = run(PILOT * allowed)
+        first = run(PILOT_ERROR_RATIO * allowed)
     if not first.problem and first.run.stats["steps"] == 0:  # it ended where it began
         return _outcome([first], replace(first, error=0.0), search, "")
     if first.source.interrupted or first.room.problem:
         return _outcome([first], first, search, first.problem)
     trials = [] if first.problem else [first]
-    wanted: float | None = first.allowed / (ratio if trials else PILOT)
+    wanted: float | None = first.allowed / (ratio if trials else PILOT_ERROR_RATIO)
     for count in range(1, MAX_RUNS + 4):  # runs beyond these, each while the one before has come nearer
         if wanted is None or (count >= MAX_RUNS and not _coming_nearer(trials, tol)):
             break
@@ -91,7 +91,7 @@ def calibrated(
         trials = search.estimated([*trials, found])
         wanted = search.next(trials)
     best = search.best(trials)
-    missed = not best.error <= BEYOND * tol
+    missed = not best.error <= MAX_ERROR_RATIO * tol
     if missed and _drives_alone_miss(best, tol):
         outcome = _outcome(trials, best, search, "")
         return replace(outcome, doubt=_drives_missed(best, tol))
@@ -106,7 +106,7 @@ def _drives_alone_miss(best: Trial, tol: float) -> bool:
     """Whether coordinates keep the tolerance and only forces of drives do not."""
     if best.gap is None or not best.gap.same or not drives_of(best.run) or not best.gap.size > 0.0:
         return False
-    return bool(np.isfinite(best.error) and best.error * best.gap.moved <= BEYOND * tol * best.gap.size)
+    return bool(np.isfinite(best.error) and best.error * best.gap.moved <= MAX_ERROR_RATIO * tol * best.gap.size)
 
 
 def _drives_missed(best: Trial, tol: float) -> str:
@@ -138,7 +138,7 @@ def _amplifies_round_off(trials: Sequence[Trial], best: Trial, tol: float) -> bo
     """
     own = rounding(best) * float(best.run.stats["steps"])
     stuck = any(is_rounding(trial) for trial in trials)
-    return bool(stuck and own <= tol and best.error <= tol**HALF_THE_DIGITS)
+    return bool(stuck and own <= tol and best.error <= tol**ROUND_OFF_POWER)
 
 
 def _sensitive(best: Trial, tol: float) -> str:
@@ -158,7 +158,7 @@ def _given_up(trials: Sequence[Trial], search: Search, refused: str) -> Outcome:
     trials = search.estimated(trials)
     best = search.best(trials)
     best.source.cause = MemoryLimitError(refused)
-    return _outcome(trials, best, search, f"tol = {search.tol:g} was not reached: {refused}; {ASK}")
+    return _outcome(trials, best, search, f"tol = {search.tol:g} was not reached: {refused}; {ADVICE}")
 
 
 def _no_room(trials: Sequence[Trial], wanted: float, power: float, order: int) -> str:
@@ -174,7 +174,9 @@ def _coming_nearer(trials: Sequence[Trial], tol: float) -> bool:
     """Whether no run is good yet, but the last and finest one is much better than the others."""
     *others, last = trials
     least = min((trial.error for trial in others), default=np.inf)
-    return last.error > tol and last.allowed <= min(t.allowed for t in others) and last.error < NEARER * least
+    return (
+        last.error > tol and last.allowed <= min(t.allowed for t in others) and last.error < MAX_IMPROVED_RATIO * least
+    )
 
 
 def _outcome(trials: Sequence[Trial], best: Trial, search: Search, problem: str) -> Outcome:
@@ -190,7 +192,7 @@ def _outcome(trials: Sequence[Trial], best: Trial, search: Search, problem: str)
         ],
         "comparing_seconds": search.comparing,
     }  # fmt: skip
-    if not problem and best.growth > GROWING and not is_rounding(best) and not search.names:
+    if not problem and best.growth > REPORTED_GROWTH and not is_rounding(best) and not search.names:
         stats["notes"].append(
             f"errors grew {best.growth:.2g}-fold: the motion is so sensitive that small differences decide it"
         )
@@ -198,7 +200,7 @@ def _outcome(trials: Sequence[Trial], best: Trial, search: Search, problem: str)
         stats["notes"].append(f"the estimated error {best.error:.2g} is above tol = {tol:g}")
     if not problem and not search.names and drives_of(best.run) and is_wholly_driven(best.run):
         stats["notes"].append("drives prescribe the whole motion: tol holds for " + forces_told(best.run))
-    if not problem and best.error < WELL * tol and stats["steps"] > 0:
+    if not problem and best.error < LOOSEN_SHARE * tol and stats["steps"] > 0:
         better = search.why_better(trials, best) or f"{len(trials)} runs came no nearer"
         stats["notes"].append(f"the estimated error {best.error:.2g} is far below tol = {tol:g}: {better}")
     if best.gap is not None and not best.gap.same:

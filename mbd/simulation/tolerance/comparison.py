@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Gap", "gap"]
 
-MIDDLES = 32
+CHECKED_MIDDLES = 32
 """Middles between rows at which it is compared, about, if what it gives there is in doubt [-]."""
 LATE, MAX_PARTS = 0.9, 8
 """The last part of an interval at which forces of drives are compared, and how many parts there are at most [-].
@@ -38,9 +38,9 @@ Steps that are taken again err most near their ends; few long ones may hold a je
 """
 MAX_PLACES = 512
 """Places between rows at which they are compared, about [-]."""
-TRUSTED = 0.02
+MAX_DOUBT = 0.02
 """Doubt of an interpolated coordinate, over the accuracy that is asked for, from which steps are taken again [-]."""
-ENOUGH = 0.5
+MAX_DOUBTFUL_SHARE = 0.5
 """Share of the instants up to which those in doubt are left out, as the others tell the error too [-]."""
 
 
@@ -127,7 +127,7 @@ def _some_middles(run: Trajectory, end: float) -> Vector:
     """Times of middles between rows until the end, a bounded number of them."""
     _, between = run._model_columns.grid.middles()
     times = between.time[between.time < end]
-    return times[:: len(times) // MIDDLES + 1]
+    return times[:: len(times) // CHECKED_MIDDLES + 1]
 
 
 def _inside_steps(begin: Vector, step: Vector) -> Vector:
@@ -168,9 +168,9 @@ def _middles(run: Trajectory, end: float, accuracy: float) -> Vector:
     if not polynomials or Restepping.serves(columns):
         return np.zeros(0)
     _, places = columns.grid.middles()
-    places = places.part(np.flatnonzero(places.time < end)[:: len(places.time) // MIDDLES + 1])
+    places = places.part(np.flatnonzero(places.time < end)[:: len(places.time) // CHECKED_MIDDLES + 1])
     doubt = _doubt(places, record, quintic(places, record.q, record.v, record.a))
-    return places.time[doubt > TRUSTED * accuracy]
+    return places.time[doubt > MAX_DOUBT * accuracy]
 
 
 def _difference(run: Trajectory, other: Trajectory, rows: Vector, middles: Vector, accuracy: float) -> Vector:
@@ -202,16 +202,16 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     known = (record.q, record.v, record.a)
     q = quintic(places, *known)
     doubt = _doubt(places, record, q)
-    poor = np.flatnonzero(doubt > TRUSTED * accuracy)
+    poor = np.flatnonzero(doubt > MAX_DOUBT * accuracy)
     if not len(poor):
         return q, sure
     better = osculating(record.time, places.part(poor), known)
     q[poor], doubt[poor] = better.values[0], better.doubt
-    again = poor[doubt[poor] > TRUSTED * accuracy]
+    again = poor[doubt[poor] > MAX_DOUBT * accuracy]
     sure[again] = False
-    if len(again) > ENOUGH * len(sure) and Restepping.serves(columns):
+    if len(again) > MAX_DOUBTFUL_SHARE * len(sure) and Restepping.serves(columns):
         again = again[np.argsort(-doubt[again], kind="stable")[:16]]
         q[again], sure[again] = columns.between(places.part(again), forces=False).q, True
-    elif len(again) > ENOUGH * len(sure):
+    elif len(again) > MAX_DOUBTFUL_SHARE * len(sure):
         sure[again] = True  # the polynomials are what there is
     return q, sure

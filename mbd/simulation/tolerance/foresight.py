@@ -16,17 +16,17 @@ import numpy as np
 from mbd.simulation.tolerance.comparison import gap
 from mbd.simulation.tolerance.trials import Trial
 
-__all__ = ["LONG", "foreseen"]
+__all__ = ["MANY_ROWS", "foreseen"]
 
-LONG = 500_000
+MANY_ROWS = 500_000
 """Rows that a pilot run is predicted from which looser runs are made first [-]."""
-FINER = 10.0
+REFINEMENT = 10.0
 """What a run allows over what the next one does [-]."""
-NEAREST = 100.0
+MIN_REFINEMENT = 100.0
 """The least that one allows, over what the pilot does: finer ones would take as long [-]."""
 SLOWER, FASTER = 0.7, 1.5
 """Observed orders over that of the scheme between which errors have its order [-]."""
-SURE = 2.0
+MAX_FORESEEN_RATIO = 2.0
 """Steps that are foreseen over those for which there is room from which a run is refused [-]."""
 
 
@@ -41,11 +41,11 @@ def foreseen(
     power : κ of the errors; order : of the scheme; names : of the results that the tolerance holds for
     """
     looser = (pilot.room.expected / 20_000) ** (order / power)  # steps of the finest of the first three, about
-    allowed = pilot.allowed * FINER**2 * max(looser, NEAREST)
+    allowed = pilot.allowed * REFINEMENT**2 * max(looser, MIN_REFINEMENT)
     trials: list[Trial] = []
-    while allowed >= NEAREST * pilot.allowed:
+    while allowed >= MIN_REFINEMENT * pilot.allowed:
         trials.append(run(allowed))
-        allowed /= FINER
+        allowed /= REFINEMENT
         ended = trials[-1].source
         if ended.interrupted or trials[-1].room.problem:
             break
@@ -55,7 +55,7 @@ def foreseen(
             continue
         steps, settled = _steps(trials, tol, power, order, names)
         last = trials[-1]
-        if steps > SURE * last.room.most:
+        if steps > MAX_FORESEEN_RATIO * last.room.most:
             stats = last.run.stats
             return trials, last.room.refused(steps, steps / stats["steps"] * stats["wall_seconds"])
         if settled:
@@ -69,7 +69,7 @@ def _steps(
     """Steps that the tolerance takes at least, 0 if unknown, and whether errors fall with the order of the scheme."""
     coarse, middle, fine = trials[-3:]
     first, last = gap(coarse.run, middle.run, tol, names), gap(middle.run, fine.run, tol, names)
-    fall = FINER**-power
+    fall = REFINEMENT**-power
     if not (first.same and last.same) or last.size == 0.0 or last.size < first.size * fall**FASTER:
         return 0.0, False
     error = fall / (1.0 - fall) * last.size

@@ -25,29 +25,29 @@ from mbd.results.driving import own_share
 from mbd.simulation.tolerance.comparison import Gap, gap
 from mbd.simulation.tolerance.trials import Trial, is_rounding, least_error, rounding, same_steps
 
-__all__ = ["CHECK", "LARGEST", "PILOT", "REGULAR", "WELL", "Search"]
+__all__ = ["CHECK_ERROR_RATIO", "MAX_STEP_SHARE", "PILOT_ERROR_RATIO", "MAX_CONDITION", "LOOSEN_SHARE", "Search"]
 
-PILOT = 10.0
+PILOT_ERROR_RATIO = 10.0
 """Allowed error of the pilot run over that of the first run [-]."""
-CHECK = 6.0
+CHECK_ERROR_RATIO = 6.0
 """Error of a run of high order over that of the one that checks it [-]."""
-REGULAR = 1.01
+MAX_CONDITION = 1.01
 """κ up to which errors keep to the order of a scheme, so that a pilot tells them [-]."""
-APART = 2.5
+MIN_ERROR_RATIO = 2.5
 """Ratio of allowed errors from which the errors of two runs are told apart [-]."""
-TARGET = 0.4
+TARGET_SHARE = 0.4
 """Part of the tolerance that a repeated run aims at [-]."""
-WELL = 0.15
+LOOSEN_SHARE = 0.15
 """Estimated error over the tolerance below which a looser run is tried [-]."""
-BLIND = 1e3
+SAME_STEPS_REFINEMENT = 1e3
 """How much finer the next run is where two runs took the same steps [-]."""
 ROUND_OFF = 1e-14
 """Difference of two runs that is no more than round-off [m, rad]."""
-NOTHING = 1e-6
+ERROR_FLOOR = 1e-6
 """Errors over the tolerance below which they do not tell runs apart [-]."""
-CHANGE = 1e4
+MAX_REFINEMENT = 1e4
 """Most by which the allowed error shrinks from one run to the next [-]."""
-LARGEST = 0.25
+MAX_STEP_SHARE = 0.25
 """Longest step of a run that is looser than the first ones, over the length of the run [-]."""
 LEAST_ORDER, MOST_ORDER = 0.5, 1.5
 """Observed orders that are believed, over the one of the scheme [-]."""
@@ -74,16 +74,18 @@ class Search:
         below = [trial for trial in trials if trial.error <= self.tol]
         if not below:
             return min(trials, key=lambda trial: trial.error)
-        return max(below, key=lambda trial: (max(trial.error, NOTHING * self.tol), trial.allowed))
+        return max(below, key=lambda trial: (max(trial.error, ERROR_FLOOR * self.tol), trial.allowed))
 
     def next(self, trials: Sequence[Trial]) -> float | None:
         """What the next run allows; None: the best is good, or as good as it gets."""
         best = self.best(trials)
         if not np.isfinite(best.error):
-            return min(trial.allowed for trial in trials) / (BLIND if best.gap is None else PILOT)
-        if best.error >= WELL * self.tol and best.error <= self.tol:
+            return min(trial.allowed for trial in trials) / (
+                SAME_STEPS_REFINEMENT if best.gap is None else PILOT_ERROR_RATIO
+            )
+        if best.error >= LOOSEN_SHARE * self.tol and best.error <= self.tol:
             return best.allowed / self.ratio if best.finest and not self.regular else None
-        if best.error < WELL * self.tol and self.why_better(trials, best):
+        if best.error < LOOSEN_SHARE * self.tol and self.why_better(trials, best):
             return None
         return self._aimed(trials)
 
@@ -94,17 +96,17 @@ class Search:
             return "errors are round-off whatever the steps"
         looser = [trial for trial in trials if trial.allowed > best.allowed]
         if (best.widest and best.is_stretched) or any(same_steps(*two) for two in combinations([best, *looser], 2)):
-            return f"steps end at events or have their largest size, {100.0 * LARGEST:.0f} % of the run"
+            return f"steps end at events or have their largest size, {100.0 * MAX_STEP_SHARE:.0f} % of the run"
         coarser = [trial.error for trial in looser if np.isfinite(trial.error) and trial.error > self.tol]
         few = best.run.stats["steps"]
-        if coarser and min(trial.allowed for trial in looser) < APART * best.allowed:
+        if coarser and min(trial.allowed for trial in looser) < MIN_ERROR_RATIO * best.allowed:
             return f"it takes {few} steps, and slightly longer ones have an error of {min(coarser):.2g}"
         return ""
 
     def _aimed(self, trials: Sequence[Trial]) -> float:
-        """An allowed error for TARGET · tol: between two runs on a straight line of logarithms, else by the order."""
+        """An allowed error for TARGET_SHARE · tol: between two runs linear in logarithms, else by the order."""
         known = sorted((t for t in trials if np.isfinite(t.error) and t.error > 0.0), key=lambda t: t.allowed)
-        goal = TARGET * self.tol
+        goal = TARGET_SHARE * self.tol
         under = [trial for trial in known if trial.error <= self.tol]
         above = [
             trial for trial in known if trial.error > self.tol and (not under or trial.allowed > under[-1].allowed)
@@ -116,7 +118,7 @@ class Search:
         base = under[-1] if under else known[0]
         reach = (goal / base.error) ** (1.0 / self.power)
         # no risk in growing: looser runs are judged by a finer one
-        return float(base.allowed * min(max(reach, 1.0 / CHANGE), 1e10))
+        return float(base.allowed * min(max(reach, 1.0 / MAX_REFINEMENT), 1e10))
 
     # errors ----------------------------------------------------------------------------------------------------------
     def estimated(self, trials: Sequence[Trial]) -> list[Trial]:
@@ -127,7 +129,7 @@ class Search:
         """
         finest = min(trials, key=lambda trial: trial.allowed)
         seen = {id(trial): self._against(trial, finest) for trial in trials if not same_steps(trial, finest)}
-        coarser = [t for t in trials if id(t) in seen and t.allowed >= APART * finest.allowed]
+        coarser = [t for t in trials if id(t) in seen and t.allowed >= MIN_ERROR_RATIO * finest.allowed]
         known = replace(finest, error=np.inf, gap=None, finest=True)
         if coarser:
             near = sorted((seen[id(trial)] for trial in coarser), key=lambda trial: trial.allowed)
@@ -175,7 +177,7 @@ class Search:
         """κ from the errors of two runs that a third has told, if they are far enough apart."""
         if (
             len(near) < 2
-            or near[1].allowed < APART * near[0].allowed
+            or near[1].allowed < MIN_ERROR_RATIO * near[0].allowed
             or not np.isfinite([near[0].error, near[1].error]).all()
         ):
             return self.power

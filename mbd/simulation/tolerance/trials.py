@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Trial", "is_rounding", "least_error", "rounding", "same_steps"]
 
 EPS = float(np.finfo(float).eps)
-ALIKE = 0.1
+INSTANT_TOLERANCE = 0.1
 """How far apart instants of two runs may be, over their mean step, where their steps are the same [-]."""
 
 
@@ -47,7 +47,7 @@ class Trial:
     def is_stretched(self) -> bool:
         """Whether half of its time or more passes in steps of the longest size."""
         steps = np.diff(self.run.time)
-        long = steps > (1.0 - ALIKE) * self.run.settings["longest"]
+        long = steps > (1.0 - INSTANT_TOLERANCE) * self.run.settings["longest"]
         return bool(2.0 * np.sum(steps[long]) > 0.99 * np.sum(steps))  # two of a quarter are half the run
 
     @property
@@ -84,4 +84,4 @@ def same_steps(one: Trial, other: Trial) -> bool:
     first, second = one.run.time, other.run.time
     if len(first) != len(second):
         return False
-    return bool(np.max(np.abs(first - second), initial=0.0) <= ALIKE * (first[-1] - first[0]) / len(first))
+    return bool(np.max(np.abs(first - second), initial=0.0) <= INSTANT_TOLERANCE * (first[-1] - first[0]) / len(first))
