@@ -36,7 +36,7 @@ def composes(equations: Equations) -> bool:
     Laws that read forces of contacts join contacts, so that there are none.
     """
     count, n = len(equations.contacts), equations.n_v + equations.n_z
-    if count < MANY or n <= programs.LARGEST or equations.held_forces:
+    if count < MANY or n <= programs.MAX_UNKNOWNS or equations.held_forces:
         return False
     shared = 0  # entries of S that contacts may fill
     for contact in equations.contacts:
