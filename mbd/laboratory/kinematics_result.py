@@ -156,7 +156,7 @@ def _rates(equations: Equations, time: Vector, q: Matrix, cutoff: float | None) 
     q = q.copy()
     for joint, first, _ in whole.charts:
         own = slice(first + joint.adding, first + joint.adding + 4)
-        q[:, own] = continuous(q[:, own], f"{joint.name}.orientation")
+        q[:, own] = continuous(q[:, own].T, f"{joint.name}.orientation").T
     if cutoff is not None:
         q = np.column_stack([smoothed(tuple(time), tuple(column), cutoff, False) for column in q.T])
         for joint, first, _ in whole.charts:
@@ -169,7 +169,8 @@ def _rates(equations: Equations, time: Vector, q: Matrix, cutoff: float | None) 
     for joint, first_q, first_v in whole.charts:
         own = slice(first_q + joint.adding, first_q + joint.adding + 4)
         into = slice(first_v + joint.adding, first_v + joint.adding + 3)
-        v[:, into], a[:, into] = quaternion_rates(q[:, own], first_rates[:, own], second_rates[:, own])
+        spins = quaternion_rates(q[:, own].T, first_rates[:, own].T, second_rates[:, own].T)
+        v[:, into], a[:, into] = (each.T for each in spins)
     return q, v, a
 
 

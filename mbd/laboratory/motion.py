@@ -138,17 +138,19 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
             f"{'; the recording has ' + _few(unused) if unused else ''}"
         )
     turned: set[int] = set()
+    spinning: list[tuple[int, slice]] = []
     charts = {names[first_q + joint.adding + k] for joint, first_q, _ in whole.charts for k in range(4)}
     plain = [n for n in names if n in columns and n not in charts and columns[n].rate is None]
-    slopes = dict(zip(plain, zip(*_slopes(time, [columns[n].value for n in plain]), strict=True), strict=True))
+    # one spline through all that has no rates, orientations among them
+    values = {name: columns[name].value for name in plain}
     for joint, first_q, first_v in whole.charts:
         at = first_q + joint.adding
         parts = names[at : at + 4]
         if any(part in missing for part in parts):
             raise ModelError(f"motion: the orientation {parts[0].removesuffix('.w')!r} is missing or incomplete")
         turned |= set(range(at, at + 4))
-        values = continuous(np.column_stack([columns[part].value for part in parts]), parts[0].removesuffix(".w"))
-        q[at : at + 4] = values.T
+        unit = continuous(np.array([columns[part].value for part in parts]), parts[0].removesuffix(".w"))
+        q[at : at + 4] = unit
         own = slice(first_v + joint.adding, first_v + joint.adding + 3)
         spins = [columns[name] for name in equations.velocity_names[own] if name in columns]
         if len(spins) == 3:
@@ -156,8 +158,13 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
             a[own] = [derivatives(time, s.value)[0] if s.acceleration is None else s.acceleration for s in spins]
             differentiated |= any(spin.acceleration is None for spin in spins)
         else:
-            rates, accelerations = quaternion_rates(values, *derivatives(time, values))
-            v[own], a[own], differentiated = rates.T, accelerations.T, True
+            values |= dict(zip(parts, unit, strict=True))
+            spinning.append((at, own))
+    slopes = dict(zip(values, zip(*_slopes(time, list(values.values())), strict=True), strict=True))
+    for at, own in spinning:
+        first, second = (np.array([slopes[part][order] for part in names[at : at + 4]]) for order in (0, 1))
+        v[own], a[own] = quaternion_rates(q[at : at + 4], first, second)
+        differentiated = True
     places = {int(place): k for k, place in enumerate(whole.places) if place >= 0}
     for place, name in enumerate(names):
         if place in turned or name in missing:
@@ -308,7 +315,8 @@ def derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:
     if len(time) == 1:
         return np.zeros_like(values), np.zeros_like(values)
     curve = CubicSpline(time, values)
-    return curve(time, 1), curve(time, 2)
+    ends = curve(time[-1:], 1), curve(time[-1:], 2)
+    return np.concatenate([curve.c[2], ends[0]]), np.concatenate([2.0 * curve.c[1], ends[1]])
 
 
 # loops --------------------------------------------------------------------------------------------------------------

@@ -37,38 +37,40 @@ class Scatter(NamedTuple):
     coordinate: float
 
 
-def scatter_of(time: Vector, coordinate: Vector, moment: Vector) -> Scatter | None:
-    """The scatter of a moment whose acceleration is that of a spline through noisy values; None where there is little.
+def scatter_of(time: Vector, coordinates: Matrix, moments: Matrix) -> list[Scatter | None]:
+    """The scatter of moments (R, n) whose accelerations are those of splines through noisy values (R, n).
 
-    Differences of high order leave noise and remove motion; their median does not see single impacts. White noise of
-    deviation σ in the values gives accelerations of deviation 6 σ/h², and moments with the same spectrum.
+    None where there is little. Differences of high order leave noise and remove motion; their median does not see
+    single impacts. White noise of deviation σ in the values gives accelerations of deviation 6 σ/h², and moments with
+    the same spectrum.
     """
-    middle = max(len(time) - MOST, 0) // 2
+    middle, count = max(len(time) - MOST, 0) // 2, moments.shape[1]
     part = slice(middle, middle + MOST)
-    time, coordinate, moment = time[part], coordinate[part], moment[part]
+    time, coordinates, moments = time[part], coordinates[part], moments[part]
     widths = np.diff(time)
     if len(time) < FEWEST or np.ptp(widths) > SPACING_RTOL * widths.mean():
-        return None
-    fourth, fifth = (_deviation(moment, order) * SPLINE_NOISE_GAIN / DIFFERENCES[order] for order in (4, 5))
-    if fifth < MIN_RATIO * fourth or fourth < MIN_SHARE * float(np.ptp(moment)) or fourth == 0.0:
-        return None
-    return Scatter(fourth, _deviation(coordinate, 4) / float(np.sqrt(comb(8, 4))))
+        return [None] * count
+    fourth, fifth = (_deviation(moments, order) * SPLINE_NOISE_GAIN / DIFFERENCES[order] for order in (4, 5))
+    noisy = (fifth >= MIN_RATIO * fourth) & (fourth >= MIN_SHARE * np.ptp(moments, axis=0)) & (fourth != 0.0)
+    own = _deviation(coordinates[:, noisy], 4) / np.sqrt(comb(8, 4))
+    found = iter(zip(fourth[noisy], own, strict=True))
+    return [Scatter(*map(float, next(found))) if each else None for each in noisy]
 
 
-def _deviation(values: Vector, order: int) -> float:
+def _deviation(values: Matrix, order: int) -> Vector:
     # standard deviation of a normal distribution over its median deviation
-    return 1.482602218505602 * float(np.median(np.abs(np.diff(values, order))))
+    return np.asarray(1.482602218505602 * np.median(np.abs(np.diff(values.T, order)), axis=1))
 
 
 def noise_remarks(equations: Equations, motion: Motion, effort: Matrix, driven: NDArray[np.bool_]) -> list[str]:
     """A sentence on the moment (R, n_v) that noise in a recorded motion scatters most; none where it hardly does."""
     whole = equations.configuration
-    found: list[tuple[float, int, Scatter]] = []
-    for k in map(int, np.flatnonzero(driven)):
-        coordinate = motion.q[:, whole.places[k]] if whole.places[k] >= 0 else np.zeros(len(motion.time))
-        scatter = scatter_of(motion.time, coordinate, effort[:, k])
-        if scatter is not None:
-            found.append((scatter.moment / float(np.ptp(effort[:, k])), k, scatter))
+    asked = np.flatnonzero(driven)
+    places = np.array(whole.places)[asked]
+    coordinates = np.where(places >= 0, motion.q[:, places], 0.0)
+    scatters = scatter_of(motion.time, coordinates, effort[:, asked])
+    found = [(each.moment / float(np.ptp(effort[:, k])), int(k), each)
+             for k, each in zip(asked, scatters, strict=True) if each is not None]  # fmt: skip
     if not found:
         return []
     share, k, scatter = max(found)

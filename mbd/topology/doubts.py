@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 from mbd.bodies.ground import Ground
 from mbd.bodies.link import Link
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.spring_leg import SpringLeg
+from mbd.forces.muscles.wrapping import WrappingCylinder
 from mbd.forces.samples import Samples, in_degrees
 from mbd.joints.base import AWAITED_ATTRIBUTE, Joint
 from mbd.topology.graph import links_of, spanning_tree
@@ -32,7 +33,7 @@ MAX_SAMPLE_TIME = 2.0
 
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    parts = (_weights, _lengths, _masses, _turned, _twice, _grips, _weak_legs, _driven, _periods, _awaited)
+    parts = (_weights, _lengths, _masses, _turned, _twice, _grips, _weak_legs, _wrapped, _driven, _periods, _awaited)
     return [sentence for part in parts for sentence in part(model)]
 
 
@@ -113,6 +114,23 @@ def _grips(model: Any) -> list[str]:
         f"friction of '{contact.name}' is {contact.friction:g}; a coefficient is a ratio of forces, rubber has about 1"
         for contact in getattr(model, "constraints", ())
         if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > MAX_FRICTION
+    ]
+
+
+def _wrapped(model: Any) -> list[str]:
+    """Muscles around two cylinders that follow each other without a side."""
+    found = []
+    for force in getattr(model, "forces", ()):
+        points = getattr(getattr(force, "path", None), "points", ())
+        free = [isinstance(point, WrappingCylinder) and point.side is None for point in points]
+        if any(one and other for one, other in pairwise(free)):
+            found.append(force.name)
+    if not found:
+        return []
+    names = ", ".join(map(repr, found[:4])) + (f" and {len(found) - 4} more" if found[4:] else "")
+    return [
+        f"the path of {names} goes around two cylinders that follow each other and have no side; the shorter way "
+        "around one depends on that around the other, so that either side is possible: give WrappingCylinder(…, side=)"
     ]
 
 

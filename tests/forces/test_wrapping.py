@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -280,3 +281,17 @@ def test_a_radius_is_a_parameter_and_must_be_positive():
 def test_wrong_surfaces_are_refused(make, sentence):
     with pytest.raises(mbd.ModelError, match=sentence):
         make(mbd.Model("m").ground)
+
+
+@pytest.mark.parametrize(("side", "doubted"), [(None, True), ((0.0, 1.0, 0.0), False)])
+def test_two_cylinders_without_a_side_are_doubted(side, doubted):
+    model = mbd.Model("arm")
+    rod = mbd.Link("rod", mass=1.0, length=0.5, center=0.2, inertia=0.02)
+    model.connect(mbd.Revolute("elbow", model.ground.origin, rod.start))
+    ground = model.ground
+    over = [mbd.WrappingCylinder(ground.point(x, 0.3), 0.03, side) for x in (0.0, 0.2)]
+    model.apply(mbd.Muscle("strap", (ground.point(-0.2, 0.3), *over, rod.end), 10.0, 0.2, 0.3, tendon="rigid"))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        mbd.assemble(model, {"elbow.angle": 0.4})
+    assert any("two cylinders that follow each other" in str(each.message) for each in told) is doubted

@@ -110,6 +110,8 @@ def test_surfaces_that_paths_name_must_be_there(tmp_path):
     assert not any("Wrapping" in type(point).__name__ for point in found.muscles["vasti"].path.points)
     odd = mbd.read_model(written(tmp_path, with_surfaces(text, ROD.replace("+x", "z"))))
     assert any("not on its side 'z'" in line for line in odd.report.approximated)
+    assert any("wrap beyond their lengths too: 'rod' (0.2 m)" in line for line in odd.report.approximated)
+    assert not any("no ends" in line for line in found.report.approximated)
 
 
 @pytest.mark.parametrize("version", FORMATS)

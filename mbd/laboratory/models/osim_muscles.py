@@ -79,6 +79,9 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
         report.approximated.append(
             f"paths around {kind} go straight, so that their moment arms differ: {listed(dict.fromkeys(muscles))}"
         )
+    ends = [f"{name!r} ({size:g} m)" for name, size in surfaces.endless.items() if name in surfaces.used]
+    if ends:
+        report.approximated.append(f"cylinders have no ends, paths wrap beyond their lengths too: {', '.join(ends)}")
     if others:
         report.approximated.append(f"curves of De Groote and Fregly stand for others: {listed(others)}")
     if slow:

@@ -33,6 +33,10 @@ class Surfaces:
     file: OsimFile
     straight: dict[str, list[str]] = field(default_factory=dict)
     """By kind, muscles whose path passes a surface of it straight."""
+    used: set[str] = field(default_factory=set)
+    """Names of those that paths pass."""
+    endless: dict[str, float] = field(default_factory=dict)
+    """Lengths of cylinders, which have no ends here, by name [m]."""
 
     def between(self, path: Element, muscle: str, bodies: Sequence[Body]) -> list[list[WrappingSurface]]:
         """Surfaces after each point of a path but the last, in the order in which the path meets them.
@@ -59,6 +63,7 @@ class Surfaces:
                 # what moves with the surface does not come to touch it
                 if k < len(found) and not bodies[k] is bodies[k + 1] is surface.frame.body:
                     found[k].append(surface)
+                    self.used.add(name)
         for k, surfaces in enumerate(found):
             if len(surfaces) > 1:
                 chains = [self._chain(bodies[end]) for end in (k, k + 1)]
@@ -114,6 +119,7 @@ def surfaces_of(file: OsimFile) -> Surfaces:
                 _report_side(file, name, "sphere", side, ("all",))
             else:
                 found.known[name] = WrappingCylinder(frame, radius, SIDES.get(side))
+                found.endless[name] = number_of(element, "length", math.inf)
                 _report_side(file, name, "cylinder", side, ("all", *SIDES))
     return found
 
