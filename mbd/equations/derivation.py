@@ -32,6 +32,7 @@ from mbd.equations.sizes import require_room
 from mbd.equations.solids import offer_solids, solids_of
 from mbd.equations.states import state_balance
 from mbd.equations.switching_times import table_faults
+from mbd.equations.tree_elimination import TreeFactors
 from mbd.equations.whole_body import offer_whole_body
 from mbd.errors import ModelError
 from mbd.forces.rotor import Rotor
@@ -289,6 +290,18 @@ class TreeGeometry:
         if not self.planar:
             return None
         return self.dynamics.tangent(self.work + self._viewed(values, multipliers, rates, forces), self.rests)
+
+    def eliminated(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> TreeFactors | None:
+        """S of the same balance eliminated from the tips of the tree, or None where it is no sum over joints."""
+        if self.rests:
+            return None
+        return self.dynamics.eliminated(self.work + self._viewed(values, multipliers, rates, forces))
 
     def _viewed(
         self, values: Sequence[Node], multipliers: Sequence[Node], rates: Sequence[Node], forces: Sequence[Node]

@@ -22,6 +22,7 @@ from mbd.equations.inputs import Inputs
 from mbd.equations.kinematic_proxies import KinematicProxies, Wrench
 from mbd.equations.kinematics import Moving, Twist, twists
 from mbd.equations.placement import Placement
+from mbd.equations.tree_elimination import TreeFactors, tree_factors
 from mbd.tape.derivatives import vjp
 from mbd.tape.node import Node, Scalar
 
@@ -110,6 +111,13 @@ class Dynamics:
         for column, entries in zip(S[:n], branches.tangent([*self._inertia, *pulls]), strict=True):
             column[:n] = _sums(entries, column[:n])
         return S
+
+    def eliminated(self, work: Work) -> TreeFactors | None:
+        """S eliminated from the tips of the tree, see `tree_factors`; None where a force acts on a body."""
+        pulls, direct = self._read(work)
+        if any(pull.carrier.parent is not None for pull in pulls):
+            return None
+        return tree_factors(self._bodies, self._inertia_of, direct, self._inputs, self._tape)
 
     def _branches(self, n_z: int) -> Branches | None:
         """Quantities of branches, the same for all forces."""

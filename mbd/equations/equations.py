@@ -30,8 +30,8 @@ from mbd.equations.shapes import Shape
 from mbd.tape.node import Node, Table, Tape
 
 __all__ = [
-    "Chart", "Contact", "Coordinate", "Effect", "Equations", "Facing", "Friction", "Geometry", "Guard", "Parameter",
-    "Machine", "Row", "Transition", "Turn",
+    "Chart", "Contact", "Coordinate", "Effect", "Eliminated", "Equations", "Facing", "Friction", "Geometry", "Guard",
+    "Parameter", "Machine", "Row", "Transition", "Turn",
 ]  # fmt: skip
 
 
@@ -336,6 +336,22 @@ class Effect:
             object.__setattr__(self, "column", usual.get(self.kind, self.kind))
 
 
+class Eliminated(Protocol):
+    """A matrix that is eliminated on the tape: see `mbd.tape.elimination.Factors`."""
+
+    @property
+    def sound(self) -> Node: ...
+
+    @property
+    def weakest(self) -> Node: ...
+
+    def solve(self, right: Sequence[Node]) -> list[Node]: ...
+
+    def kept(self) -> list[Node]: ...
+
+    def read(self, kept: Mapping[int, Node]) -> Eliminated: ...
+
+
 class Geometry(Protocol):
     """What a derivation knows of its own expressions: shorter ways to derivatives that the tape could take alone.
 
@@ -383,6 +399,15 @@ class Geometry(Protocol):
         forces: Sequence[Node] = (),
     ) -> list[list[Node]] | None:
         """The columns of S = M + c_C C + c_K K of `balance_with` by a shorter way, or None where it knows none."""
+
+    def eliminated(
+        self,
+        values: Sequence[Node],
+        multipliers: Sequence[Node],
+        rates: Sequence[Node] = (),
+        forces: Sequence[Node] = (),
+    ) -> Eliminated | None:
+        """The same S eliminated without the matrix, with operations in proportion to the bodies; None if it cannot."""
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """For each x_j, ∂node/∂x_j of the nodes inside `outputs` (positions, rotations) where it is known."""

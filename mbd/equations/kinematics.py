@@ -22,7 +22,9 @@ from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Column", "Edge", "Moving", "Twist", "ground_motion", "moving_body", "twists"]
+__all__ = [
+    "Column", "Edge", "Moving", "Twist", "carried", "ground_motion", "joint_motion", "moving_body", "spin_of", "twists",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -101,20 +103,27 @@ def ground_motion(body: Body, gravity: Triple) -> Moving:
 def moving_body(body: Body, parent: Moving, edge: Edge, scope: Scope) -> Moving:
     """The next body of the recursion."""
     turn, arm, shift, columns = _geometry(edge, scope)
-    turning, turning_rate, sliding, sliding_rate = _joint_motion(edge, columns, scope.tape)
-    back = transpose(turn)
-    carried = rotate(back, parent.angular_velocity)
-    omega = total(carried, turning)
-    alpha = total(total(rotate(back, parent.angular_acceleration), cross(carried, turning)), turning_rate)
-    coriolis = scaled(2.0, cross(parent.angular_velocity, sliding))
-    at_joint = total(total(parent.acceleration_at(arm), coriolis), sliding_rate)
-    spin = _spin(omega, alpha)
-    acceleration = difference(rotate(back, at_joint), rotate(spin, shift))
+    motion = joint_motion(edge, columns, scope.tape)
+    omega, alpha, acceleration, spin = carried(parent, turn, arm, shift, motion)
     path = (*parent.path, *range(edge.first, edge.first + len(edge.rates)))
     return Moving(
-        body, parent, edge, omega, alpha, acceleration, spin, turn, arm, shift, columns, turning, sliding,
-        sliding_rate, path,
+        body, parent, edge, omega, alpha, acceleration, spin, turn, arm, shift, columns, motion[0], *motion[2:], path,
     )  # fmt: skip
+
+
+def carried(
+    parent: Moving, turn: Rotation, arm: Triple, shift: Triple, motion: tuple[Triple, Triple, Triple, Triple]
+) -> tuple[Triple, Triple, Triple, Rotation]:
+    """ω, α, a − g of the origin and A of a body that a parent carries by a joint, which moves by ω_r, ω̇_r, ṗ, p̈."""
+    turning, turning_rate, sliding, sliding_rate = motion
+    back = transpose(turn)
+    with_parent = rotate(back, parent.angular_velocity)
+    omega = total(with_parent, turning)
+    alpha = total(total(rotate(back, parent.angular_acceleration), cross(with_parent, turning)), turning_rate)
+    coriolis = scaled(2.0, cross(parent.angular_velocity, sliding))
+    at_joint = total(total(parent.acceleration_at(arm), coriolis), sliding_rate)
+    spin = spin_of(omega, alpha)
+    return omega, alpha, difference(rotate(back, at_joint), rotate(spin, shift)), spin
 
 
 def _geometry(edge: Edge, scope: Scope) -> tuple[Rotation, Triple, Triple, tuple[Column, ...]]:
@@ -142,7 +151,7 @@ def _adds(edge: Edge, k: int) -> bool:
     return edge.increment_rates[k] is rate and not any(node is rate for node in live(others))
 
 
-def _joint_motion(edge: Edge, columns: Sequence[Column], tape: Tape) -> tuple[Triple, Triple, Triple, Triple]:
+def joint_motion(edge: Edge, columns: Sequence[Column], tape: Tape) -> tuple[Triple, Triple, Triple, Triple]:
     """ω_r, ω̇_r in child axes and ṗ, p̈ in parent axes."""
     turning, sliding = _combined(columns, edge.rates)
     turning_rate, sliding_rate = _combined(columns, edge.accelerations)
@@ -170,7 +179,7 @@ def _jvp(vector: Triple, seeds: Mapping[Node, Scalar], tape: Tape) -> Triple:
     return (x, y, z)
 
 
-def _spin(omega: Triple, alpha: Triple) -> Rotation:
+def spin_of(omega: Triple, alpha: Triple) -> Rotation:
     """A = [α]ₓ + [ω]ₓ² = [α]ₓ + ω ωᵀ − |ω|² 1."""
     (x, y, z), (ax, ay, az) = omega, alpha
     xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z

@@ -28,7 +28,7 @@ from collections.abc import Iterable, Sequence
 
 from mbd.dataclass import dataclass
 from mbd.equations.cones import cosine, sliding_force
-from mbd.equations.equations import Contact, Equations
+from mbd.equations.equations import Contact, Eliminated, Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.magnitudes import magnitudes
 from mbd.equations.tangents import Columns, Forces, seeded, tangent
@@ -79,6 +79,8 @@ class Correction:
 
 MAX_UNKNOWNS = 20
 """Unknowns above which a system is not eliminated on the tape."""
+MIN_COORDINATES = 24
+"""Coordinates from which on a tree is eliminated from its tips."""
 
 
 def correction(
@@ -92,6 +94,8 @@ def correction(
     """
     inputs, rows, tape = Inputs.of(equations), sorted(rows), equations.tape
     n, n_v, m = inputs.n, equations.n_v, len(rows)
+    if n >= MIN_COORDINATES and m == 0:
+        return _from_the_tips(equations, penalties, sliding)
     if not 0 < n + m <= MAX_UNKNOWNS:
         return None
     matrix, tail = _whole(equations, *system(equations, rows, penalties, stabilized, sliding))
@@ -114,13 +118,28 @@ def correction(
         change = [after - u for after, u in zip(shift, before, strict=True)]
         goal = [(rates[k] + _dot(turning[k * n_v : (k + 1) * n_v], change)) * by_C for k in range(m)]
     solved = found.solve([-force for force in r] + [-row for row in goal])
-    out = [*tail, found.sound, found.weakest, *solved, *change]
+    out = [*solved, *change]
     if stabilized and not found.weakest.is_zero:
         out += [matrix[j][j] for j in range(n_v)] + [entry for line in matrix[n:] for entry in line[:n_v]]
+    return _kept(found, tail, out, n + m)
+
+
+def _from_the_tips(equations: Equations, penalties: Sequence[int], sliding: Sequence[int]) -> Correction | None:
+    """The same of a large tree without rows, eliminated from its tips; None where its tangent is no sum over joints."""
+    r = balance_with(equations, (), penalties, sliding)
+    forces = _forces(equations, (), [(c, equations.tape.one) for c in penalties], sliding)
+    found = None if equations.geometry is None else equations.geometry.eliminated(*forces)
+    return None if found is None else _kept(found, r, found.solve([-force for force in r]), len(r))
+
+
+def _kept(found: Eliminated, tail: list[Node], solved: Sequence[Node], size: int) -> Correction:
+    """The programs of a correction whose solution, of `size`, and what follows it are `solved`."""
+    tape = found.sound.tape
+    out = [*tail, found.sound, found.weakest, *solved]
     kept = found.kept()
     at, place = len(out), len(tail) + 2
     again = found.read({node.index: tape.input("held", at + k) for k, node in enumerate(kept)})
-    return Correction([*out, *kept], again.solve([tape.input("held", place + k) for k in range(n + m)]), len(tail))
+    return Correction([*out, *kept], again.solve([tape.input("held", place + k) for k in range(size)]), len(tail))
 
 
 def system(
