@@ -31,7 +31,8 @@ class Event(Machine):
     name : its name, under which it stands in the run
     guard : the measure; None: it happens `on` something
     reset : named values to set, {'hip.rate': 0.0}, or a function that makes them from named values; None for no change.
-        A value may be a function of named values, or a sympy expression: ``{theta.q: -theta.q, phi.v: 0}``
+        A value may be a function of named values, ``{'hip.rate': lambda named: -0.5 * named['hip.rate']}``, or a sympy
+        expression: ``{theta.q: -theta.q, phi.v: 0}``
     terminal : whether the run ends there
     direction : −1 as the guard falls through zero, +1 as it rises, 0 both. A value that jumps over zero, as the rate of
         a knee in an impact or at a reset, has crossed it then
