@@ -11,8 +11,7 @@ from dataclasses import field
 from mbd.dataclass import dataclass
 from mbd.errors import UnknownNameError, nearest
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
-from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER
-from mbd.kernel.schemes.tableau import Tableau
+from mbd.kernel.schemes.tableau import FOURTH_ORDER, Tableau
 
 __all__ = ["EXTENSIONS", "HERMITE", "OSCULATING", "STEPS_OF_ORDER_4", "STEPS_OF_ORDER_8", "Extension", "extension_of"]
 

@@ -7,8 +7,7 @@ from typing import ClassVar
 from mbd.dataclass import dataclass
 from mbd.integrators.extension import STEPS_OF_ORDER_4, Extension
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
-from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER
-from mbd.kernel.schemes.tableau import Tableau
+from mbd.kernel.schemes.tableau import FOURTH_ORDER, Tableau
 
 __all__ = ["RungeKutta4"]
 

@@ -13,7 +13,7 @@ from mbd.hardcases.governor import governor
 from mbd.hardcases.user_force import pushed_particle
 from mbd.integrators.runge_kutta import RungeKutta853
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
-from mbd.kernel.schemes.runge_kutta_4 import FOURTH_ORDER
+from mbd.kernel.schemes.tableau import FOURTH_ORDER
 from mbd.results.interpolation import Grid
 from mbd.results.polynomials import quintic
 from mbd.simulation.simulate import prepared

@@ -177,14 +177,15 @@ NO_SCHEME = Scheme("", _no_step, _no_step, _no_step)  # type: ignore[arg-type]
 """In place of an entry for integrators that are written in Python only."""
 
 
-@lru_cache(maxsize=8)
-def _entries(modules: tuple[str, ...]) -> tuple[Scheme, ...]:
-    return tuple(import_module(module).SCHEME for module in modules)
+@lru_cache(maxsize=64)
+def _entry(module: str) -> Scheme:
+    entry: Scheme = import_module(module).SCHEME
+    return entry
 
 
 def schemes() -> tuple[Scheme, ...]:
     """All entries, in the order of `SCHEMES`."""
-    return _entries(SCHEMES)
+    return tuple(map(_entry, SCHEMES))
 
 
 def scheme_named(name: str) -> Scheme:
@@ -197,18 +198,19 @@ def scheme_named(name: str) -> Scheme:
     """
     if not name:
         return NO_SCHEME
-    found = {scheme.name: scheme for scheme in schemes()}
-    if name not in found:
+    found = next((scheme for scheme in map(_entry, SCHEMES) if scheme.name == name), None)  # imports none behind it
+    if found is None:
         raise CapabilityError(
             f"the integrator names the compiled scheme {name!r}, which no entry has: there are "
-            f"{', '.join(map(repr, found))}; add its module to mbd.kernel.schemes.contract.SCHEMES"
+            f"{', '.join(repr(scheme.name) for scheme in schemes())}; add its module to "
+            "mbd.kernel.schemes.contract.SCHEMES"
         )
-    return found[name]
+    return found
 
 
 def number_of(name: str) -> int:
     """The place of a scheme among them; 0 for a name that none has."""
-    return next((number for number, scheme in enumerate(schemes()) if scheme.name == name), 0)
+    return next((number for number, scheme in enumerate(map(_entry, SCHEMES)) if scheme.name == name), 0)
 
 
 def dispatch() -> tuple[str, dict[str, Any]]:

@@ -7,21 +7,10 @@ direction in which Σ b, Σ b c, Σ b c² and Σ b A c stay as they are. s = −
 
 from __future__ import annotations
 
-import numpy as np
-
 from mbd.kernel.schemes.runge_kutta import explicit_scheme
-from mbd.kernel.schemes.tableau import Tableau, weights_at
+from mbd.kernel.schemes.tableau import FOURTH_ORDER
 
-__all__ = ["FOURTH_ORDER", "SCHEME"]
-
-FOURTH_ORDER = Tableau(
-    weights_at(4, {(1, 0): 0.5, (2, 1): 0.5, (3, 2): 1.0}),
-    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
-    np.array([0.0, 0.5, 0.5, 1.0]),
-    np.array([0.0, 0.0, 0.0, 1.0, -1.0]) / 6.0,
-    np.zeros(5),
-)
-"""Four stages."""
+__all__ = ["SCHEME"]
 
 SCHEME = explicit_scheme("runge-kutta-4", FOURTH_ORDER, 0.75, 2.828)
 """Its middle lies between the nodes at 1/2 and 1."""

@@ -9,7 +9,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 
-__all__ = ["Tableau", "weights_at"]
+__all__ = ["FOURTH_ORDER", "Tableau", "weights_at"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,3 +42,13 @@ def weights_at(stages: int, entries: Mapping[tuple[int, int], float]) -> Matrix:
     for place, value in entries.items():
         found[place] = value
     return found
+
+
+FOURTH_ORDER = Tableau(
+    weights_at(4, {(1, 0): 0.5, (2, 1): 0.5, (3, 2): 1.0}),
+    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
+    np.array([0.0, 0.5, 0.5, 1.0]),
+    np.array([0.0, 0.0, 0.0, 1.0, -1.0]) / 6.0,
+    np.zeros(5),
+)
+"""Four stages, and the slope at the end; see `mbd.kernel.schemes.runge_kutta_4`."""
