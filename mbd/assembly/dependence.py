@@ -9,7 +9,7 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
 
-__all__ = ["Dependence", "dependences", "rank_of"]
+__all__ = ["MIN_COEFFICIENT", "Dependence", "dependences", "rank_of"]
 
 RANK_RTOL = 1e-8
 """Singular value of the row-normalised B, relative to the largest, that counts as zero [-]."""

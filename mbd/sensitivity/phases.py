@@ -15,6 +15,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
+from mbd.kernel.contact.complementarity import ROUND_OFF
 from mbd.sensitivity.balance import independent, saddle
 from mbd.sensitivity.motion import Mode, Motion, solved
 from mbd.sensitivity.programs import Programs
@@ -26,8 +27,6 @@ BRANCH_RTOL = 1e-9
 """What an impulse or a velocity is relative to its terms where the branch of its law is not certain [-]."""
 DERIVATIVE_RTOL = 1e-8
 """Derivative, relative to its terms, that moves off such an edge [-]."""
-ROUND_OFF = 1e-11
-"""What impulses and velocities may miss of their laws [-]."""
 
 
 class Unknown(Exception):

@@ -28,7 +28,7 @@ from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, DependentRows, Motion
 from mbd.kernel.stepping.restart import active_rows, refresh_scales
 
-__all__ = ["complementarity"]
+__all__ = ["ROUND_OFF", "complementarity"]
 
 MAX_NEWTON = 12
 """Changes of all branches at once before and after the solution over cones [-]."""

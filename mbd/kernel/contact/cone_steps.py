@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import STICK
-from mbd.kernel.contact.cone_turns import estimated_turn_rate, stable_turn
+from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, estimated_turn_rate, stable_turn
 from mbd.kernel.contact.cones import (
     HELD,
     NO_DIRECTION,
@@ -29,6 +29,7 @@ from mbd.kernel.contact.cones import (
     speed_of,
 )
 from mbd.kernel.contact.contact_modes import STILL
+from mbd.kernel.events.guard_sides import LEAST_SPEED
 from mbd.kernel.events.guards import judge
 from mbd.kernel.events.locate import locate
 from mbd.kernel.records import Frictions, Guards, Kernel, Switching
@@ -41,16 +42,12 @@ __all__ = [
 
 PART = 0.5
 """Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
-FAR = 2.0
-"""Times of a step in which γ must not reach zero if the step is to be as any other [-]."""
 SHORTER = 0.1
 """Part of a step that is tried where Newton's method fails as sliding begins, four times at most [-]."""
 LONGER = 3.0
 """Each of the steps that follow over the one before [-]."""
 BRIEFEST = 1e-7
-"""Part of dt below which no such step is tried [-]."""
-BRIEFEST_TURN = 1e-7
-"""Part of dt below which no step is shortened for it [-]."""
+"""Part of dt below which no such step is tried, and none is shortened for a turn [-]."""
 SURELY = 0.8
 """Part of a step within which γ reaches zero if a direction is held in it [-]."""
 STRAIGHT = 0.05
@@ -65,8 +62,6 @@ TURNS_AWAY = -2
 """Of `come_to_zero`: what seemed to come to rest slides on."""
 TOGETHER = 0.02
 """Part of its speed before the step at which another group rests at the same instant [-]."""
-NOTHING = 1e-200
-"""What is added to a speed that may be zero [m/s]."""
 AT_REST = 1e-10
 """Speed across the direction that is held that counts as none, over ‖γ̇‖ dt [-]."""
 
@@ -87,7 +82,7 @@ def approached_end(K: Switching, t1: float) -> float:
             if speed < NO_DIRECTION:  # it came to rest at the end of the last step: held, it is found to
                 set_hold(K, f, HELD)
                 continue
-            if not change * FAR * h > speed:
+            if not change * MIN_STEPS_TO_REST * h > speed:
                 continue
             turns_at = turning_of(K, f)
             slow = PART * speed <= SHORTEST * change * K.dt
@@ -99,7 +94,8 @@ def approached_end(K: Switching, t1: float) -> float:
                 rest = max(rest, speed * speed / fall)
             elif fall > 0.0 or turns_at * h > PART * speed * speed:
                 end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
-    if 0.0 < LONGER * K.begun_step < FAR * rest and not turns(K):  # what is held needs a step in which it comes to rest
+    # what is held needs a step in which it comes to rest
+    if 0.0 < LONGER * K.begun_step < MIN_STEPS_TO_REST * rest and not turns(K):
         K.begun_step = 0.0
     if K.begun_step > 0.0:
         K.begun_step *= LONGER
@@ -109,7 +105,7 @@ def approached_end(K: Switching, t1: float) -> float:
             K.begun_step = 0.0
     if K.explicit == 1 and K.adaptive == 0:
         rate = estimated_turn_rate(K)
-        K.turning_step = max(stable_turn(K) / rate, BRIEFEST_TURN * K.dt) if rate > 0.0 else 0.0
+        K.turning_step = max(stable_turn(K) / rate, BRIEFEST * K.dt) if rate > 0.0 else 0.0
         if 0.0 < K.turning_step < end - K.time:
             end = K.time + K.turning_step
     return end
@@ -197,7 +193,7 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
             if K.group_size[g] > 1 and K.slip[g] != 0.0 and K.hold[g] == HELD:
                 speed = speed_of(K, g, K.guards0, K.at_slip)
                 largest = max(largest, away(K, g, K.guards1, K.at_slip) / (AT_REST * speed + 1e-13))
-                left = across(K, g, K.guards1, K.at_slip) / (speed + NOTHING)
+                left = across(K, g, K.guards1, K.at_slip) / (speed + LEAST_SPEED)
                 change = left - K.across[g]
                 product += K.across[g] * change
                 square += change * change

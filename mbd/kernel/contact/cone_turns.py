@@ -11,7 +11,7 @@ from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.records import Balance, ContactForces, SchemeAbilities, Switching
 from mbd.kernel.stepping.restart import evaluate, stepping_rows
 
-__all__ = ["estimated_turn_rate", "stable_turn"]
+__all__ = ["MIN_STEPS_TO_REST", "estimated_turn_rate", "stable_turn"]
 
 STABLE = 0.72
 """Part of what an explicit scheme is stable for that step times the estimated rate may be [-].
@@ -20,6 +20,8 @@ Beyond all of it what is across the direction grows from round-off until γ has 
 """
 UNKNOWN = 2.0
 """The same for a scheme that does not tell what it is stable for [-]."""
+MIN_STEPS_TO_REST = 2.0
+"""Steps in which γ must not reach zero, nor turn by a radian, for one to be as any other [-]."""
 SOON = 100.0
 """Steps before it comes to rest from which on a motion that slows down is looked at [-]."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import PULL
 from mbd.kernel.contact.cone_contacts import all_hold
-from mbd.kernel.contact.cone_turns import estimated_turn_rate, stable_turn
+from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, estimated_turn_rate, stable_turn
 from mbd.kernel.contact.cones import HELD, aim_as_pulled, along, away, friction_size, leads_group, set_hold, speed_of
 from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
@@ -18,8 +18,6 @@ from mbd.kernel.stepping.restart import evaluate, evaluate_loaded, largest_force
 
 __all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release", "turned_in_plane"]
 
-FAR = 2.0
-"""Times of a step in which γ must neither reach zero nor turn by a radian if its direction is to follow it [-]."""
 TURNED = 1e-6
 """Sine of the angle by which γ may leave the direction that a step holds [-]."""
 
@@ -29,7 +27,7 @@ def hold_for_step(K: Switching, h: float) -> None:
     for f in range(K.n_frictions):
         if leads_group(K, f) and K.slip[f] != 0.0:
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
-            set_hold(K, f, HELD if FAR * h * change > speed_of(K, f, K.guards0, K.at_slip) else 0.0)
+            set_hold(K, f, HELD if MIN_STEPS_TO_REST * h * change > speed_of(K, f, K.guards0, K.at_slip) else 0.0)
     if K.explicit == 1 and h * estimated_turn_rate(K) > stable_turn(K):
         hold_all(K)
 

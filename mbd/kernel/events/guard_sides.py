@@ -21,6 +21,8 @@ from mbd.kernel.events.guards import gap_tolerance, is_waiting, is_watched
 from mbd.kernel.records import Events, Guards, Switching
 
 __all__ = [
+    "LEAST_SPEED",
+    "SAME_INSTANT",
     "find_crossings",
     "find_passed",
     "is_at_event",

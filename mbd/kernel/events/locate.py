@@ -15,7 +15,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.events.bracket import bracket, flag_of
 from mbd.kernel.events.guard_round_off import guard_round_off
-from mbd.kernel.events.guard_sides import striking_contact
+from mbd.kernel.events.guard_sides import SAME_INSTANT, striking_contact
 from mbd.kernel.events.guards import (
     gap_scale,
     gap_tolerance,
@@ -32,8 +32,6 @@ JUMP = 1e-6
 """Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
 UNEXPLAINED = 0.5
 """What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
-SAME = 1e-9
-"""Events closer than this part of the way to the first are one event."""
 EARLIER, LATER = -2, -1
 """Where `fall_back` has seen another guard fire: before the place looked at, or in the full step."""
 
@@ -119,7 +117,7 @@ def locate(K: Kernel, h: float) -> int:
         found = K.event_after
         if found <= 0.0:
             return 0
-        together = found_kind >= 0 and found > (1.0 - SAME) * end  # as the one it was looked for before
+        together = found_kind >= 0 and found > (1.0 - SAME_INSTANT) * end  # as the one it was looked for before
         if together or not another_before(K, kind, index, found):
             take_event(K, kind, index, found)
             if (kind == CROSS or kind == CROSS_BACK) and K.strategy == 0:  # of one instant, the contact comes first
@@ -207,7 +205,7 @@ def another_before(K: Switching, kind: int, index: int, found: float) -> bool:
     place = flag_of(K, kind, index)
     quiet = K.active[place]
     K.active[place] = 1
-    other = judge(K, found) and K.event_place < 1.0 - SAME
+    other = judge(K, found) and K.event_place < 1.0 - SAME_INSTANT
     K.active[place] = quiet
     return other
 
@@ -249,5 +247,5 @@ def left_alone(K: Guards, c: int) -> bool:
     place = K.at_condition + c
     change = abs(K.guards0[place] - K.guards1[place])
     fall = abs(K.guards0[c] - K.guards1[c])
-    apart = SAME * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
+    apart = SAME_INSTANT * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
     return bool(K.guards1[place] <= apart * change)

@@ -11,8 +11,8 @@ from mbd.kernel.stepping.restart import compose, note_scales
 from mbd.kernel.stepping.scales import ROUGH, add_force_floors
 
 __all__ = [
-    "BENT", "BYSTANDER", "LOOK_TWICE", "finish", "is_below_floors", "is_small", "overturns", "predict",
-    "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at", "weigh_by_accelerations",
+    "BENT", "BYSTANDER", "LOOK_TWICE", "MIN_HALVED_RESIDUAL", "finish", "is_below_floors", "is_small", "overturns",
+    "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at", "weigh_by_accelerations",
 ]  # fmt: skip
 
 LOOK_TWICE = 0.01
@@ -21,6 +21,8 @@ BENT = 0.1
 """Change of accelerations in a step, times its size, over the fastest rate, above which poles are looked for [-]."""
 BYSTANDER = 0.01
 """Part of the fastest rate below which another one hardly takes part in the motion [-]."""
+MIN_HALVED_RESIDUAL = 1e4
+"""Residual over its tolerance above which a correction that does not reduce it is halved."""
 
 
 def predict(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> None:

@@ -13,6 +13,7 @@ from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, Steps
 from mbd.kernel.schemes.iteration import (
+    MIN_HALVED_RESIDUAL,
     finish,
     is_below_floors,
     overturns,
@@ -45,8 +46,6 @@ from mbd.kernel.tangent_rules import (
 
 __all__ = ["SEARCHED", "UNSOUND", "solve_step"]
 
-FAR = 1e4
-"""Residual over its tolerance above which a correction that does not reduce it is halved."""
 MOST_STRAIGHT = 2
 """Tangents of a step that straight-line code may factor: where it takes more, pivots are searched for."""
 SEARCHED = 3
@@ -93,12 +92,13 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             K.n_residuals += 1
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
-        grown = error > FAR and error > 0.9 * left and not together  # shares that follow loads change it as well
+        # shares that follow loads change it as well
+        grown = error > MIN_HALVED_RESIDUAL and error > 0.9 * left and not together
         if grown and m > 0:
             vanishing = weigh_by_accelerations(K)
             if vanishing or K.stabilized == 0:  # of index 3 the rows alone ask for accelerations
                 size = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
-                grown = size > FAR and size > 0.9 * size_before(K, m, c_C, c_K, tolerance)
+                grown = size > MIN_HALVED_RESIDUAL and size > 0.9 * size_before(K, m, c_C, c_K, tolerance)
             restore_scales(K)
         if halvings < 10 and iteration > 0 and (error < 0.0 or grown):
             if fixed:

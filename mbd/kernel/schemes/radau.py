@@ -20,7 +20,7 @@ from mbd.kernel.schemes.direction_continuation import (
     continue_directions,
     wants_continuation,
 )
-from mbd.kernel.schemes.iteration import roughly, runs_away, weigh_by_accelerations
+from mbd.kernel.schemes.iteration import MIN_HALVED_RESIDUAL, roughly, runs_away, weigh_by_accelerations
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import (
@@ -62,8 +62,6 @@ from mbd.kernel.tangent_rules import NOT_FOLLOWED, follow_stages, further_correc
 
 __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 
-FAR_OFF = 1e4
-"""Residual over its tolerance above which a correction that does not reduce it is halved."""
 SLOW = 0.5
 """Part of the residual left by a correction above which the matrices are made again."""
 
@@ -158,7 +156,8 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
     further = 0
     for iteration in range(K.max_iterations):
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
-        grown = error > FAR_OFF and error > 0.9 * left and not sharing(K)  # shares that follow loads change it as well
+        # shares that follow loads change it as well
+        grown = error > MIN_HALVED_RESIDUAL and error > 0.9 * left and not sharing(K)
         if grown and m > 0:
             if weigh_by_accelerations(K):
                 retreat_stages(K, m, 1.0)

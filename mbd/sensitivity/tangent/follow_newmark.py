@@ -8,11 +8,11 @@ from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.schemes.iteration import finish
+from mbd.kernel.tangent_rules import NOT_FOLLOWED
 from mbd.sensitivity.tangent.words import (
     CORRECTION_RTOL,
     MAX_CONTRACTION,
     MAX_CORRECTIONS,
-    NOT_FOLLOWED,
     derivative_of,
     is_differentiated,
     largest_derivative,

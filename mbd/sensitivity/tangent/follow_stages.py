@@ -16,11 +16,11 @@ from mbd.kernel.schemes.stages import (
     load_stage,
     predict_stages,
 )
+from mbd.kernel.tangent_rules import NOT_FOLLOWED
 from mbd.sensitivity.tangent.words import (
     CORRECTION_RTOL,
     MAX_CONTRACTION,
     MAX_CORRECTIONS,
-    NOT_FOLLOWED,
     derivative_of,
     largest_derivative,
     metric_place,

@@ -9,14 +9,11 @@ from __future__ import annotations
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
-    "CORRECTION_RTOL", "MAX_CONTRACTION", "MAX_CORRECTIONS", "NOT_FOLLOWED", "at_root", "derivative_of",
-    "every_row_place",
+    "CORRECTION_RTOL", "MAX_CONTRACTION", "MAX_CORRECTIONS", "at_root", "derivative_of", "every_row_place",
     "is_differentiated", "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
     "solution_place", "solve_plain", "step_place", "takes_part", "without_tangent",
 ]  # fmt: skip
 
-NOT_FOLLOWED = -3
-"""Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
 CORRECTION_RTOL = 1e-12
 """Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
 MAX_CONTRACTION = 0.9

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbd.simulation.diagnostics.circular import SINGULAR_RTOL
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
@@ -29,8 +30,6 @@ __all__ = ["may_jam"]
 
 DIRECTIONS = 180
 """Directions of the force in a pin that are tried [-]."""
-SINGULAR_RTOL = 0.01
-"""Part of the determinant without friction below which it counts as zero [-]."""
 
 
 def may_jam(stepper: Stepper) -> str:

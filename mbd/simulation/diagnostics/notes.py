@@ -37,8 +37,6 @@ HALVING_RATIO = 3.0
 UNRESOLVED_STEPS = 2.0
 """Steps of a penalty contact below which its impact is the scheme's, not the law's: the run's message says so [-]."""
 
-MAX_LOSS_SHARE = 0.5
-"""Share of its energy that a scheme may take from a mechanism before the run's message says so [-]."""
 
 PENETRATION_ATOL = 1e-8
 """Depth at which a contact may close that is no more than round-off of large coordinates [m, rad]."""
@@ -198,7 +196,7 @@ def _uncounted(run: RunData, record: Record) -> list[str]:
 
 def _energy_lost(run: RunData, record: Record) -> list[str]:
     """The note on the energy with the dt that resolves the fastest motion, where most of the energy is gone."""
-    if not run.energy.share < -MAX_LOSS_SHARE or run.kernel.adaptive:
+    if not run.energy.share < -MAX_ENERGY_SHARE or run.kernel.adaptive:
         return []
     rate = fastest(run, record, sane_rows(run))
     text = f": dt = {run.dt:g} s does not resolve its fastest motion of {rate:.3g} rad/s, dt below "

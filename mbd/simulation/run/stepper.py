@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.assembly.dependence import MIN_COEFFICIENT
 from mbd.compile.mechanism import AccelerationTerms, Mechanism
 from mbd.equations.equations import Equations
 from mbd.equations.programs import follows_multipliers
@@ -32,8 +33,6 @@ EVENT_CAPACITY = 512
 """Events that the kernel may log before it hands them over, at least."""
 LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
-TAKES_PART = 1e-7
-"""Coefficient of a row below which another does not depend on it [-]."""
 
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
@@ -270,7 +269,7 @@ class Stepper:
         for row in range(v.n_rows):
             if dropped[row]:  # as they were found first
                 self.dependent.setdefault(
-                    row, tuple(int(k) for k in np.flatnonzero(np.abs(dependence[row]) > TAKES_PART))
+                    row, tuple(int(k) for k in np.flatnonzero(np.abs(dependence[row]) > MIN_COEFFICIENT))
                 )
         v.n_modes = count + 1  # at last: an interrupt may come between any two lines
 
