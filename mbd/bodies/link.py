@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from mbd.bodies.algebra import ZERO, Triple
 from mbd.bodies.base import Body, Frame, Parameter, ParameterSource
 from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.given import GivenInertia
 from mbd.bodies.mass import (
     Inertia,
     MassProperties,
@@ -43,7 +43,7 @@ class Link(Body):
     center_distance: float
     inertia: Inertia
 
-    def __init__(self, name: str, mass: float, length: float, center: float, inertia: Any = 0.0) -> None:
+    def __init__(self, name: str, mass: float, length: float, center: float, inertia: GivenInertia = 0.0) -> None:
         put = object.__setattr__
         put(self, "name", name_of(name, "Link"))
         put(self, "mass", number(mass, f"mass of '{name}'"))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from mbd.bodies.algebra import ZERO, Triple
 from mbd.bodies.base import Body, Parameter, ParameterSource
+from mbd.bodies.given import GivenInertia, Numbers
 from mbd.bodies.mass import (
     Inertia,
     MassProperties,
@@ -46,7 +46,9 @@ class RigidBody(Body):
     center_offset: Vector3
     form: str = ""
 
-    def __init__(self, name: str, mass: float, inertia: Any, center: Any = ZERO, *, form: str = "") -> None:
+    def __init__(
+        self, name: str, mass: float, inertia: GivenInertia, center: Numbers = ZERO, *, form: str = ""
+    ) -> None:
         put = object.__setattr__
         put(self, "name", name_of(name, "RigidBody"))
         put(self, "mass", number(mass, f"mass of '{name}'"))

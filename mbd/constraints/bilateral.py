@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.domains import Domain
+from mbd.bodies.given import Expression
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.constraints.base import Constraint
@@ -18,6 +19,7 @@ from mbd.errors import ModelError
 from mbd.forces.base import joint_of
 from mbd.forces.quantities import (
     Mention,
+    Quantity,
     Samples,
     arguments_of,
     law_names,
@@ -48,8 +50,8 @@ class Bilateral(Constraint):
     """
 
     name: str
-    subject: Any
-    value: Any = 0.0
+    subject: Joint | Measure | Expression
+    value: Quantity = 0.0
     arguments: Any = ("t",)
 
     def __post_init__(self) -> None:
@@ -70,7 +72,10 @@ class Bilateral(Constraint):
     @property
     def measure(self) -> Measure:
         """The measure it holds."""
-        return JointMeasure(self.subject) if isinstance(self.subject, Joint) else self.subject
+        if isinstance(self.subject, Joint):
+            return JointMeasure(self.subject)
+        assert isinstance(self.subject, Measure)  # expressions have become one
+        return self.subject
 
     @property
     def kind(self) -> str:

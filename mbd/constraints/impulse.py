@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from mbd.bodies.algebra import dot, rotate
 from mbd.bodies.base import Frame
+from mbd.bodies.given import Numbers
 from mbd.bodies.point_mass import PointMass
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, name_of, triple
@@ -16,6 +17,7 @@ from mbd.errors import ModelError
 from mbd.forces.base import joint_of
 from mbd.forces.quantities import (
     Mention,
+    Quantity,
     arguments_of,
     law_names,
     mentioned,
@@ -64,10 +66,10 @@ class Impulse(Constraint):
     """
 
     name: str
-    at: Any
-    size: Any
+    at: Joint | Frame | str
+    size: Quantity
     on: str
-    direction: Any = None
+    direction: Numbers | None = None
     order: Literal["before", "with", "after"] = "before"
     axes: Frame | None = None
     arguments: Any = ("t",)
@@ -124,8 +126,9 @@ class Impulse(Constraint):
             return scope.joint(self.at.name).rates[0], size
         if isinstance(self.at, str):
             return scope.rate(scope.named(self.at)), size
-        length = math.sqrt(sum(part * part for part in self.direction))
-        x, y, z = (part / length for part in self.direction)
+        direction = triple(self.direction, f"direction of '{self.name}'")
+        length = math.sqrt(sum(part * part for part in direction))
+        x, y, z = (part / length for part in direction)
         along = (x, y, z) if self.axes is None else rotate(scope.frame(self.axes).rotation, (x, y, z))
         return dot(along, scope.frame(self.at).velocity), size
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from mbd.bodies.given import Function
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, is_number, name_of
 from mbd.constraints.base import VelocityConstraint
@@ -13,6 +14,7 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
     Mention,
+    Quantity,
     Samples,
     arguments_of,
     law_names,
@@ -52,8 +54,8 @@ class Nonholonomic(VelocityConstraint):
     """
 
     name: str
-    row: Any
-    bias: Any = 0.0
+    row: Function
+    bias: Quantity = 0.0
     arguments: Any = ()
     unit: str = "m"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -16,6 +17,8 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import (
     Mention,
+    Quantity,
+    QuantityTriple,
     arguments_of,
     is_single,
     law_names,
@@ -53,8 +56,8 @@ class Applied(Force):
 
     name: str
     frame: Frame
-    force: Any = None
-    torque: Any = None
+    force: QuantityTriple | Mapping[str, QuantityTriple] | None = None
+    torque: Quantity | QuantityTriple | Mapping[str, Quantity | QuantityTriple] | None = None
     arguments: Any = ("t",)
     axes: Frame | None = None
     by: str | None = None

@@ -7,6 +7,7 @@ from typing import Any
 from mbd.bodies.algebra import cross, difference, product, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.given import Numbers
 from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.bodies.values import is_number, name_of, number, shown, triple
 from mbd.dataclass import dataclass
@@ -52,10 +53,10 @@ class Bushing(Force):
     name: str
     a: Frame
     b: Frame
-    stiffness: Any = 0.0
-    rotational_stiffness: Any = 0.0
-    damping: Any = 0.0
-    rotational_damping: Any = 0.0
+    stiffness: float | Numbers = 0.0
+    rotational_stiffness: float | Numbers = 0.0
+    damping: float | Numbers = 0.0
+    rotational_damping: float | Numbers = 0.0
 
     def __post_init__(self) -> None:
         name_of(self.name, "Bushing")
@@ -70,7 +71,8 @@ class Bushing(Force):
     @property
     def kind(self) -> str:
         """'potential', or 'loss' with dampers; the energy of its springs is kept apart from what these take."""
-        return "loss" if any((*self.damping, *self.rotational_damping)) else "potential"
+        dampers: tuple[Any, ...] = self.damping, self.rotational_damping
+        return "loss" if any(map(any, dampers)) else "potential"
 
     def mentions(self) -> list[Mention]:
         """Its frames."""

@@ -34,20 +34,21 @@ class Damper(Force):
     name: str
     a: Frame
     b: Frame
-    loss: Any
+    loss: float | Loss
 
     def __post_init__(self) -> None:
         name_of(self.name, "Damper")
         frame_of(self.a, f"first end of Damper '{self.name}'")
         frame_of(self.b, f"second end of Damper '{self.name}'")
-        loss = Viscous(self.loss) if is_number(self.loss) else loss_of(self.loss, self.name)
+        given: Any = self.loss
+        loss = Viscous(given) if is_number(given) else loss_of(given, self.name)
         object.__setattr__(self, "loss", loss if loss is not None else loss_of("None", self.name))
 
     @property
     def law(self) -> Loss:
         """Its loss."""
-        law: Loss = self.loss
-        return law
+        assert isinstance(self.loss, Loss)  # a number has become one
+        return self.loss
 
     @property
     def kind(self) -> str:

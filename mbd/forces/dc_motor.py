@@ -12,6 +12,7 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import (
     Mention,
+    Quantity,
     arguments_of,
     law_names,
     mentioned,
@@ -48,7 +49,7 @@ class DCMotor(Force):
 
     name: str
     joint: Joint
-    voltage: Any
+    voltage: Quantity
     resistance: float
     constant: float
     inductance: float = 0.0

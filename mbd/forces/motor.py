@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from mbd.bodies.by_mode import by_mode_of
@@ -12,6 +13,7 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import (
     Mention,
+    Quantity,
     arguments_of,
     law_names,
     mentioned,
@@ -44,9 +46,9 @@ class Motor(Force):
 
     name: str
     joint: Joint
-    torque: Any = None
+    torque: Quantity | Mapping[str, Quantity] | None = None
     arguments: Any = ("t",)
-    force: Any = None
+    force: Quantity | Mapping[str, Quantity] | None = None
     by: str | None = None
 
     def __post_init__(self) -> None:

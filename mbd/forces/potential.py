@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.bodies.given import Function
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
@@ -27,7 +28,7 @@ class Potential(Force):
     """
 
     name: str
-    function: Any
+    function: Function
     arguments: Any
 
     def __post_init__(self) -> None:

@@ -7,9 +7,11 @@ from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import ByMode
+from mbd.bodies.given import Function
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import is_number, number
 from mbd.errors import ModelError, UnknownNameError
@@ -21,12 +23,18 @@ from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "INCREMENT_PREFIX", "ArgumentSpec", "Mention", "Samples", "arguments_of", "is_single", "law_names", "mentioned",
-    "quantity_of", "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
+    "INCREMENT_PREFIX", "ArgumentSpec", "Mention", "Quantity", "QuantityTriple", "Samples", "arguments_of", "is_single",
+    "law_names", "mentioned", "quantity_of", "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
 ]  # fmt: skip
 
 INCREMENT_PREFIX = "+"
 """Before the name of a law among the tunable parameters: what is added to it is an input, see `law_names`."""
+
+Quantity: TypeAlias = float | Function | Samples
+"""A number, a function of the arguments, an expression, a curve of scipy, or samples in time."""
+
+QuantityTriple: TypeAlias = Sequence[Quantity] | NDArray[Any] | Function | Samples
+"""Three components (two are x and y), or one function or table that gives them all."""
 
 Mention: TypeAlias = Frame | Joint | str
 """What a word refers to: a frame, a joint, or the name of a quantity."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
 from mbd.bodies.domains import Domain, at_least_zero
+from mbd.bodies.given import NumberByMode
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
@@ -37,8 +36,8 @@ class Spring(Force):
     name: str
     a: Frame
     b: Frame
-    stiffness: Any
-    length: Any = 0.0
+    stiffness: NumberByMode
+    length: NumberByMode = 0.0
     by: str | None = None
 
     def __post_init__(self) -> None:

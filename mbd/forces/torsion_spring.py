@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.given import NumberByMode
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
@@ -32,8 +31,8 @@ class TorsionSpring(Force):
 
     name: str
     joint: Joint
-    stiffness: Any
-    rest: Any = 0.0
+    stiffness: NumberByMode
+    rest: NumberByMode = 0.0
     by: str | None = None
 
     def __post_init__(self) -> None:

@@ -16,6 +16,7 @@ from mbd.forces.muscles.curves import CURVES, Curves
 from mbd.forces.muscles.paths import path_of
 from mbd.forces.quantities import (
     Mention,
+    Quantity,
     arguments_of,
     law_names,
     mentioned,
@@ -89,7 +90,7 @@ class Muscle(Force):
     fiber_length: float
     tendon_length: float
     pennation: float = 0.0
-    excitation: Any = 0.01
+    excitation: Quantity = 0.01
     tendon: str = "elastic"
     curves: str = "de groote"
     max_velocity: float = 10.0

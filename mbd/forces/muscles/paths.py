@@ -21,7 +21,15 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of, joint_of
 from mbd.forces.muscles.wrapping import WrappingSurface, taut
-from mbd.forces.quantities import Mention, arguments_of, mentioned, triple_at, triple_of, value_parameters
+from mbd.forces.quantities import (
+    Mention,
+    QuantityTriple,
+    arguments_of,
+    mentioned,
+    triple_at,
+    triple_of,
+    value_parameters,
+)
 from mbd.joints.base import Joint
 from mbd.tape.functions import where
 from mbd.tape.node import Scalar
@@ -45,7 +53,7 @@ class ViaPoint:
     frame: Frame
     joint: Joint | None = None
     between: tuple[float, float] | None = None
-    place: Any = None
+    place: QuantityTriple | None = None
     arguments: Any = ()
 
     def __post_init__(self) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from mbd.bodies.algebra import derivatives_at
+from mbd.bodies.given import Function
 from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -25,7 +25,7 @@ class Dissipation(DissipationFunction):
     function : D(v) [W], with ``D'(v) v ≥ 0``; the model's check tries it at rates of both signs
     """
 
-    function: Any
+    function: Function
 
     def __post_init__(self) -> None:
         if not callable(self.function) and not hasattr(self.function, "free_symbols"):

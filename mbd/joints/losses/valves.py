@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
@@ -33,8 +32,8 @@ class Valves(Loss):
         sum instead: ``Valves(…) + Coulomb(2.0)``.
     """
 
-    backward: Any
-    forward: Any
+    backward: Loss
+    forward: Loss
 
     def __post_init__(self) -> None:
         for field, loss in self.parts().items():

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Any
 
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.given import NumberByMode
 from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
 from mbd.joints.losses.base import DissipationFunction
@@ -25,7 +25,7 @@ class Viscous(DissipationFunction):
         that are left out there is none. Each is the parameter 'owner.coefficient.stance'
     """
 
-    coefficient: Any
+    coefficient: NumberByMode
     by: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:

@@ -158,8 +158,11 @@ def _losses(joint: Any) -> tuple[float, float] | None:
     parts = getattr(loss, "losses", (loss,))
     if not all(isinstance(part, Viscous | Coulomb) for part in parts):
         return None
-    damping = sum(float(part.coefficient) for part in parts if isinstance(part, Viscous))
-    return damping, sum(float(part.torque) for part in parts if isinstance(part, Coulomb))
+    viscous = [part.coefficient for part in parts if isinstance(part, Viscous)]
+    constant = [each for each in viscous if isinstance(each, float)]
+    if len(constant) < len(viscous):  # by the state of a mode
+        return None
+    return sum(constant), sum(float(part.torque) for part in parts if isinstance(part, Coulomb))
 
 
 def _ground_on(each: WrittenJoint, parameters: dict[str, float]) -> Place:

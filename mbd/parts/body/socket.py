@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.bodies.base import Frame
+from mbd.bodies.given import Numbers
 from mbd.bodies.values import triple
 from mbd.forces.potential import Potential
 from mbd.joints.losses.viscous import Viscous
@@ -16,7 +17,7 @@ __all__ = ["elastic_socket"]
 
 
 def elastic_socket(
-    model: Description, name: str, limb: Frame, socket: Frame, *, stiffness: Any, damping: Any
+    model: Description, name: str, limb: Frame, socket: Frame, *, stiffness: Numbers, damping: Numbers
 ) -> Planar:
     """A pseudo-joint of three freedoms: springs and dampers across, along and about; ``V = ½ Σ kᵢ qᵢ²``, ``D = ½ Σ cᵢ
     q̇ᵢ²``.
