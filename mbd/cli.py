@@ -87,7 +87,7 @@ def run_command(arguments: argparse.Namespace) -> int:
     plots = _can_plot(arguments.plots)
     if plots:
         import_plotting()
-    script = Script.load(arguments.script)
+    script = Script.load(arguments.script, _changes(arguments))
     for wrong, name in script.misspelt().items():
         print(
             f"note: {script.path.name} defines {wrong!r}, which is no setting; did you mean {name!r}?", file=sys.stderr
@@ -274,7 +274,7 @@ def _walked(name: str, arguments: argparse.Namespace, progress: Any, changes: di
     if is_run_file(name):
         return load(name)
     if not is_recording(name):
-        return Script.load(name).run(progress, changes)
+        return Script.load(name, changes).run(progress, changes)
     if arguments.model is None:
         return measured(name, None)
     if is_model_file(arguments.model):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import difflib
 import inspect
 import runpy
@@ -12,12 +13,14 @@ from dataclasses import field
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.progress import Progress
 from mbd.results.storage import SUFFIX
+from mbd.script_changes import changed
 
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
@@ -64,14 +67,22 @@ class Script:
 
     path: Path
     names: dict[str, Any] = field(repr=False)
+    is_changed: bool = False
 
     @classmethod
-    def load(cls, name: str) -> Script:
-        """Execute a script or example, but not what it keeps under ``if __name__ == "__main__"``."""
+    def load(cls, name: str, changes: Mapping[str, Any] | None = None) -> Script:
+        """Execute a script or example, but not what it keeps under ``if __name__ == "__main__"``.
+
+        Changes of settings are put into a script that simulates by itself, or refused, before it runs, see
+        `script_changes`; `is_changed` tells that they have been.
+        """
         path = find(name)
+        tree = changed(path.read_text(encoding="utf-8"), path.name, changes) if changes else None
         sys.path.insert(0, str(path.resolve().parent))
         try:
-            return cls(path, runpy.run_path(str(path), run_name="mbd_script"))
+            if tree is None:
+                return cls(path, runpy.run_path(str(path), run_name="mbd_script"))
+            return cls(path, _executed(tree, path), is_changed=True)
         finally:
             sys.path.pop(0)
 
@@ -102,7 +113,7 @@ class Script:
         made = self._made()
         described = {"model", "start", "until"} <= set(self.names)
         if made is not None and not (changes and described):
-            self._refuse(changes, "simulates by itself")
+            self._refuse({} if self.is_changed else changes, "simulates by itself")
             return made
         return self._simulated(progress, changes)
 
@@ -151,6 +162,21 @@ class Script:
                 f"main() of {self.path.name} must return the run of mbd.simulate, got {type(run).__name__}"
             )
         return run
+
+
+def _executed(tree: ast.Module, path: Path) -> dict[str, Any]:
+    """What a changed script defines, executed as `runpy.run_path` does."""
+    name = "mbd_script"
+    module, before = ModuleType(name), sys.modules.get(name)
+    module.__file__ = str(path)
+    sys.modules[name] = module
+    try:
+        exec(compile(tree, str(path), "exec"), module.__dict__)
+    finally:
+        del sys.modules[name]
+        if before is not None:
+            sys.modules[name] = before
+    return dict(vars(module))
 
 
 def name_of_script(name: str) -> str:

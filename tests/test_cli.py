@@ -132,7 +132,9 @@ def test_effects_of_a_script_with_a_tolerance_ask_for_a_step(script, capsys):
 
 def test_another_step_is_refused_where_main_chooses_it(script, capsys):
     assert cli.main(["run", script(WALK), "--dt", "0.1"]) == 1
-    assert "runs its own main(), so dt must be changed in the script" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "runs its own main(), so dt must be changed in the script; nothing was run" in said
+    assert "give main the argument dt" in said
 
 
 def test_an_unknown_example_gets_the_nearest_name(monkeypatch, tmp_path, capsys):
@@ -451,8 +453,31 @@ def test_a_script_that_has_simulated_is_shown_and_not_simulated_again(script, tm
     text = PENDULUM.replace("dt, until = 0.01, 0.5", "run = mbd.simulate(model, start, tol=1e-4, until=0.3)")
     assert cli.main(["run", script(text), "--out", "out", "--no-plots"]) == 0
     assert mbd.load(tmp_path / "out" / "run.mbd.npz").time[-1] == pytest.approx(0.3)
-    assert cli.main(["run", script(text), "--until", "0.1"]) == 1
-    assert "simulates by itself, so until must be changed in the script" in capsys.readouterr().err
+
+
+def test_settings_reach_the_simulation_of_a_script(script, tmp_path, capsys):
+    text = PENDULUM.replace(
+        "dt, until = 0.01, 0.5",
+        "run = mbd.simulate(model, start, None, 0.01, until=0.3, parameters={'rod.mass': 3.0, 'gravity.y': -5.0})",
+    )
+    given = ["--until", "0.2", "--tol", "1e-4", "--set", "rod.mass=2"]
+    assert cli.main(["run", script(text), *given, "--out", "out", "--no-plots"]) == 0
+    run = mbd.load(tmp_path / "out" / "run.mbd.npz")
+    assert run.time[-1] == pytest.approx(0.2) and run.settings["tol"] == 1e-4
+    assert run.parameters["rod.mass"] == 2.0 and run.parameters["gravity.y"] == -5.0
+
+
+@pytest.mark.parametrize(
+    ("calls", "told"),
+    [
+        ("one = mbd.simulate(a, b)\ntwo = mbd.simulate(a, b)", "simulates by itself, 2 times, so until must be"),
+        ("for k in range(2):\n    run = mbd.simulate(a, b)", "simulates by itself, in a loop, so until must be"),
+    ],
+)
+def test_settings_that_reach_no_one_simulation_are_refused_before_the_script_runs(script, capsys, calls, told):
+    assert cli.main(["run", script(f"print('computed')\n{calls}\n"), "--until", "0.1"]) == 1
+    said = capsys.readouterr()
+    assert told in said.err and "nothing was run" in said.err and "computed" not in said.out
 
 
 def test_a_parameter_is_set_from_the_command_line(script, tmp_path, capsys):

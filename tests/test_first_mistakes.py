@@ -566,3 +566,72 @@ def test_limits_of_a_robot_in_degrees_are_doubted(tmp_path, recwarn: pytest.Warn
     file.write_text(URDF.format(0, 130))
     with pytest.warns(mbd.MbdWarning, match=r"leg.urdf: a limit of 'knee' is 130 rad, 20.7 turns; .* 130° is 2.269"):
         mbd.read_model(file)
+
+
+@pytest.mark.parametrize(
+    ("loss", "said"),
+    [
+        (0.3, r"got 0\.3; viscous damping is mbd\.Viscous\(0\.3\)"),
+        (mbd.Viscous, r"give the class its numbers: mbd\.Viscous\(…\)"),
+        ([mbd.Viscous(0.1), mbd.Quadratic(0.2)], r"losses that act together are a sum, one \+ other"),
+    ],
+)
+def test_what_is_no_loss_is_answered_by_the_one_that_was_meant(loss: Any, said: str) -> None:
+    with pytest.raises(mbd.ModelError, match=said):
+        pendulum(loss=loss)
+
+
+@pytest.mark.parametrize("mass", ["1.0", [1.0], np.array([1.0])])
+def test_a_text_or_a_list_in_place_of_a_number_is_answered_by_the_number(mass: Any) -> None:
+    with pytest.raises(mbd.ModelError, match=r"mass of 'rod' must be a number, got .*; give the number itself, 1$"):
+        mbd.Link("rod", mass=mass, length=1.0, center=0.5)
+
+
+def test_a_body_in_place_of_a_frame_is_answered_by_its_frames() -> None:
+    model, rod = mbd.Model("pendulum"), mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
+    with pytest.raises(mbd.ModelError, match=r"its child must be a frame .*; its frames are \.origin, \.start, \.end"):
+        mbd.Revolute("pin", model.ground.origin, rod)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("what", "add"),
+    [
+        ("rest of 'spring' is 90 rad", lambda m, pin, rod: m.apply(mbd.TorsionSpring("spring", pin, 1.0, rest=90.0))),
+        ("value of 'hold' is -60 rad", lambda m, pin, rod: m.constrain(mbd.Bilateral("hold", pin, -60.0))),
+        ("offset of 'stop' is -90 rad", lambda m, pin, rod: m.constrain(mbd.Unilateral("stop", mbd.flexion(pin, -90)))),
+        (
+            "'tendon' is 900 m long unstretched; lengths are in metres, and 900 mm is 0.9",
+            lambda m, pin, rod: m.apply(mbd.Spring("tendon", m.ground.point(1.0, 0.0), rod.end, 1.0, length=900.0)),
+        ),
+    ],
+)
+def test_degrees_and_millimetres_of_stops_springs_and_drives_are_doubted(what: str, add: Any) -> None:
+    model, pin = pendulum()
+    add(model, pin, pin.child.body)
+    with pytest.warns(mbd.MbdWarning, match=re.escape(what)):
+        mbd.assemble(model, {} if what.startswith("value") else {"pin.angle": -0.1})
+
+
+def test_a_rest_angle_in_degrees_of_a_joint_is_doubted() -> None:
+    model, _ = pendulum(stiffness=1.0, rest=45.0)
+    with pytest.warns(mbd.MbdWarning, match=r"rest of 'pin' is 45 rad, 7\.2 turns; .* math\.radians\(45\) = 0\.7854"):
+        mbd.assemble(model)
+
+
+def test_arguments_of_simulate_in_another_order_or_kind_are_answered_by_the_right_ones(tmp_path: Any) -> None:
+    model, _ = pendulum()
+    start = mbd.assemble(model)
+    wrong: Any = start, model
+    with pytest.raises(mbd.ModelError, match="the model comes first, then the start"):
+        mbd.simulate(*wrong, dt=0.01, until=0.1)
+    with pytest.raises(mbd.ModelError, match=r"call it: mbd\.HHT\(\)"):
+        mbd.simulate(model, start, mbd.HHT, dt=0.01, until=0.1)  # type: ignore[arg-type]
+    with pytest.raises(mbd.UnknownNameError, match=r"a time is a number, until=0\.1"):
+        mbd.simulate(model, start, dt=0.01, until="0.1")
+    run = mbd.simulate(model, start, dt=0.01, until=0.1)
+    with pytest.raises(mbd.TrajectoryError, match=r"ends in \.mbd\.npz .*; for that: run\.to_csv\(path\)"):
+        run.save(tmp_path / "run.csv")
+    with pytest.raises(mbd.TrajectoryError, match=r"ends in \.csv .*to_excel"):
+        run.to_csv(tmp_path / "run.xlsx")
+    with pytest.raises(AttributeError, match=r"such as run\['pin\.angle'\]"):
+        run.q

@@ -42,7 +42,7 @@ RANKS = [
     ("view",),
     ("hardcases",),
     ("testing",),
-    ("scripts",),
+    ("scripts", "script_changes"),
     ("cli", "__main__"),
 ]
 """From the lowest layer to the highest; parts of one layer may know each other."""

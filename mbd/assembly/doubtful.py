@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from mbd.equations.equations import Equations
 from mbd.tape.derivatives import gradient, live, substitute
 from mbd.tape.node import Node
-from mbd.topology.doubts import doubts
+from mbd.topology.doubts import doubts, in_radians
 
-__all__ = ["MAX_PLAUSIBLE_ANGLE", "degrees", "doubtful"]
-
-MAX_PLAUSIBLE_ANGLE = 10.0
-"""Angle above which a whole number may be one in degrees [rad]."""
+__all__ = ["degrees", "doubtful"]
 
 
 def doubtful(model: Any, equations: Equations, position: Mapping[str, float]) -> list[str]:
@@ -65,9 +61,5 @@ def _is_fast(node: Node) -> bool:
 def degrees(equations: Equations, position: Mapping[str, float]) -> list[str]:
     """Sentences on angles of a start that may be in degrees."""
     angles = {each.name for each in equations.coordinates if each.unit == "rad"}
-    return [
-        f"position: {name!r} is {value:g} rad, {value / math.tau:.1f} turns; angles are in radians, and {value:g}° is "
-        f"math.radians({value:g}) = {math.radians(value):.4g}"
-        for name, value in position.items()
-        if name in angles and abs(value) >= MAX_PLAUSIBLE_ANGLE and float(value).is_integer()
-    ]
+    given = {name: value for name, value in position.items() if name in angles}
+    return [sentence for name, value in given.items() for sentence in in_radians(f"position: {name!r}", value)]

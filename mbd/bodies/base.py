@@ -14,7 +14,7 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Body", "Frame", "Parameter", "ParameterSource"]
+__all__ = ["Body", "Frame", "Parameter", "ParameterSource", "frames_in_words"]
 
 Parameter = Callable[[str], Scalar]
 """Gives the value of a field of a body, a number or a run-time input."""
@@ -186,3 +186,8 @@ class Frame:
     def is_planar(self) -> bool:
         """Whether its z axis is the body's."""
         return self.rotation is None or self.rotation[2] == (0.0, 0.0, 1.0)
+
+
+def frames_in_words(value: object) -> str:
+    """'; its frames are .origin, .start, …' of a body that was given in place of a frame; ''."""
+    return f"; its frames are {', '.join(f'.{name}' for name in value.frames)}" if isinstance(value, Body) else ""

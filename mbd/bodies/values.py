@@ -100,7 +100,7 @@ def number(value: Any, what: str) -> float:
     2.0
     """
     if not _is_numeric(value):
-        raise ModelError(f"{what} must be a number, got {shown(value)}")
+        raise ModelError(f"{what} must be a number, got {shown(value)}{_meant(value)}")
     try:
         result = float(value)
     except (TypeError, ValueError):
@@ -110,6 +110,15 @@ def number(value: Any, what: str) -> float:
     if not math.isfinite(result):
         raise ModelError(f"{what} must be finite, got {shown(value)}")
     return result
+
+
+def _meant(value: Any) -> str:
+    """The number that a text or a list of one was to be."""
+    one = value[0] if isinstance(value, list | tuple | np.ndarray) and np.shape(value) == (1,) else value
+    try:
+        return "" if one is None or isinstance(one, bool) else f"; give the number itself, {float(one):g}"
+    except (TypeError, ValueError):
+        return ""
 
 
 def size(value: Any, what: str) -> float:

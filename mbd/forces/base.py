@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from mbd.bodies.base import Frame
+from mbd.bodies.base import Frame, frames_in_words
 from mbd.bodies.domains import Parameterized
 from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
@@ -90,7 +90,9 @@ class Force(Parameterized, ABC):
 def frame_of(value: object, what: str) -> Frame:
     """A frame, checked at the border."""
     if not isinstance(value, Frame):
-        raise ModelError(f"{what} must be a frame such as thigh.end or model.ground.origin, got {value!r}")
+        raise ModelError(
+            f"{what} must be a frame such as thigh.end or model.ground.origin, got {value!r}{frames_in_words(value)}"
+        )
     return value
 
 

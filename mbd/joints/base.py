@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from mbd.bodies.base import Frame
+from mbd.bodies.base import Frame, frames_in_words
 from mbd.bodies.domains import Domain, Parameterized
 from mbd.bodies.promises import scalar
 from mbd.bodies.scope import Rotation, Scope, Triple
@@ -271,7 +271,7 @@ class Joint(Parameterized, ABC):
             if not isinstance(value, Frame):
                 raise ModelError(
                     f"{kind} '{self.name}': its {side} must be a frame such as thigh.end or model.ground.origin, "
-                    f"got {value!r}"
+                    f"got {value!r}{frames_in_words(value)}"
                 )
         if isinstance(self.loss, Mapping) and not self.loss:
             put(self, "loss", None)

@@ -73,9 +73,25 @@ def plain(value: Any) -> Any:
     return repr(value)
 
 
+WRITERS = {
+    ".csv": "run.to_csv(path)", ".html": "run.page(path)", ".png": "run.plot(path=…)", ".sto": "run.to_sto(path)",
+    ".xlsx": "run.to_dataframe().to_excel(path)",
+}  # fmt: skip
+"""What writes a file of a run, by how its name ends."""
+
+
 def named_file(path: Any, suffix: str = "") -> Path:
-    """Where a file is to be written, with `suffix` if its name has none; a `TrajectoryError` for what names no file."""
+    """Where a file is to be written, with `suffix` if its name has none.
+
+    Raises
+    ------
+    TrajectoryError
+        for what names no file, and a name that ends as files of another kind do.
+    """
     target = Path(path) if isinstance(path, str | os.PathLike) else Path()
+    writer = WRITERS.get(target.suffix.lower(), "")
+    if suffix and writer and target.suffix.lower() != suffix:
+        raise TrajectoryError(f"a file that ends in {suffix} is written here, not {str(path)!r}; for that: {writer}")
     if not target.name or target.is_dir():
         known = ", which is a folder" if target.name and target.is_dir() else ""
         raise TrajectoryError(f"a file to write to is expected, such as 'run{suffix}', not {path!r}{known}")

@@ -73,7 +73,8 @@ class Trajectory:
             """Asked for what is no attribute: results go by their names."""
             hidden = name.startswith("_") or name == "columns" or "record" not in self.__dict__
             known = () if hidden else self.columns.names
-            near = next((each for each in known if each.startswith(f"{name}.") or each.split()[0] == name), None)
+            same = [each for each in known if each.startswith(f"{name}.") or each.split()[0] == name]
+            near = next(iter([*same, *(each for each in known if "." in each)]), None)
             hint = "" if near is None else f"; results are asked for by name, such as run[{near!r}]"
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 

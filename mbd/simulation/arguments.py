@@ -11,6 +11,7 @@ import numpy as np
 
 from mbd.bodies.promises import promise_faults
 from mbd.bodies.values import among, is_number, named_number_faults, shown
+from mbd.description import Description
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
@@ -58,11 +59,13 @@ def _numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any,
     """What is wrong with the integrator, the start, the step and the end."""
     faults = []
     if not isinstance(scheme, Integrator):
-        faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}")
+        hint = f"; call it: mbd.{scheme.__name__}()" if isinstance(scheme, type) else ""
+        faults.append(f"integrator must be an mbd integrator such as mbd.HHT(alpha=0.05), not {scheme!r}{hint}")
     else:
         faults += promise_faults(scheme)
     if not isinstance(start, State):
-        faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}")
+        hint = "; the model comes first, then the start" if isinstance(start, Description) else ""
+        faults.append(f"start must be a State from mbd.assemble(model, …), not {start!r}{hint}")
     else:
         faults += malformed(start)
     if tol is not None and dt is not None:
@@ -125,5 +128,6 @@ def end_of(until: Any, manager: ActiveSetManager, dt: float, begin: float) -> tu
     name, latest = until
     known = [*manager.names, *manager.instants]
     if name not in known:
-        raise UnknownNameError("until: " + nearest(name, known, "contact or event"))
+        hint = f"; a time is a number, until={name}" if name.replace(".", "", 1).isdigit() else ""
+        raise UnknownNameError("until: " + nearest(name, known, "contact or event") + hint)
     return float(latest), name

@@ -9,13 +9,18 @@ from typing import Any
 from mbd.bodies.ground import Ground
 from mbd.bodies.link import Link
 from mbd.constraints.bilateral import Bilateral
+from mbd.constraints.measures import JointMeasure
 from mbd.constraints.spring_leg import SpringLeg
 from mbd.forces.muscles.wrapping import WrappingCylinder
 from mbd.forces.samples import Samples, in_degrees
+from mbd.forces.spring import Spring
 from mbd.joints.base import AWAITED_ATTRIBUTE, Joint
 from mbd.topology.graph import links_of, spanning_tree
 
-__all__ = ["doubts"]
+__all__ = ["MAX_PLAUSIBLE_ANGLE", "doubts", "in_radians"]
+
+MAX_PLAUSIBLE_ANGLE = 10.0
+"""Angle above which a whole number may be one in degrees [rad]."""
 
 MAX_LENGTH = 50.0
 """Length of a body of less than a ton above which it may be given in millimetres [m]."""
@@ -33,8 +38,37 @@ MAX_SAMPLE_TIME = 2.0
 
 def doubts(model: Any) -> list[str]:
     """Sentences on what looks like a mistake."""
-    parts = (_weights, _lengths, _masses, _turned, _twice, _grips, _weak_legs, _wrapped, _driven, _periods, _awaited)
+    parts = (
+        _weights, _lengths, _masses, _angles, _turned, _twice, _grips, _weak_legs, _wrapped, _driven, _periods,
+        _awaited,
+    )  # fmt: skip
     return [sentence for part in parts for sentence in part(model)]
+
+
+def in_radians(what: str, value: float) -> list[str]:
+    """A sentence on an angle that is a whole number beyond `MAX_PLAUSIBLE_ANGLE`, as degrees are; none on another."""
+    if not (abs(value) >= MAX_PLAUSIBLE_ANGLE and float(value).is_integer()):
+        return []
+    return [
+        f"{what} is {value:g} rad, {value / math.tau:.1f} turns; angles are in radians, and {value:g}° is "
+        f"math.radians({value:g}) = {math.radians(value):.4g}"
+    ]
+
+
+def _angles(model: Any) -> list[str]:
+    """Angles of stops, of springs at rest and of drives that may be in degrees."""
+    rest = [each for each in (*getattr(model, "joints", ()), *getattr(model, "forces", ())) if hasattr(each, "rest")]
+    angles = [
+        (f"rest of '{each.name}'", each.rest)
+        for each in rest
+        if getattr(each, "joint", each).labels and getattr(each, "joint", each).labels[0].unit == "rad"
+    ]
+    for word in getattr(model, "constraints", ()):
+        measure = getattr(word, "measure", None)
+        if isinstance(measure, JointMeasure) and measure.unit == "rad":
+            angles.append((f"offset of '{word.name}'", measure.offset))
+            angles.append((f"value of '{word.name}'", getattr(word, "value", 0.0)))
+    return [sentence for what, angle in angles if isinstance(angle, float) for sentence in in_radians(what, angle)]
 
 
 def _weights(model: Any) -> list[str]:
@@ -55,7 +89,12 @@ def _lengths(model: Any) -> list[str]:
             found.append(
                 f"'{body.name}' is {length:g} m long; lengths are in metres, and {length:g} mm is {length / 1e3:g}"
             )
-    return found
+    return found + [
+        f"'{spring.name}' is {spring.length:g} m long unstretched; lengths are in metres, and {spring.length:g} mm is "
+        f"{spring.length / 1e3:g}"
+        for spring in getattr(model, "forces", ())
+        if isinstance(spring, Spring) and isinstance(spring.length, float) and spring.length > MAX_LENGTH
+    ]
 
 
 def _masses(model: Any) -> list[str]:

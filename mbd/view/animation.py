@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from os import PathLike
 from typing import TYPE_CHECKING
 
 from mbd.bodies.values import is_number
@@ -28,8 +29,11 @@ class Animation:
     """
 
     def __init__(self, run: Trajectory, height: int) -> None:
+        hint = "; run.page(path) writes it to a file" if isinstance(height, str | PathLike) else ""
         if not is_number(height) or not MIN_HEIGHT <= height < 1e5:
-            raise ModelError(f"height of an animation must be a number of pixels from {MIN_HEIGHT} on, not {height!r}")
+            raise ModelError(
+                f"height of an animation must be a number of pixels from {MIN_HEIGHT} on, not {height!r}{hint}"
+            )
         self.run, self.height = run, int(height)
 
     def __repr__(self) -> str:

@@ -10,6 +10,7 @@ from mbd.bodies.algebra import derivatives_at
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.promises import called, scalar, title_of
 from mbd.bodies.scope import Scope
+from mbd.bodies.values import is_number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.tape.node import Node, Scalar
@@ -227,4 +228,11 @@ def loss_of(value: Any, owner: str) -> Loss | None:
     """A loss as given to a joint, checked at the border."""
     if value is None or isinstance(value, Loss):
         return value
-    raise ModelError(f"loss of '{owner}' must be a loss such as mbd.Viscous(0.1), got {value!r}")
+    hint = ""
+    if is_number(value):
+        hint = f"; viscous damping is mbd.Viscous({value:g})"
+    elif isinstance(value, type) and issubclass(value, Loss):
+        hint = f"; give the class its numbers: mbd.{value.__name__}(…)"
+    elif isinstance(value, list | tuple) and value and all(isinstance(each, Loss) for each in value):
+        hint = "; losses that act together are a sum, one + other"
+    raise ModelError(f"loss of '{owner}' must be a loss such as mbd.Viscous(0.1), got {value!r}{hint}")

@@ -63,7 +63,8 @@ def read_model(
     stops = suffix != ".osim" if stops is None else flag(stops, "stops")
     losses, repair = flag(losses, "losses"), flag(repair, "repair")
     if suffix not in (".urdf", ".xml", ".osim"):
-        raise ModelError(f"a model ends in .urdf, .osim, or in .xml of MuJoCo; got {str(path)!r}")
+        hint = "; xacro makes a .urdf of it: xacro robot.xacro > robot.urdf" if suffix == ".xacro" else ""
+        raise ModelError(f"a model ends in .urdf, .osim, or in .xml of MuJoCo; got {str(path)!r}{hint}")
     if not target.is_file():
         raise ModelError(f"there is no file '{target}'")
     if suffix != ".urdf" and base != "fixed":

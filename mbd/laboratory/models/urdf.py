@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix
-from mbd.assembly.doubtful import MAX_PLAUSIBLE_ANGLE
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.rigid_body import RigidBody
 from mbd.constraints.base import Constraint
@@ -30,6 +29,7 @@ from mbd.laboratory.models.report import ImportedModel, ImportReport
 from mbd.laboratory.models.xml import Element, read_xml
 from mbd.model import Model
 from mbd.notes import doubt
+from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE
 
 __all__ = ["read_urdf"]
 

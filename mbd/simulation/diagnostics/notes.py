@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mbd.assembly.doubtful import MAX_PLAUSIBLE_ANGLE, degrees
+from mbd.assembly.doubtful import degrees
 from mbd.equations.equations import Contact
 from mbd.forces.muscles import Muscle
 from mbd.kernel.codes import PULL
@@ -25,7 +25,7 @@ from mbd.simulation.diagnostics.stiff import bounded_by_stability
 from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
-from mbd.topology.doubts import doubts
+from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE, doubts
 
 __all__ = ["notes_of"]
 
