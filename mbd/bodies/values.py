@@ -115,10 +115,12 @@ def number(value: Any, what: str) -> float:
 def _meant(value: Any) -> str:
     """The number that a text or a list of one was to be."""
     one = value[0] if isinstance(value, list | tuple | np.ndarray) and np.shape(value) == (1,) else value
-    try:
-        return "" if one is None or isinstance(one, bool) else f"; give the number itself, {float(one):g}"
-    except (TypeError, ValueError):
-        return ""
+    if isinstance(one, str) or (one is not value and is_number(one)):
+        try:
+            return f"; give the number itself, {float(one):g}"
+        except ValueError:
+            pass
+    return ""
 
 
 def size(value: Any, what: str) -> float:

@@ -11,11 +11,11 @@ import numpy as np
 
 from mbd.bodies.promises import promise_faults
 from mbd.bodies.values import among, is_number, named_number_faults, shown
-from mbd.description import Description
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
+from mbd.topology.description import Description
 
 __all__ = ["MAX_WAIT", "check_arguments", "end_of"]
 
