@@ -56,10 +56,14 @@ def seeded(equations: Equations, r: Sequence[Node]) -> Columns:
     if equations.geometry is not None:
         known = equations.geometry.partials(r)
     sweeps: Sweeps = equations.memory.setdefault("sweeps of tangents", Sweeps())
-    plain = [entry for column in sweeps(r, inputs.directions(known)) for entry in column]
+    columns, zero = sweeps(r, inputs.directions(known)), equations.tape.zero
+    filled = [j for j, column in enumerate(columns) if any(entry is not zero for entry in column)]
+    plain = [entry for j in filled for entry in columns[j]]
     known_factors: dict[int, Node] = equations.memory.setdefault("factored tangents", {})
     entries = min(plain, factored(plain, inputs.c, known_factors), key=lambda S: len(live([*r, *S])))
-    return [entries[j * len(r) : (j + 1) * len(r)] for j in range(len(r))]
+    for place, j in enumerate(filled):
+        columns[j] = entries[place * len(r) : (place + 1) * len(r)]
+    return columns
 
 
 def _known(equations: Equations, forces: Forces) -> Columns | None:

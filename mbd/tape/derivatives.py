@@ -210,7 +210,9 @@ def vjp(outputs: Sequence[Node], adjoints: Sequence[Scalar], inputs: Sequence[No
         return [node.tape.zero for node in inputs]
     tape = outputs[0].tape
     wanted = {node.index for node in inputs}
-    order = live(outputs, wanted)
+    lifted = [(node, tape.lift(adjoint)) for node, adjoint in zip(outputs, adjoints, strict=True)]
+    lifted = [(node, adjoint) for node, adjoint in lifted if not adjoint.is_zero]
+    order = live([node for node, _ in lifted], wanted)
     depends: set[int] = set(wanted)
     for node in order:
         if node.index not in depends and any(arg.index in depends for arg in node.args):
@@ -222,8 +224,8 @@ def vjp(outputs: Sequence[Node], adjoints: Sequence[Scalar], inputs: Sequence[No
             known = bars.get(node.index)
             bars[node.index] = bar if known is None else _joined(tape, known, bar)
 
-    for node, adjoint in zip(outputs, adjoints, strict=True):
-        push(node, tape.lift(adjoint))
+    for node, adjoint in lifted:
+        push(node, adjoint)
     for node in reversed(order):
         bar = bars.get(node.index)
         if bar is not None and node.index not in wanted and node.args and node.op not in _FLAT:
