@@ -131,7 +131,7 @@ def tree_factors(
 ) -> TreeFactors | None:  # fmt: skip
     """The tangent of bodies under forces that act on coordinates, eliminated.
 
-    None where such a force follows other joints, or a velocity moves nothing.
+    None where such a force follows other joints, a velocity moves nothing, or one belongs to no joint of the tree.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def tree_factors(
     direct : forces on coordinates (n_v)
     """
     moving = [body for body in bodies if body.parent is not None]
-    if not _is_local(moving, direct):
+    if sum(len(body.columns) for body in moving) < len(direct) or not _is_local(moving, direct):
         return None
     work = _Elimination(moving, inertia, direct, inputs, tape)
     return work.result() if all(work.eliminate(k) for k in reversed(range(len(moving)))) else None
