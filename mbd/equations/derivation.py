@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from mbd.bodies.algebra import dot
@@ -323,17 +323,20 @@ class TreeGeometry:
 
     def mass_matrix(self) -> list[list[Node]] | None:
         """M of the bodies, where no force and no state depends on accelerations."""
+        return self.dynamics.mass_matrix() if self._inertia_alone else None
+
+    @cached_property
+    def _inertia_alone(self) -> bool:
+        """Whether no force and no state depends on accelerations."""
         forces = [contact.force for contact in self.constraints.contacts if contact.force is not None]
         forces += [force for contact in self.constraints.contacts for _, _, force in contact.drags]
         forces += [friction.sliding for friction in self.constraints.frictions]
         inside = live([*self.dynamics.generalized(self.work), *forces])
-        if self.rests or any(node.op == "input" and node.data[0] == "a" for node in inside):
-            return None
-        return self.dynamics.mass_matrix()
+        return not self.rests and not any(node.op == "input" and node.data[0] == "a" for node in inside)
 
     def accelerations(self, forces: Sequence[Node]) -> tuple[list[Node], Node] | None:
         """v̇ with M v̇ = forces from the tips of the tree, where M is that of `mass_matrix`."""
-        return None if self.mass_matrix() is None else self.dynamics.accelerations(forces)
+        return self.dynamics.accelerations(forces) if self._inertia_alone else None
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
         """∂node/∂x_j of the places and rotations inside the outputs."""
