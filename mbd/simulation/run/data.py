@@ -23,7 +23,7 @@ from mbd.results.record import EventRecord
 from mbd.simulation.run.boundaries import WINDOW_STEPS, Boundaries
 from mbd.simulation.run.event_log import EventLog
 from mbd.simulation.run.idle import stepper_of
-from mbd.simulation.run.stepper import Stepper
+from mbd.simulation.run.stepper import Stepper, is_compiled
 from mbd.simulation.run.whole_turns import TurnCounter
 from mbd.state import State
 
@@ -123,6 +123,10 @@ class RunData:
         options: dict[str, Any],
         settings: dict[str, Any],
     ) -> None:
+        if self.stepper_kind is Stepper and is_compiled(mechanism, integrator):
+            from mbd.kernel.entry import entry
+
+            entry()  # the first run on a machine builds the kernel, which is no time of this run
         self.began = perf_counter()
         self.model = model
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
