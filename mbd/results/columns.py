@@ -179,10 +179,19 @@ class ModelColumns(StoredStates, Columns):
             return self._steps.at(self.rows, places)
         if forces and Balance.serves(self.equations):
             return self._forces.at(places)
-        return self._interpolated(places)[0]
+        return self._held(places, self._polynomials(places)[0])
 
     def _interpolated(self, places: Places) -> tuple[Rows, Rows]:
         """States by polynomials, and by polynomials of a lower degree."""
+        found, rougher = self._polynomials(places)
+        return self._held(places, found), self._held(places, rougher)
+
+    def _held(self, places: Places, found: Rows) -> Rows:
+        """The states on the constraints as far as the rows are."""
+        return found if self._onto is None else self._onto.at(self.rows, places, found)
+
+    def _polynomials(self, places: Places) -> tuple[Rows, Rows]:
+        """The same wherever they lead."""
         rows, plain = self.rows, self.equations.compose is None
         charts = Charts.of(self.equations)
         smooth = is_smooth(self.record, plain or charts is not None)
@@ -190,9 +199,7 @@ class ModelColumns(StoredStates, Columns):
         rougher = self.grid.rougher(rows, places, found, plain, smooth)
         if smooth and LedSteps.serves(self) and Balance.serves(self.equations):
             found = LedSteps(Restepping(self, self.balance)).at(rows, places, found)
-        if self._onto is None:
-            return found, rougher
-        return self._onto.at(rows, places, found), self._onto.at(rows, places, rougher)
+        return found, rougher
 
     @cached_property
     def _steps(self) -> Restepping | None:
