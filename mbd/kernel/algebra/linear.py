@@ -38,7 +38,7 @@ def factor(A: Reals, n: int, pivots: Integers) -> int:
             if takes_part(A[i * n + k]):
                 left = A[i * n + k] * inverse
                 A[i * n + k] = left
-                subtract_row(A, n, i, k, left, k + 1)
+                subtract_row(A, n, i, k, left, k + 1, n)
     return 0
 
 
@@ -50,10 +50,10 @@ def swap_rows(A: Reals, n: int, i: int, k: int) -> None:
         A[k * n + j] = swap
 
 
-def subtract_row(A: Reals, n: int, i: int, k: int, part: float, first: int) -> None:
-    """Row i less `part` times row k, from the column `first` on."""
+def subtract_row(A: Reals, n: int, i: int, k: int, part: float, first: int, end: int) -> None:
+    """Row i less `part` times row k, in the columns from `first` to before `end`."""
     j = first
-    while j + 3 < n:  # four at once, which become one instruction
+    while j + 3 < end:  # four at once, which become one instruction
         a0 = A[i * n + j] - part * A[k * n + j]
         a1 = A[i * n + j + 1] - part * A[k * n + j + 1]
         a2 = A[i * n + j + 2] - part * A[k * n + j + 2]
@@ -63,7 +63,7 @@ def subtract_row(A: Reals, n: int, i: int, k: int, part: float, first: int) -> N
         A[i * n + j + 2] = a2
         A[i * n + j + 3] = a3
         j += 4
-    while j < n:
+    while j < end:
         A[i * n + j] -= part * A[k * n + j]
         j += 1
 
@@ -117,7 +117,7 @@ def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:
             if takes_part(M[k * n + i]):
                 left = M[k * n + i] * inverse
                 b[i] -= left * b[k]
-                subtract_head(M, n, i, k, left)
+                subtract_row(M, n, i, k, left, 0, i + 1)
     substitute_outwards(M, n, b)
     return kept
 
@@ -147,24 +147,6 @@ def substitute_outwards(M: Reals, n: int, b: Reals) -> None:
         b[k] = (left + even) * M[k * n + k]
 
 
-def subtract_head(A: Reals, n: int, i: int, k: int, part: float) -> None:
-    """Row i less `part` times row k, up to the diagonal."""
-    j = 0
-    while j + 3 <= i:
-        a0 = A[i * n + j] - part * A[k * n + j]
-        a1 = A[i * n + j + 1] - part * A[k * n + j + 1]
-        a2 = A[i * n + j + 2] - part * A[k * n + j + 2]
-        a3 = A[i * n + j + 3] - part * A[k * n + j + 3]
-        A[i * n + j] = a0
-        A[i * n + j + 1] = a1
-        A[i * n + j + 2] = a2
-        A[i * n + j + 3] = a3
-        j += 4
-    while j <= i:
-        A[i * n + j] -= part * A[k * n + j]
-        j += 1
-
-
 def eliminate(A: Reals, n: int, b: Reals, columns: Integers, work: Reals, rank_tolerance: float) -> int:
     """Solve A x = b by complete pivoting after equilibration; x in b, free unknowns 0.
 
@@ -185,7 +167,7 @@ def eliminate(A: Reals, n: int, b: Reals, columns: Integers, work: Reals, rank_t
         for i in range(k + 1, n):
             left = A[i * n + k] / A[k * n + k]
             if takes_part(left):
-                subtract_row(A, n, i, k, left, k + 1)
+                subtract_row(A, n, i, k, left, k + 1, n)
                 b[i] -= left * b[k]
     conflict = False
     for i in range(rank, n):
