@@ -139,7 +139,7 @@ class Jump:
 
 
 _FREE: list[tuple[int, ctypes.c_uint64]] = []
-"""Jumps that nobody has, with where their plans are told."""
+"""Jumps that nobody has, with the places of their plans."""
 _MACHINES: list[Machine] = []
 """What holds all jumps until the process ends."""
 

@@ -156,8 +156,8 @@ def _idle(scope: DerivationScope, node: Node, title: str, kinds: set[str], unit:
     (size,) = evaluate([node], given)
     if abs(size) > EQUAL_RTOL:
         return [f"{title} is {size:.6g} {unit} whatever the motion, so it can never be 0"]
-    told = f"{title} is 0 whatever the motion, so it constrains nothing; remove it, or check the axes of its joints"
-    return [] if may_fold else [told]
+    empty = f"{title} is 0 whatever the motion, so it constrains nothing; remove it, or check the axes of its joints"
+    return [] if may_fold else [empty]
 
 
 def _contact(
