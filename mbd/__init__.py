@@ -305,8 +305,7 @@ _LATER = {
     "Trajectory.plot": "mbd.view.plots.histories",
     "Trajectory.sensitivities": "mbd.sensitivity.result.read",
     "Trajectory.summary": "mbd.analysis.ending.summary",
-    "simulate: derivatives": "mbd.sensitivity.sensitivities.derivatives_of",
-    "simulate: inputs": "mbd.sensitivity.sensitivities.with_inputs",
+    "simulate: derivatives": "mbd.sensitivity.asked.request_of",
 }
 """Functions that methods of results call, by the method; see `mbd.later`."""
 

@@ -9,6 +9,7 @@ child: D and its inverse lead from them to the increments of a chart and back (`
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from mbd.configuration import Configuration
 from mbd.errors import CapabilityError
 from mbd.gait.return_map import ReturnMap, Values
 from mbd.gait.section import Chart
-from mbd.sensitivity.derivative import final_state_derivative
+from mbd.sensitivity.asked import EndState
 from mbd.sensitivity.tangent_names import place_names
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
@@ -38,20 +39,21 @@ def exact_derivative(map_: ReturnMap, chart: Chart, c: Vector, values: Values) -
     state = chart.at(c, map_.vector(values))
     along = _tangent(chart, state, map_.vector(values))
     for _ in range(map_.strides):
-        run = simulate(
-            map_.model, state, map_.integrator, dt=map_.dt, until=(map_.section, map_.longest), contact="events",
-            parameters=map_.plain(values), progress=False, on_failure="return", backend=map_.backend,
-        )  # fmt: skip
+        by_start = EndState([*place_names(equations), *state.velocity_names], hold=())
+        try:
+            run = simulate(
+                map_.model, replace(state, memory=None), map_.integrator, dt=map_.dt,
+                until=(map_.section, map_.longest), contact="events", parameters=map_.plain(values), progress=False,
+                on_failure="return", backend=map_.backend, wrt=by_start,  # type: ignore[arg-type]
+            )  # fmt: skip
+        except CapabilityError:
+            return None
         if stopped(run):
             raise KeyboardInterrupt
         arrival = map_(state, values, strides=1)
         if not run.success or not arrival.outcome.good:
             return None
-        try:
-            by_start, _ = final_state_derivative(run, [*place_names(equations), *state.velocity_names])
-        except CapabilityError:
-            return None
-        along, state = _mirrored(map_, by_start) @ along, arrival.state
+        along, state = _mirrored(map_, by_start.found[0]) @ along, arrival.state
     return _by_tangent(chart, state, along)
 
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.results.trajectory import Trajectory
+from mbd.sensitivity.made_run import MadeRun
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.passing import tangent_run
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, Source
 from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
 
-__all__ = ["Differentiated", "final_state_derivative", "passed"]
+__all__ = ["Differentiated", "end_of", "final_state_derivative", "passed"]
 
 
 def final_state_derivative(
@@ -49,9 +51,7 @@ def final_state_derivative(
     CapabilityError
         where the run has no derivative, or none that the pass knows, by name and time.
     """
-    tangent = passed(run, wrt, held)[0].walked.motion.tangent
-    n_v = len(tangent.q)
-    return np.vstack([tangent.q, tangent.y[:n_v]]), tangent.t
+    return end_of(passed(run, wrt, held)[0])
 
 
 @dataclass(frozen=True)
@@ -63,17 +63,29 @@ class Differentiated:
     walked: Passed
 
 
+def end_of(found: Differentiated) -> tuple[Matrix, Vector]:
+    """d(q, v) and dt at the end of a run."""
+    tangent = found.walked.motion.tangent
+    n_v = len(tangent.q)
+    return np.vstack([tangent.q, tangent.y[:n_v]]), tangent.t
+
+
 def passed(
     run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = (),
-    source: Source | None = None,
+    source: Source | None = None, made: Any = None,
 ) -> tuple[Differentiated, list[Direction]]:  # fmt: skip
     """The pass over a run, and its directions.
 
-    The run is made once more, to the bit, by the kernel with derivatives (`mbd.sensitivity.tangent`).
+    The run is made once more, to the bit, by the kernel with derivatives (`mbd.sensitivity.tangent`), unless it carried
+    them itself.
 
-    source : what made the run, where that is known
+    source : what made the run, where that is known; made : itself
     """
     rows = RunRows(run, source)
+    if isinstance(made, MadeRun) and made.ready is not None:
+        wanted, programs, start = made.ready.wanted, made.ready.programs, made.ready.start
+        walked = tangent_run(rows, programs, start, restitutions_of(wanted), made=made)
+        return Differentiated(rows, programs, walked), wanted
     wanted = directions(rows, wrt)
     programs = programs_of(rows, wanted)
     start, restitutions = start_tangent(rows, programs, wanted, held), restitutions_of(wanted)

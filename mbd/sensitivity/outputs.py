@@ -71,33 +71,34 @@ def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]
     UnknownNameError
         for a name that is neither a result nor the instant of an event that happened.
     """
-    values, lines = [], []
     rates = with_sliding(programs, found.motion, found.mode, found.rates)
-    for name in of:
-        if name == "time":
-            values.append(float(rows.run.time[-1]))
-            lines.append(found.motion.tangent.t)
-            continue
-        instant = instant_of(name, found)
-        if instant is not None:
-            values.append(instant[0])
-            lines.append(instant[1])
-            continue
-        value, line = _result(rows, programs, found, rates, name)
-        values.append(value)
-        lines.append(line)
+    instants = {name: instant_of(name, found) for name in of}
+    instants["time"] = float(rows.run.time[-1]), found.motion.tangent.t
+    wanted = _at_rows(rows, found, [name for name in of if instants[name] is None])
+    results = [instants[name] or _result(rows, programs, found, rates, name, wanted[name]) for name in of]
+    values, lines = [value for value, _ in results], [line for _, line in results]
     size = len(found.motion.tangent.t)
     return Lines(tuple(of), np.array(values), np.array(lines).reshape(len(values), size))
 
 
-def _result(rows: RunRows, programs: Programs, found: Passed, rates: Rates, name: str) -> tuple[float, Vector]:
-    """A named result at the end."""
-    if name not in rows.run:
-        times = [f"{each.fired.name}.time" for each in found.instants]
-        raise UnknownNameError("of: " + nearest(name, {*rows.run.names, *times, "time"}, "result", "The run has"))
-    wanted = np.asarray(rows.run[name])
-    if wanted.ndim != 1:
-        raise UnknownNameError(f"of: {name!r} has three components; ask for {name + '.x'!r}, '.y' or '.z'")
+def _at_rows(rows: RunRows, found: Passed, names: Sequence[str]) -> dict[str, Vector]:
+    """Named results at all rows of the run, evaluated together."""
+    single = list[str]()
+    for name in names:
+        if name not in rows.run:
+            times = [f"{each.fired.name}.time" for each in found.instants]
+            raise UnknownNameError("of: " + nearest(name, {*rows.run.names, *times, "time"}, "result", "The run has"))
+        parts = rows.run.columns.components(name)
+        if len(parts) > 1:
+            raise UnknownNameError(f"of: {name!r} has three components; ask for {name + '.x'!r}, '.y' or '.z'")
+        single += parts
+    return dict(zip(names, rows.run.columns.at_rows(single), strict=True))
+
+
+def _result(
+    rows: RunRows, programs: Programs, found: Passed, rates: Rates, name: str, wanted: Vector
+) -> tuple[float, Vector]:  # fmt: skip
+    """A named result at the end, which has these values at the rows of the run."""
     at = found.motion.at(found.mode, rates.rate, rates.lam)
     at.lam, at.anchors = rates.lam, _with_turns(rows, programs, at.anchors)
     value, slopes = programs.result(name, at)

@@ -30,7 +30,7 @@ from mbd.simulation.arguments import end_of
 from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.simulate import INSTANT_RTOL
 
-__all__ = ["AnotherRun", "tangent_run"]
+__all__ = ["AnotherRun", "Charted", "seed", "tangent_run"]
 
 OWN = ("contact", "impact", "locate", "store", "rest_speed")
 FOLLOWING = ("allowed", "longest", "driven")
@@ -82,11 +82,12 @@ class Charted:
 
 def tangent_run(
     rows: RunRows, programs: Programs, start: Tangent, restitutions: Mapping[str, Vector],
-    visit: Callable[[int, Motion, Any, Rates], None] | None = None,
+    visit: Callable[[int, Motion, Any, Rates], None] | None = None, made: TangentRun | None = None,
 ) -> Passed:  # fmt: skip
     """The run from its start, with these derivatives, to its end.
 
-    restitutions : rates (D,) of those of contacts; visit : is called with every row
+    restitutions : rates (D,) of those of contacts; visit : is called with every row; made : the run itself, where it
+    has carried the first of these derivatives
 
     Raises
     ------
@@ -100,23 +101,21 @@ def tangent_run(
         name = rows.events[0][0].name
         raise sided(f"{name!r} happens as the run starts", f"start where it has happened, with closed={name!r}")
     charted, layout, count = Charted(programs), rows.mechanism.layout, len(start.t)
-    contacts = [contact.name for contact in programs.equations.contacts]
-    of_e = np.array([restitutions.get(name, np.zeros(count)) for name in contacts]).reshape(len(contacts), count)
-    of_q = charted.base(np.array(rows.record.q[0])) @ start.q
     runs, states = list[tuple[TangentRun, int]](), list[dict[str, tuple[Any, Matrix]]]()
     for first in range(0, count, DIRECTIONS):
         some = slice(first, min(first + DIRECTIONS, count))
-        run = _again(rows)
-        run.every_row = visit is not None
-        run.differentiated_reset = _reset(rows, programs, charted, start.p[:, some], run)
-        run.moved_with_jump = partial(_moved_with_jump, rows, programs, start.p[:, some], run)
-        run.begin_tangents(programs.places)
-        run.at_start()
-        run.seed(start.p[:, some], of_q[:, some], start.y[:, some], start.anchors[:, some], of_e[:, some])
-        _require_same(rows, run)
+        run = made if made is not None and not runs else _again(rows)
+        if run is not made:
+            run.every_row = visit is not None
+            run.differentiated_reset = _reset(rows, programs, charted, start.p[:, some], run)
+            run.moved_with_jump = partial(_moved_with_jump, rows, programs, start.p[:, some], run)
+            run.begin_tangents(programs.places)
+            run.at_start()
+            seed(run, charted, rows.record.q[0], start, restitutions, some)
+            _require_same(rows, run)
+            keep_idle(run.stepper)
         runs.append((run, some.stop - some.start))
         states.append(run.at_state())
-        keep_idle(run.stepper)
 
     def joined(parts: Sequence[Matrix]) -> Matrix:
         return np.concatenate([part[..., :width] for part, (_, width) in zip(parts, runs, strict=True)], axis=-1)
@@ -154,6 +153,16 @@ def tangent_run(
         for row, trigger in zip(sorted(rows.events), fired, strict=True)
     ]  # fmt: skip
     return Passed(end[0], last, end[1], instants)
+
+
+def seed(
+    run: TangentRun, charted: Charted, q: Vector, start: Tangent, restitutions: Mapping[str, Vector], some: slice
+) -> None:
+    """Give some of the derivatives of a start to a run whose start is in the kernel's arrays."""
+    names, count = [contact.name for contact in charted.programs.equations.contacts], len(start.t)
+    of_e = np.array([restitutions.get(name, np.zeros(count)) for name in names]).reshape(len(names), count)
+    of_q = charted.base(np.array(q)) @ start.q
+    run.seed(start.p[:, some], of_q[:, some], start.y[:, some], start.anchors[:, some], of_e[:, some])
 
 
 def _with_mode(rows: RunRows, row: int, found: tuple[Motion, Rates]) -> tuple[Motion, Any, Rates]:

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from mbd.bodies.values import among, is_finite_number, is_number, shown
-from mbd.compile.mechanisms import mechanism_of, tunable_model
-from mbd.errors import ModelError, OneSidedError, UnknownNameError, nearest
+from mbd.bodies.values import is_finite_number, shown
+from mbd.compile.mechanisms import mechanism_of
+from mbd.errors import ModelError, OneSidedError
 from mbd.integrators import Integrator
 from mbd.results.trajectory import Trajectory
-from mbd.results.units import unit
-from mbd.sensitivity.derivative import passed
-from mbd.sensitivity.functions import rates_of_parameters
+from mbd.sensitivity.asked import Table, Wanted, names_in, with_inputs
 from mbd.sensitivity.one_sided import with_both_sides
-from mbd.sensitivity.outputs import lines_of, taken_apart, usual
+from mbd.sensitivity.outputs import taken_apart, usual
 from mbd.sensitivity.result import Sensitivities
-from mbd.sensitivity.run_data import ADVICE, RunRows, Source, refused
+from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.sequence import amounts_of, changed_sequences
-from mbd.sensitivity.starts import restitution_names
-from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names, whole_names
+from mbd.sensitivity.tangent_names import expanded
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
 
-__all__ = ["derivatives_of", "sensitivities", "with_inputs"]
-
-Wanted = str | Mapping[str, Mapping[str, Any]]
+__all__ = ["sensitivities"]
 
 
 def sensitivities(
@@ -105,7 +100,7 @@ def sensitivities(
     >>> print(f"{found['time', 'fall.displacement']:.6f}")
     0.225762
     """
-    _names_in(wrt)
+    names_in(wrt)
     _check_of(of)
     _check_hold(hold)
     values = _values_of(at)
@@ -119,102 +114,24 @@ def sensitivities(
     if own and amounts:
         raise refused("in the runs of check_events controllers read and write other values", "leave check_events out")
 
-    def made(start: State, more: Mapping[str, float]) -> Trajectory:
+    def made(start: State, more: Mapping[str, float], asked: Any = None) -> Trajectory:
         return simulate(
             model, replace(start, memory=None), integrator, dt, tol, until=until, contact=contact, impact=impact,
             parameters={**(parameters or {}), **more} if more else parameters, rest_speed=rest_speed, backend=backend,
+            wrt=asked,
         )  # fmt: skip
 
-    run = made(start, {})
+    asked = Table(wrt, of, values, hold)
     try:
-        found = derivatives_of(run, wrt, of, values, hold, model, integrator)
+        run = made(start, {}, asked)
     except OneSidedError as error:
-        rows, single = RunRows(run), _names_in(wrt)[0]
-        names, held = (
-            (usual(rows) if of is None else taken_apart(rows, of)),
-            _held(run, single) if hold is None else hold,
-        )
-        directions = _directions(run, wrt, values)
-        raise with_both_sides(error, model, run, directions, held, names, made, backend) from None
+        rows = RunRows(error.run)
+        names = usual(rows) if of is None else taken_apart(rows, of)
+        raise with_both_sides(error, model, error.run, *asked.of_run(error.run), names, made, backend) from None
+    found: Sensitivities = asked.found
     if not amounts:
         return found
-    single, _ = _names_in(wrt)
-    ways, held = _directions(run, wrt, values), _held(run, single) if hold is None else hold
-    return replace(found, event_changes=changed_sequences(model, run, ways, held, amounts, made, backend))
-
-
-def derivatives_of(
-    run: Trajectory,
-    wrt: Sequence[Wanted],
-    of: Sequence[str] | None = None,
-    at: Mapping[str, float] | None = None,
-    hold: Sequence[str] | None = None,
-    model: Any = None,
-    scheme: Integrator | None = None,
-) -> Sensitivities:
-    """The derivatives of a run of a model that `with_inputs` made; see `sensitivities`.
-
-    scheme : the run's integrator; None: the usual one
-    """
-    single, _ = _names_in(wrt)
-    held = _held(run, single) if hold is None else hold
-    return _differentiated(
-        run, _directions(run, wrt, at or {}), held, of, None if model is None else Source(model, scheme)
-    )
-
-
-def _directions(run: Trajectory, wrt: Sequence[Wanted], values: Mapping[str, float]) -> list[Any]:
-    """Names, and quantities with the rates of the parameters that they move."""
-    known = dict(zip(run.record.parameter_names, run.record.parameters, strict=False))
-    found: list[Any] = []
-    for each in wrt:
-        if isinstance(each, str):
-            found.append(each)
-        else:
-            found += [(name, rates_of_parameters(name, given, values, known)) for name, given in each.items()]
-    return found
-
-
-def _differentiated(
-    run: Trajectory, directions: list[Any], held: Sequence[str], of: Sequence[str] | None, source: Source | None
-) -> Sensitivities:  # fmt: skip
-    """The derivatives of a run as a table."""
-    found, wanted = passed(run, directions, held, source)
-    names = usual(found.rows) if of is None else taken_apart(found.rows, of)
-    lines = lines_of(found.rows, found.programs, found.walked, names)
-    facts, columns = run.facts, tuple(each.name for each in wanted)
-    return Sensitivities(
-        lines.names, columns, lines.matrix, lines.values, run,
-        tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in lines.names),
-        tuple("rad" if ".turn." in name else unit(name, facts) for name in columns),
-        written=tuple(dict.fromkeys(name for each in found.rows.controllers for name in each.writes)),
-    )  # fmt: skip
-
-
-def _names_in(wrt: Any) -> tuple[list[str], list[str]]:
-    """Names of single quantities, and of the parameters that functions give."""
-    if isinstance(wrt, str | bytes) or not isinstance(wrt, Sequence) or not len(wrt):
-        raise ModelError(f"wrt must be a list of names such as ['hip.angle', 'hip.mass'], not {shown(wrt)}")
-    single, grouped = list[str](), list[str]()
-    for each in wrt:
-        if isinstance(each, str):
-            single.append(each)
-        elif isinstance(each, Mapping) and each and all(isinstance(v, Mapping) and v for v in each.values()):
-            grouped += [name for functions in each.values() for name in functions]
-            rates = [rate for functions in each.values() for rate in functions.values() if is_number(rate)]
-            if not all(map(is_finite_number, rates)):
-                raise ModelError(f"wrt: rates of parameters must be finite numbers, or functions, not {shown(each)}")
-        else:
-            raise ModelError(
-                f"wrt: expected names, or functions of parameters {{name: {{parameter: function}}}}, not {shown(each)}"
-            )
-    return single, grouped
-
-
-def _held(run: Trajectory, single: Sequence[str]) -> list[str]:
-    """The coordinates and rates of the start among some names."""
-    parameters = set(run.record.parameter_names)
-    return [name for name in single if name not in parameters]
+    return replace(found, event_changes=changed_sequences(model, run, *asked.of_run(run), amounts, made, backend))
 
 
 def _check_hold(hold: Any) -> None:
@@ -237,39 +154,3 @@ def _values_of(at: Any) -> dict[str, float]:
     if not isinstance(at, Mapping) or not all(isinstance(k, str) and is_finite_number(v) for k, v in at.items()):
         raise ModelError(f"at maps names of quantities to finite numbers, such as {{'slope': 0.05}}, not {shown(at)}")
     return {name: float(value) for name, value in at.items()}
-
-
-def _check_controllers(own: Sequence[Any], asked: Any, names: Collection[str]) -> None:
-    """Refuse the controllers of a model unless what they write is to be held, and derivatives by what they write."""
-    if not among(asked, (None, "held")):
-        raise ModelError(f"controllers={shown(asked)} is not available; use 'held', or leave it out")
-    if own and asked is None:
-        them = ", ".join(repr(each.name) for each in own)
-        raise refused(
-            f"its controllers ({them}) change parameters as they read results, which is not differentiated",
-            ADVICE,
-        )
-    for each in own:
-        for name in each.writes:
-            if name in names:
-                raise refused(f"{name!r} is held as {each.name!r} writes it", "leave it out of wrt")
-
-
-def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any, controllers: Any = None) -> Any:
-    """The model with the parameters that `wrt` names as run-time inputs, also where they are 0 or ±1."""
-    single, grouped = _names_in(wrt)
-    _check_controllers(getattr(model, "controllers", ()), controllers, {*single, *grouped})
-    mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
-    inputs = {parameter.name for parameter in mechanism.equations.parameters}
-    folded = getattr(model, "parameters", {})
-    own = {coordinate.name for coordinate in mechanism.equations.coordinates}
-    known = {*inputs, *folded, *start_names(mechanism.equations), *restitution_names(mechanism.equations)}
-    whole = whole_names(mechanism.equations)
-    for name in (*single, *grouped):
-        if name not in known and not (name in whole and name in single):
-            refuse_parts(mechanism.equations, [name], "wrt")
-            raise UnknownNameError(
-                "wrt: " + nearest(name, known, "coordinate, rate of the start or parameter", "There are")
-            )
-    more = [name for name in (*single, *grouped) if name in folded and name not in inputs and name not in own]
-    return tunable_model(model, more) if more else model

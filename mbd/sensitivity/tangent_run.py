@@ -19,6 +19,7 @@ from mbd.sensitivity.tangent.programs import (
     balance_function,
     derivatives_of_modes,
     derivatives_of_programs,
+    lanes,
 )
 from mbd.sensitivity.tangent.words import every_row_place
 from mbd.simulation.marching import Run
@@ -70,7 +71,7 @@ class TangentStepper(Stepper):
         super().__init__(*given)
         plan, reals = self.shelves.plan, TABLE.real_arrays
         self.rooms = [
-            np.zeros((length if own and own.keys() <= set(reals) else 0, LANES))
+            lanes(length if own and own.keys() <= set(reals) else 0)
             for length, own in zip(plan.lengths, plan.places, strict=True)
         ]
         self._cleared = [room[part] for room, own in zip(self.rooms, plan.places, strict=True) for part in _read(own)]
@@ -79,7 +80,7 @@ class TangentStepper(Stepper):
         self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._programs: list[Any] = []
         self._of_modes: dict[Hashable, list[Derivative]] = {}
-        self.scheme = Kept(self)
+        self.plain, self.scheme = self.scheme, Kept(self)
         self._begin()
 
     def _begin(self) -> None:
@@ -100,6 +101,7 @@ class TangentStepper(Stepper):
         unknowns = K.n + 2 * K.n_rows  # of `follow_newmark.follow_newton`
         starts = 2 * size + 10 * (K.n + K.n_rows + K.n_v + 1) + K.n_q + K.n_watched + K.n_frictions
         own = {"kkt": unknowns * unknowns, "rhs": unknowns, "pivots": unknowns}
+        own["block"] = size + K.n + K.n_rows + K.n_v  # with W behind it
         more = {name: max(length, given.get(name, 0)) for name, length in own.items()}
         return given | more | {"starts": starts + K.n_rows * (K.n_v + K.n + K.n_rows)}
 
@@ -115,7 +117,7 @@ class TangentStepper(Stepper):
         array = getattr(self.kernel, name)
         before, found = self._of.get(name, (None, None))
         if array is not before:
-            room = np.zeros((max(len(array), 1), LANES))
+            room = lanes(max(len(array), 1))
             if found is not None:
                 count = min(len(found), len(room))
                 room[:count] = found[:count]

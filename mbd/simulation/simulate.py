@@ -137,48 +137,27 @@ def simulate(
     check_arguments(scheme, start, dt, tol, tol_of, until, parameters, options, on_failure, observers, progress)
     changed = {**start.parameters, **(parameters or {})}
     by_user = called_from_outside()
+    asked: Any = None
     if wrt is not None:
-        model, start = _differentiable(model, start, changed, wrt, options, controllers)
+        asked = later("simulate: derivatives")(wrt, controllers)
+        model, start = asked.differentiable(model, start, changed, options)
     elif controllers is not None:
         raise ModelError("controllers= is for derivatives by wrt=; controllers act in every run; leave it out")
     motion = _Motion(
-        model, start, scheme, until, changed, options, observers, "late" if by_user and progress is None else progress
-    )
+        model, start, scheme, until, changed, options, observers, "late" if by_user and progress is None else progress,
+        Run if asked is None else asked.begun,
+    )  # fmt: skip
     run, trajectory, problem = motion.run(dt) if dt is not None else motion.to_tolerance(float(tol or 0.0), tol_of)
     of_model(trajectory.final, model)
     if by_user:
         _tell(trajectory)
     if problem and on_failure == "raise":
         raise _failure(problem, trajectory, run.cause)
-    if wrt is not None and not problem:
-        _differentiate(trajectory, wrt, model, scheme)
+    if asked is not None and not problem:
+        asked.conclude(trajectory, run, model, scheme)
     if dt is not None and not problem:
         keep_idle(run.stepper)
     return trajectory
-
-
-def _differentiable(
-    model: Any, start: State, changed: Mapping[str, float], wrt: Any, options: dict[str, Any], controllers: Any
-) -> tuple[Any, State]:
-    """The model with what it is differentiated by as inputs, the start without memory; contacts by events."""
-    if options["locate"] != "root":
-        raise CapabilityError("wrt= needs locate='root'; leave it out")
-    if options["contact"] == "auto":
-        options["contact"] = "events"
-    model = later("simulate: inputs")(model, options["backend"], changed, wrt, controllers)
-    if any(callable(rate) for each in wrt if not isinstance(each, str) for by in each.values() for rate in by.values()):
-        raise ModelError("wrt takes rates of parameters here, such as 9.8; mbd.sensitivities(…, at=…) takes functions")
-    return model, replace(start, memory=None)
-
-
-def _differentiate(run: Trajectory, wrt: Any, model: Any, scheme: Integrator) -> None:
-    """Give a run its derivatives."""
-    try:
-        found = later("simulate: derivatives")(run, wrt, model=model, scheme=scheme)
-        run.record.stats["sensitivities"] = found.as_words()
-    except CapabilityError as error:
-        error.run = run
-        raise
 
 
 def _tell(trajectory: Trajectory) -> None:
@@ -202,13 +181,16 @@ class _Motion:
     options: Mapping[str, Any]
     observers: Sequence[Callable[[float, State], None]]
     progress: Any
+    kind: Callable[..., Run] = Run
 
     def run(
         self, step: float, more: Mapping[str, Any] | None = None, most: float = np.inf
     ) -> tuple[Run, Trajectory, str]:
         """A run with steps of one size, or from one on, that ends where it has taken `most` seconds."""
         options = {**self.options, **(more or {})}
-        run = prepared(self.model, self.start, self.scheme, float(step), self.until, self.changed, options)
+        run = laid_out(
+            self.model, self.start, self.scheme, float(step), self.until, self.changed, options, kind=self.kind
+        ).at_start()
         run.room.patience = most
         with run_bar(self.progress, run.mechanism.backend.name == "python", self.start.time, run.end) as bar:
             run.observe(self.observers, bar)
@@ -271,7 +253,7 @@ def laid_out(
     changed: Mapping[str, float],
     options: Mapping[str, Any],
     watch: Callable[[Mechanism], Any] | None = None,
-    kind: type[Run] = Run,
+    kind: Callable[..., Run] = Run,
 ) -> Run:
     """The same before its start is put into the kernel's arrays."""
     mechanism = mechanism_of(model, options["backend"], changed)

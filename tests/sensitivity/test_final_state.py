@@ -85,3 +85,23 @@ def test_of_a_walker_with_locking_knees(scheme, until):
 @pytest.mark.parametrize("until", ["right foot", 0.9])
 def test_of_a_walker_by_every_scheme(scheme, until):
     walked(scheme, until)
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
+def test_a_run_that_carries_derivatives_is_the_run_itself(scheme):
+    """Rows, events and what goes on from the end are those of the run without derivatives, to the bit."""
+    model = mbd.Model("stick")
+    rod = mbd.Link("rod", mass=1.2, length=0.9, center=0.4, inertia=0.1)
+    model.connect(mbd.Planar("free", model.ground.origin, rod.start))
+    model.constrain(mbd.Unilateral("floor", mbd.touchdown(rod.end), restitution=0.4, friction=0.3))
+    start = mbd.assemble(model, {"free.y": 1.2, "free.angle": -0.9}, {"free.x": 0.3})
+    plain = mbd.simulate(model, start, scheme, dt=0.01, until=0.6, contact="events")
+    carried = mbd.simulate(model, start, scheme, dt=0.01, until=0.6, wrt=["free.y", "rod.mass"])
+    assert len(plain.events) > 0 and [e.time for e in carried.events] == [e.time for e in plain.events]
+    for name in ("time", "q", "v", "a", "lam", "closed", "phase"):
+        assert np.array_equal(getattr(carried.record, name), getattr(plain.record, name)), name
+    again = final_state_derivative(plain, ["free.y", "rod.mass"], held=["free.y"])[0]
+    table = np.array([carried.sensitivities[name] for name in (*start.names, *start.velocity_names)])
+    assert np.allclose(table, again, rtol=1e-12, atol=1e-12)
+    further = [mbd.simulate(model, run.final, scheme, dt=0.01, until=0.7, contact="events") for run in (plain, carried)]
+    assert np.array_equal(further[0].record.q, further[1].record.q)

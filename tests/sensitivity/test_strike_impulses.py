@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.sensitivity.sensitivities import with_inputs
+from mbd.sensitivity.asked import with_inputs
 from tests.simulation.test_strike_impulses import ALPHA, INERTIA, wheel
 
 SCHEMES = {"RungeKutta853": (mbd.RungeKutta853(), 0.02), "RadauIIA": (mbd.RadauIIA(), 0.02), "HHT": (mbd.HHT(), 0.005)}

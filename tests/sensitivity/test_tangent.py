@@ -16,6 +16,7 @@ from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.tangent.printer import LANES, tangent_text
 from mbd.sensitivity.tangent.rules import own_rules
 from mbd.sensitivity.tangent_run import TangentRun
+from mbd.simulation.interrupted import stopped
 from mbd.testing.mechanisms import random_scene
 from tests.gait.test_gaits_with_modes import walker as walker_with_modes
 from tests.sensitivity.differences import differences, off
@@ -214,6 +215,7 @@ def test_an_interruption_is_no_failure_of_the_derivatives(raised, monkeypatch):
     rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
     model.connect(mbd.Revolute("hip", model.ground.origin, rod.start))
     start, calls = mbd.assemble(model, {"hip.angle": 0.3}), []
+    run = mbd.simulate(model, start, mbd.HHT(), dt=1e-3, until=2.0)
     collect = TangentRun.collect
 
     def interrupted(run):
@@ -224,4 +226,8 @@ def test_an_interruption_is_no_failure_of_the_derivatives(raised, monkeypatch):
 
     monkeypatch.setattr(TangentRun, "collect", interrupted)
     with pytest.raises(raised):
+        final_state_derivative(run, ["rod.center"])
+    calls.clear()
+    with pytest.raises(mbd.SimulationError) as caught:  # a run that carries derivatives ends as any other
         mbd.sensitivities(model, start, mbd.HHT(), dt=1e-3, until=2.0, wrt=["rod.mass"])
+    assert stopped(caught.value.run)

@@ -21,6 +21,7 @@ from mbd.kernel.algebra.ordered import (
 from mbd.kernel.algebra.redundancy import find_dependent, find_shares, sharing, spread, take_shares
 from mbd.kernel.codes import CONFLICT, DEPENDENT, EPS, NOT_FINITE
 from mbd.kernel.records import Balance, DependentRows, Equations
+from mbd.kernel.tangent_rules import is_differentiated
 
 __all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_at", "solve_rows"]
 
@@ -169,6 +170,21 @@ def dependent_last(K: DependentRows, m: int) -> int:
 
 
 def solve_matrix(K: Balance, m: int, together: bool, tolerance: float) -> int:
+    """The same as `solve_islands`; values are those of its islands, whatever derivatives couple."""
+    least = K.least_pivot
+    rank = solve_islands(K, m, together, tolerance)
+    if is_differentiated():
+        K.least_pivot = least
+        rank = solve_values(K, m, together, tolerance)
+    return rank
+
+
+def solve_values(K: Balance, m: int, together: bool, tolerance: float) -> int:
+    """The same without derivatives: those that are there stay."""
+    return solve_islands(K, m, together, tolerance)
+
+
+def solve_islands(K: Balance, m: int, together: bool, tolerance: float) -> int:
     """w and λ of the m rows in K.rows, as far as they are independent, others 0; the rank, or minus a failure.
 
     With `together` each multiplier brings the shares of the rows that depend on its row along. Pivots below

@@ -39,7 +39,7 @@ HELD = (
     "schemes.explicit_rates.rates_at_end", "schemes.runge_kutta.find_sizes", "schemes.runge_kutta.note_uneven",
     "schemes.radau_end.end_rates", "stepping.mass_ratios.polish_with_rows", "stepping.restart.holds_rows",
     "rules.prepare_newton", "rules.prepare_stages", "stepping.observe.store_passed_row",
-    "rules.follow_factors", "rules.solve_by_value",
+    "rules.follow_factors", "rules.factors_at", "rules.solve_by_value", "algebra.saddle.solve_values",
 )  # fmt: skip
 """Functions without derivatives: steps are tried and judged, and instants found, by values alone.
 

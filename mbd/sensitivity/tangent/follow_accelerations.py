@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.islands import saddle_entry
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Kernel
 from mbd.kernel.stepping.restart import consistent, evaluate, fill_block
-from mbd.sensitivity.tangent.words import derivative_of, solve_plain, without_tangent
+from mbd.sensitivity.tangent.words import derivative_of, is_differentiated, solve_plain, without_tangent
 
 __all__ = ["follow_factors", "follow_move", "follow_rates", "follow_solution"]
 
@@ -20,11 +19,7 @@ def prepare_rates(K: Kernel, t: float, m: int) -> int:
     n = K.n
     size = n + m
     evaluate(K, t, K.q1, K.y1)
-    for i in range(size):
-        for j in range(size):
-            K.kkt[i * size + j] = saddle_entry(K, i, j, False)
-    K.order_start = 0
-    if factor(K.kkt, size, K.pivots) != 0:
+    if not factors_at(K, m, False):
         return 1
     for i in range(n):
         K.rhs[i] = -K.acc[K.acc_f + i]
@@ -39,6 +34,8 @@ def follow_rates(K: Kernel, t: float) -> int:
 
     ``[M R; B 0] (δv̇, δλ) = −δ(M v̇ + f + R λ, B v̇ + γ)`` with v̇ and λ held.
     """
+    if not is_differentiated():
+        return 0
     n = K.n
     m = K.n_active
     if K.n_frictions > 0 or K.loaded > 0 or K.loads_act == 1 or K.n_dropped > 0 or prepare_rates(K, t, m) != 0:
@@ -78,6 +75,11 @@ def follow_move(K: Kernel, h: float, weights: int, count: int) -> None:
 
 def follow_factors(K: Kernel, m: int) -> bool:
     """LU factors of ``A = [M Bᵀ; B 0]`` from K.acc, which have no derivatives; false where a pivot is missing."""
+    return factors_at(K, m, True)
+
+
+def factors_at(K: Kernel, m: int, symmetric: bool) -> bool:
+    """The same, or of ``[M R; B 0]``."""
     n = K.n
     size = n + m
     K.order_start = 0
@@ -89,7 +91,7 @@ def follow_factors(K: Kernel, m: int) -> bool:
         K.kkt[o : o + size] = 0.0
         for i in range(n):
             K.kkt[o + i] = K.acc[row + i]
-            K.kkt[i * size + n + k] = K.acc[row + i]
+            K.kkt[i * size + n + k] = K.acc[row + i] if symmetric else K.acc[K.acc_R + i * K.n_rows + K.rows[k]]
     return bool(factor(K.kkt, size, K.pivots) == 0)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.linear import factor, solve
+from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.hooks import call, call_on
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import Integers, Kernel, Reals
 from mbd.kernel.schemes.iteration import finish
 from mbd.kernel.tangent_rules import NOT_FOLLOWED
 from mbd.sensitivity.tangent.words import (
@@ -201,19 +201,41 @@ def prepare_metric(K: Kernel, m: int) -> int:
     shift = solution_place(K) + at - K.n_v
     K.starts[at : at + size + K.n_v] = 0.0  # what rows make of W is left to g
     o_Z = metric_place(K)
+    K.spare[: size * m] = 0.0
     for k in range(m):
-        K.work[:size] = 0.0
-        K.work[n + k] = 1.0
-        solve(K.kkt, size, K.pivots, K.work)
+        K.spare[(n + k) * m + k] = 1.0
+    solve_columns(K.kkt, size, K.pivots, K.spare, m)
+    for k in range(m):
         g = 0.0
         for j in range(K.n_v):
             g += K.out[(n + k) * size + j] * K.starts[shift + j]
         for i in range(size):
-            K.starts[at + i] += K.work[i] * g
-            K.starts[o_Z + k * size + i] = K.work[i]
+            K.starts[at + i] += K.spare[i * m + k] * g
+            K.starts[o_Z + k * size + i] = K.spare[i * m + k]
         if K.row_level[K.rows[k]] == 1:  # those on velocities correct no positions
             K.starts[o_Z + k * size : o_Z + k * size + size] = 0.0
     return 0
+
+
+def solve_columns(A: Reals, n: int, pivots: Integers, b: Reals, m: int) -> None:
+    """The row-major n×m matrix b ← A⁻¹ b with the factors of `mbd.kernel.algebra.linear.factor`."""
+    for k in range(n):
+        if pivots[k] != k:
+            for c in range(m):
+                swap = b[k * m + c]
+                b[k * m + c] = b[pivots[k] * m + c]
+                b[pivots[k] * m + c] = swap
+    for i in range(1, n):
+        for k in range(i):
+            for c in range(m):
+                b[i * m + c] -= A[i * n + k] * b[k * m + c]
+    for r in range(n):
+        i = n - 1 - r
+        for k in range(i + 1, n):
+            for c in range(m):
+                b[i * m + c] -= A[i * n + k] * b[k * m + c]
+        for c in range(m):
+            b[i * m + c] *= A[i * n + i]
 
 
 def begin_corrections(K: Kernel, m: int) -> bool:
@@ -221,13 +243,11 @@ def begin_corrections(K: Kernel, m: int) -> bool:
     size = K.n + m
     at = n_inputs(K)
     shift = solution_place(K) + at - K.n_v
-    for i in range(at):
-        K.starts[i] = moved(K.block[i], K.starts[i])
     if prepare_metric(K, m) != 0:
         return False
     for i in range(size + K.n_v):
-        K.starts[at + i] = without_tangent(K.starts[at + i])
-    call_on(K, turned_program(K), K.starts, K.spare)
+        K.block[at + i] = without_tangent(K.starts[at + i])
+    call(K, turned_program(K), K.spare)
     for i in range(size):
         K.work[i] = -derivative_of(K.spare[i])
     solve_plain(K.kkt, size, K.pivots, K.work)
@@ -249,6 +269,8 @@ def follow_matrix(K: Kernel, m: int, x: Reals, whole: bool) -> None:
     ``δK x`` is the derivative of a program of the mode (see `programs`) that reads x behind the inputs of the matrix,
     and for the rows what is left of it without the position correction that was there, with `whole`.
     """
+    if not is_differentiated():
+        return
     size = K.n + m
     o = n_inputs(K)
     for i in range(size):

@@ -4,7 +4,8 @@ A real is a value and a vector of `LANES` derivatives, one for each direction; a
 array and one with a vector for each of its numbers; the kernel is two tables, whose fields have the same places. Rules
 (Griewank & Walther 2008, Evaluating Derivatives, ch. 2): those of + − × ÷, powers, roots and |x|; an extreme or a
 choice takes the derivatives of the value that it takes; integers, conditions and numbers of the record have none.
-Values are computed by the very operations of the kernel, so that a run with derivatives is the run without them.
+Values are computed by the very operations of the kernel, so that a run with derivatives is the run without them;
+derivatives take fused ones where the processor has them.
 
 Functions in `HELD` are called as they stand, without derivatives: what they write keeps the derivatives it had. Model
 code is called for its values, then its exact derivatives are multiplied into the vectors of its inputs (`product`).
@@ -46,25 +47,63 @@ BUNDLES = {kind: f"{{ {LLVM[kind]}, {more} }}" for kind, more in WITH_TANGENT.it
 """What functions return that return reals, or the address of an array."""
 
 PRODUCT = f"""\
-define internal void @product(ptr %program, ptr %block, ptr %params, ptr %of.block, ptr %of.params, ptr %of.out) {{
+define internal void @product(
+  ptr %program, ptr %block, ptr %params, ptr %of.block, ptr %of.params, ptr %of.out
+) noinline {{
 entry:
   %code = load ptr, ptr %program
-  %p1 = getelementptr i64, ptr %program, i64 1
-  %size = load i64, ptr %p1
-  %p2 = getelementptr i64, ptr %program, i64 2
-  %ends = load ptr, ptr %p2
-  %p3 = getelementptr i64, ptr %program, i64 3
-  %columns = load ptr, ptr %p3
-  %p4 = getelementptr i64, ptr %program, i64 4
-  %numbers = load ptr, ptr %p4
+  %size.at = getelementptr i64, ptr %program, i64 1
+  %size = load i64, ptr %size.at
+  %ends.at = getelementptr i64, ptr %program, i64 2
+  %ends = load ptr, ptr %ends.at
+  %columns.at = getelementptr i64, ptr %program, i64 3
+  %columns = load ptr, ptr %columns.at
+  %numbers.at = getelementptr i64, ptr %program, i64 4
+  %numbers = load ptr, ptr %numbers.at
+  %count.at = getelementptr i64, ptr %program, i64 5
+  %count = load i64, ptr %count.at
+  %places.at = getelementptr i64, ptr %program, i64 6
+  %places = load ptr, ptr %places.at
+  %others.at = getelementptr i64, ptr %program, i64 7
+  %others = load ptr, ptr %others.at
+  %room.at = getelementptr i64, ptr %program, i64 8
+  %room = load ptr, ptr %room.at
   %there = icmp ne ptr %code, null
-  br i1 %there, label %evaluate, label %lines
+  br i1 %there, label %evaluate, label %inputs
 evaluate:
   call void %code(ptr %block, ptr %params, ptr %numbers)
-  br label %lines
+  br label %inputs
+inputs:
+  %i = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %i.next, %keep ]
+  %wanted = icmp slt i64 %i, %count
+  br i1 %wanted, label %input, label %lines
+input:
+  %place.at = getelementptr i64, ptr %places, i64 %i
+  %place = load i64, ptr %place.at
+  %of.state = icmp sge i64 %place, 0
+  %parameter = sub i64 -1, %place
+  %number.of = select i1 %of.state, i64 %place, i64 %parameter
+  %array = select i1 %of.state, ptr %of.block, ptr %of.params
+  %source = getelementptr {ROOM}, ptr %array, i64 %number.of
+  %first = load {VECTOR}, ptr %source, align 8
+  %other.at = getelementptr i64, ptr %others, i64 %i
+  %other = load i64, ptr %other.at
+  %pair = icmp sge i64 %other, 0
+  br i1 %pair, label %both, label %keep
+both:
+  %second.at = getelementptr {ROOM}, ptr %of.block, i64 %other
+  %second = load {VECTOR}, ptr %second.at, align 8
+  %together = fadd {VECTOR} %first, %second
+  br label %keep
+keep:
+  %whole = phi {VECTOR} [ %first, %input ], [ %together, %both ]
+  %kept.at = getelementptr {ROOM}, ptr %room, i64 %i
+  store {VECTOR} %whole, ptr %kept.at, align 8
+  %i.next = add i64 %i, 1
+  br label %inputs
 lines:
-  %k = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %k.next, %store ]
-  %first = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %last, %store ]
+  %k = phi i64 [ 0, %inputs ], [ %k.next, %store ]
+  %begin = phi i64 [ 0, %inputs ], [ %last, %store ]
   %more = icmp slt i64 %k, %size
   br i1 %more, label %line, label %end
 line:
@@ -72,8 +111,9 @@ line:
   %last = load i64, ptr %end.at
   br label %entries
 entries:
-  %e = phi i64 [ %first, %line ], [ %e.next, %add ]
-  %sum = phi {VECTOR} [ zeroinitializer, %line ], [ %total, %add ]
+  %e = phi i64 [ %begin, %line ], [ %e.next, %add ]
+  %even = phi {VECTOR} [ zeroinitializer, %line ], [ %odd, %add ]
+  %odd = phi {VECTOR} [ zeroinitializer, %line ], [ %total, %add ]
   %left = icmp slt i64 %e, %last
   br i1 %left, label %add, label %store
 add:
@@ -81,21 +121,18 @@ add:
   %column = load i64, ptr %column.at
   %entry.at = getelementptr double, ptr %numbers, i64 %e
   %number = load double, ptr %entry.at
-  %of.state = icmp sge i64 %column, 0
-  %other = sub i64 -1, %column
-  %index = select i1 %of.state, i64 %column, i64 %other
-  %array = select i1 %of.state, ptr %of.block, ptr %of.params
-  %source = getelementptr {ROOM}, ptr %array, i64 %index
-  %input = load {VECTOR}, ptr %source, align 8
+  %input.at = getelementptr {ROOM}, ptr %room, i64 %column
+  %input.of = load {VECTOR}, ptr %input.at, align 8
   %only = insertelement {VECTOR} poison, double %number, i64 0
   %factor = shufflevector {VECTOR} %only, {VECTOR} poison, <{LANES} x i32> zeroinitializer
-  %part = fmul {VECTOR} %factor, %input
-  %total = fadd {VECTOR} %sum, %part
+  %part = fmul contract {VECTOR} %factor, %input.of
+  %total = fadd contract {VECTOR} %even, %part
   %e.next = add i64 %e, 1
   br label %entries
 store:
-  %place = getelementptr {ROOM}, ptr %of.out, i64 %k
-  store {VECTOR} %sum, ptr %place, align 8
+  %sum = fadd {VECTOR} %even, %odd
+  %out.at = getelementptr {ROOM}, ptr %of.out, i64 %k
+  store {VECTOR} %sum, ptr %out.at, align 8
   %k.next = add i64 %k, 1
   br label %lines
 end:
@@ -196,14 +233,14 @@ class TangentBody(Body):
 
     def scaled(self, factor: str, tangent: str) -> str:
         """A vector times a number; ZERO stays."""
-        return ZERO if tangent == ZERO else self.emit(f"fmul {VECTOR} {self.splat(factor)}, {tangent}")
+        return ZERO if tangent == ZERO else self.emit(f"fmul contract {VECTOR} {self.splat(factor)}, {tangent}")
 
     def sum(self, a: str, b: str, word: str = "fadd") -> str:
         if b == ZERO:
             return a
         if a == ZERO:
             return b if word == "fadd" else self.emit(f"fneg {VECTOR} {b}")
-        return self.emit(f"{word} {VECTOR} {a}, {b}")
+        return self.emit(f"{word} contract {VECTOR} {a}, {b}")
 
     def dual(self, value: str, tangent: str) -> str:
         return value if tangent == ZERO else Dual(value, tangent)

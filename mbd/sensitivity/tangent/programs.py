@@ -6,18 +6,21 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import dataclass
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.inputs import Inputs
 from mbd.sensitivity.tangent.interpreted import Pair
 from mbd.sensitivity.tangent.printer import LANES
+from mbd.simulation.run.shelves import CACHE_LINE_BYTES, NUMBER_BYTES
 from mbd.tape.derivatives import jvps, live
 from mbd.tape.node import Node
 
-__all__ = ["Derivative", "balance_function", "derivatives_of_modes", "derivatives_of_programs"]
+__all__ = ["Derivative", "balance_function", "derivatives_of_modes", "derivatives_of_programs", "lanes"]
 
 BALANCE = "tangent_balance"
 WITHOUT = ("switch",)
@@ -35,7 +38,8 @@ class Derivative:
 
     Attributes
     ----------
-    address : of ``[code, outputs, ends of their lines, columns, numbers]``, as `printer.PRODUCT` reads it
+    address : of ``[code, outputs, ends of their lines, columns, numbers, inputs, places, second places, room]``, as
+        `printer.PRODUCT` reads it: columns are numbers of inputs, whose derivatives come into the room first
     """
 
     def __init__(
@@ -49,56 +53,86 @@ class Derivative:
     ) -> None:
         symbol = f"tangent_{name}_by_{'_'.join(map(str, places))}"
 
-        def made() -> tuple[Any, Any, Any, int]:
+        def made() -> tuple[_Entries, int]:
             nodes = outputs()
-            return *_made(mechanism, f"tangent_{len(mechanism.common)}", nodes, places, without), len(nodes)
+            return _made(mechanism, f"tangent_{len(mechanism.common)}", nodes, places, without), len(nodes)
 
-        function, lines, columns, count = mechanism.kept((Derivative, symbol), made)
-        size = first + count
-        ends = np.searchsorted(lines + first, np.arange(size), side="right")
-        numbers = np.zeros(max(len(lines), 1))
-        self._function, self._ends = function, ends
-        self._lines, self._columns, self._numbers = lines + first, columns, numbers
-        self._size = size
-        places = [each.ctypes.data for each in (ends, columns, numbers)]
-        self._words = np.array([0 if function is None else function.address, size, *places], dtype=np.int64)
+        known, count = mechanism.kept((Derivative, symbol), made)
+        self._known, self._size, self._lines = known, first + count, known.lines + first
+        self._ends = np.searchsorted(self._lines, np.arange(self._size), side="right")
+        self._numbers, self._room = np.zeros(max(len(known.lines), 1)), lanes(len(known.inputs))
+        ends, columns, numbers, inputs, others, room = (
+            each.ctypes.data
+            for each in (self._ends, known.columns, self._numbers, known.inputs, known.others, self._room)
+        )
+        code = 0 if known.function is None else known.function.address
+        words = [code, self._size, ends, columns, numbers, len(known.inputs), inputs, others, room]
+        self._words = np.array(words, dtype=np.int64)
         self.address = int(self._words.ctypes.data)
 
     def product(self, block: Pair, parameters: Pair) -> Matrix:
         """The derivatives of its outputs, in Python."""
         out = np.zeros((self._size, LANES))
-        if self._function is not None:
-            self._function(block.values, parameters.values, self._numbers)
-            columns = self._columns
-            inputs = block.of[np.maximum(columns, 0)]
-            inputs[columns < 0] = parameters.of[-1 - columns[columns < 0]]
-            np.add.at(out, self._lines, self._numbers[: len(columns), None] * inputs)
+        known = self._known
+        if known.function is not None:
+            known.function(block.values, parameters.values, self._numbers)
+            inputs = block.of[np.maximum(known.inputs, 0)]
+            inputs[known.inputs < 0] = parameters.of[-1 - known.inputs[known.inputs < 0]]
+            inputs[known.others >= 0] += block.of[known.others[known.others >= 0]]
+            np.add.at(out, self._lines, self._numbers[: len(known.columns), None] * inputs[known.columns])
         return out
+
+
+def lanes(count: int) -> Matrix:
+    """Room for the derivatives of so many numbers, each of which begins on a cache line."""
+    words = np.zeros(count * LANES + CACHE_LINE_BYTES // NUMBER_BYTES - 1)
+    first = -words.ctypes.data % CACHE_LINE_BYTES // NUMBER_BYTES
+    return words[first : first + count * LANES].reshape(count, LANES)
+
+
+@dataclass(frozen=True)
+class _Entries:
+    """Compiled entries, their lines and the numbers of their inputs.
+
+    inputs : places in the block, or −1 − place of a parameter; others : a second place whose derivatives are added, −1
+        for none: where coordinates add, of what depends on q + x alone
+    """
+
+    function: Any
+    lines: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    inputs: NDArray[np.int64]
+    others: NDArray[np.int64]
 
 
 def _made(
     mechanism: Mechanism, symbol: str, outputs: Sequence[Node], places: Sequence[int], without: Sequence[str]
-) -> tuple[Any, Any, Any]:
-    """The compiled entries, their lines and columns: places in the block, or −1 − place of a parameter."""
+) -> _Entries:
+    """The derivatives of some outputs that are not always 0."""
     layout, wanted = mechanism.layout, set(places)
     inputs = [node for node in live(outputs) if node.op == "input"]
     inputs = [
         each for each in inputs if each.data[0] not in without and (each.data[0] != "p" or each.data[1] in wanted)
     ]
-    found = jvps(outputs, [{node: 1.0} for node in inputs]) if inputs else []
-    made = list[tuple[int, int, Node]]()
-    for node, column in zip(inputs, found, strict=True):
-        kind, index = node.data
-        place = -1 - index if kind == "p" else layout.place(kind, index)
-        for line, entry in enumerate(column):
-            if not entry.is_zero:
-                made.append((line, place, entry))
+    slopes = jvps(outputs, [{node: 1.0} for node in inputs]) if inputs else []
+    found = {node.data: each for node, each in zip(inputs, slopes, strict=True)}
+    made, own, others = list[tuple[int, int, Node]](), list[int](), list[int]()
+    for (kind, index), column in found.items():
+        beside = found.get(("q" if kind == "x" else "x", index), ())
+        if kind in "qx" and [each.index for each in column] == [each.index for each in beside]:
+            if kind == "x":
+                continue
+            others.append(layout.place("x", index))
+        else:
+            others.append(-1)
+        made += [(line, len(own), entry) for line, entry in enumerate(column) if not entry.is_zero]
+        own.append(-1 - index if kind == "p" else layout.place(kind, index))
     made.sort(key=lambda each: each[0])
     if made:
         mechanism.common.add({symbol: [entry for _, _, entry in made]}, True)
     function = mechanism.common[symbol] if made else None
     lines, columns = ([each[k] for each in made] for k in (0, 1))
-    return function, np.array(lines, dtype=np.int64), np.array(columns, dtype=np.int64)
+    return _Entries(function, *(np.array(each, dtype=np.int64) for each in (lines, columns, own, others)))
 
 
 def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list[Derivative]:

@@ -75,17 +75,27 @@ def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
             swap = b[k]
             b[k] = b[p]
             b[p] = swap
-    for i in range(1, n):  # by rows: a sum of vectors stays in registers
-        total = b[i]
-        for k in range(i):
-            total -= plain_A[i * n + k] * b[k]
-        b[i] = total
+    for i in range(1, n):  # by rows: sums of vectors stay in registers, two, which do not wait for each other
+        total = row_times(plain_A, i * n, b, 0, i)
+        b[i] -= total
     for c in range(n):
         i = n - 1 - c
-        total = b[i]
-        for k in range(i + 1, n):
-            total -= plain_A[i * n + k] * b[k]
-        b[i] = total * plain_A[i * n + i]
+        total = row_times(plain_A, i * n, b, i + 1, n)
+        b[i] = (b[i] - total) * plain_A[i * n + i]
+
+
+def row_times(plain_A: Reals, o: int, b: Reals, first: int, last: int) -> float:
+    """Σ A[o + k] b[k] over some places, of A that has no derivatives."""
+    even = 0.0
+    odd = 0.0
+    k = first
+    while k + 1 < last:
+        even += plain_A[o + k] * b[k]
+        odd += plain_A[o + k + 1] * b[k + 1]
+        k += 2
+    if k < last:
+        even += plain_A[o + k] * b[k]
+    return even + odd
 
 
 def n_inputs(K: Kernel) -> int:

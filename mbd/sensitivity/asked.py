@@ -1,0 +1,209 @@
+"""What a run is asked to be differentiated by, and what is made of the derivatives that it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import field, replace
+from typing import Any
+
+from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import among, is_finite_number, is_number, shown
+from mbd.compile.mechanisms import mechanism_of, tunable_model
+from mbd.dataclass import dataclass
+from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
+from mbd.integrators import Integrator
+from mbd.results.trajectory import Trajectory
+from mbd.results.units import unit
+from mbd.sensitivity.derivative import Differentiated, end_of, passed
+from mbd.sensitivity.functions import rates_of_parameters
+from mbd.sensitivity.made_run import made_with
+from mbd.sensitivity.outputs import lines_of, taken_apart, usual
+from mbd.sensitivity.result import Sensitivities
+from mbd.sensitivity.run_data import ADVICE, Source, refused
+from mbd.sensitivity.starts import Direction, restitution_names
+from mbd.sensitivity.tangent_names import refuse_parts, start_names, whole_names
+from mbd.simulation.marching import Run
+from mbd.state import State
+
+__all__ = ["Asked", "EndState", "Table", "Wanted", "names_in", "request_of", "with_inputs"]
+
+Wanted = str | Mapping[str, Mapping[str, Any]]
+
+
+@dataclass
+class Asked:
+    """Derivatives of a run, which it carries where it can (`mbd.sensitivity.made_run`).
+
+    wrt, of, at, hold : see `mbd.sensitivities`, which has checked them; found : what was asked for, after the run
+    """
+
+    wrt: Sequence[Wanted]
+    of: Sequence[str] | None = None
+    at: Mapping[str, float] = field(default_factory=dict)
+    hold: Sequence[str] | None = None
+    found: Any = None
+
+    def differentiable(
+        self, model: Any, start: State, changed: Mapping[str, float], options: dict[str, Any]
+    ) -> tuple[Any, State]:
+        """The model with what it is differentiated by as inputs, and a start without memory."""
+        return model, start
+
+    def begun(self, *given: Any) -> Run:
+        """The run itself, from what `Run` takes."""
+        return made_with(self._ways, *given)
+
+    def of_run(self, run: Trajectory) -> tuple[list[Any], Sequence[str]]:
+        """Directions by the parameters of a run, and names of its start that stay."""
+        return self._ways(dict(zip(run.record.parameter_names, run.record.parameters, strict=False)))
+
+    def _ways(self, known: Mapping[str, float]) -> tuple[list[Any], Sequence[str]]:
+        found: list[Any] = []
+        for each in self.wrt:
+            if isinstance(each, str):
+                found.append(each)
+            else:
+                found += [(name, rates_of_parameters(name, given, self.at, known)) for name, given in each.items()]
+        of_start = [name for name in names_in(self.wrt)[0] if name not in known]
+        return found, of_start if self.hold is None else self.hold
+
+    def conclude(self, run: Trajectory, made: Run, model: Any, scheme: Integrator) -> None:
+        """Find what was asked for of a run that has come to its end.
+
+        Raises
+        ------
+        CapabilityError
+            where it has no derivatives; with the run.
+        """
+        try:
+            self.take(run, *passed(run, *self.of_run(run), self.source(model, scheme), made))
+        except CapabilityError as error:
+            error.run = run
+            raise
+
+    def source(self, model: Any, scheme: Integrator) -> Source | None:
+        """What made the run."""
+        return Source(model, scheme)
+
+    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
+        """What was asked for, from the derivatives at the end and at events."""
+        raise NotImplementedError
+
+
+class Table(Asked):
+    """Derivatives of results as a table."""
+
+    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
+        names = usual(found.rows) if self.of is None else taken_apart(found.rows, self.of)
+        lines = lines_of(found.rows, found.programs, found.walked, names)
+        facts, columns = run.facts, tuple(each.name for each in wanted)
+        self.found = Sensitivities(
+            lines.names, columns, lines.matrix, lines.values, run,
+            tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in lines.names),
+            tuple("rad" if ".turn." in name else unit(name, facts) for name in columns),
+            written=tuple(dict.fromkeys(name for each in found.rows.controllers for name in each.writes)),
+        )  # fmt: skip
+
+
+class EndState(Asked):
+    """d(q, v) and dt at the end, as `final_state_derivative` has them; controllers are refused."""
+
+    def source(self, model: Any, scheme: Integrator) -> Source | None:
+        return None
+
+    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
+        known: tuple[Matrix, Vector] = end_of(found)
+        self.found = known
+
+
+class Carried(Table):
+    """Derivatives that a run takes into files: ``mbd.simulate(…, wrt=…)``.
+
+    controllers : see `mbd.simulate`
+    """
+
+    controllers: Any = None
+
+    def differentiable(
+        self, model: Any, start: State, changed: Mapping[str, float], options: dict[str, Any]
+    ) -> tuple[Any, State]:
+        if options["locate"] != "root":
+            raise CapabilityError("wrt= needs locate='root'; leave it out")
+        if options["contact"] == "auto":
+            options["contact"] = "events"
+        model = with_inputs(model, options["backend"], changed, self.wrt, self.controllers)
+        groups = [by for each in self.wrt if not isinstance(each, str) for by in each.values()]
+        if any(callable(rate) for by in groups for rate in by.values()):
+            raise ModelError(
+                "wrt takes rates of parameters here, such as 9.8; mbd.sensitivities(…, at=…) takes functions"
+            )
+        return model, replace(start, memory=None)
+
+    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
+        super().take(run, found, wanted)
+        run.record.stats["sensitivities"] = self.found.as_words()
+
+
+def request_of(wrt: Any, controllers: Any) -> Asked:
+    """What `mbd.simulate` was asked for by ``wrt=``."""
+    if isinstance(wrt, Asked):
+        return wrt
+    found = Carried(wrt)
+    found.controllers = controllers
+    return found
+
+
+def names_in(wrt: Any) -> tuple[list[str], list[str]]:
+    """Names of single quantities, and of the parameters that functions give."""
+    if isinstance(wrt, str | bytes) or not isinstance(wrt, Sequence) or not len(wrt):
+        raise ModelError(f"wrt must be a list of names such as ['hip.angle', 'hip.mass'], not {shown(wrt)}")
+    single, grouped = list[str](), list[str]()
+    for each in wrt:
+        if isinstance(each, str):
+            single.append(each)
+        elif isinstance(each, Mapping) and each and all(isinstance(v, Mapping) and v for v in each.values()):
+            grouped += [name for functions in each.values() for name in functions]
+            rates = [rate for functions in each.values() for rate in functions.values() if is_number(rate)]
+            if not all(map(is_finite_number, rates)):
+                raise ModelError(f"wrt: rates of parameters must be finite numbers, or functions, not {shown(each)}")
+        else:
+            raise ModelError(
+                f"wrt: expected names, or functions of parameters {{name: {{parameter: function}}}}, not {shown(each)}"
+            )
+    return single, grouped
+
+
+def _check_controllers(own: Sequence[Any], asked: Any, names: Collection[str]) -> None:
+    """Refuse the controllers of a model unless what they write is to be held, and derivatives by what they write."""
+    if not among(asked, (None, "held")):
+        raise ModelError(f"controllers={shown(asked)} is not available; use 'held', or leave it out")
+    if own and asked is None:
+        them = ", ".join(repr(each.name) for each in own)
+        raise refused(
+            f"its controllers ({them}) change parameters as they read results, which is not differentiated",
+            ADVICE,
+        )
+    for each in own:
+        for name in each.writes:
+            if name in names:
+                raise refused(f"{name!r} is held as {each.name!r} writes it", "leave it out of wrt")
+
+
+def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any, controllers: Any = None) -> Any:
+    """The model with the parameters that `wrt` names as run-time inputs, also where they are 0 or ±1."""
+    single, grouped = names_in(wrt)
+    _check_controllers(getattr(model, "controllers", ()), controllers, {*single, *grouped})
+    mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
+    inputs = {parameter.name for parameter in mechanism.equations.parameters}
+    folded = getattr(model, "parameters", {})
+    own = {coordinate.name for coordinate in mechanism.equations.coordinates}
+    known = {*inputs, *folded, *start_names(mechanism.equations), *restitution_names(mechanism.equations)}
+    whole = whole_names(mechanism.equations)
+    for name in (*single, *grouped):
+        if name not in known and not (name in whole and name in single):
+            refuse_parts(mechanism.equations, [name], "wrt")
+            raise UnknownNameError(
+                "wrt: " + nearest(name, known, "coordinate, rate of the start or parameter", "There are")
+            )
+    more = [name for name in (*single, *grouped) if name in folded and name not in inputs and name not in own]
+    return tunable_model(model, more) if more else model

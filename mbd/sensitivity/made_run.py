@@ -1,0 +1,102 @@
+"""A run that carries its derivatives as it is made, so that it need not be made a second time for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+
+from mbd.dataclass import dataclass
+from mbd.equations.switching_times import switches_of
+from mbd.integrators.stepping import own_scheme
+from mbd.kernel import codes
+from mbd.kernel.schemes.contract import NO_SCHEME
+from mbd.results.trajectory import Trajectory
+from mbd.sensitivity.motion import Tangent
+from mbd.sensitivity.passing import Charted, seed
+from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
+from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
+from mbd.simulation.marching import Run
+from mbd.simulation.run.ends import call
+from mbd.simulation.run.remembered import sealed
+from mbd.simulation.run.savepoints import restore, save
+from mbd.simulation.run.stored import record_of
+
+__all__ = ["MadeRun", "Ready", "made_with"]
+
+Ways = Callable[[Mapping[str, float]], tuple[Sequence[Any], Sequence[str]]]
+"""Directions, and names of the start that stay, by the parameters of a run."""
+
+
+@dataclass(frozen=True)
+class Ready:
+    """What a run is differentiated by, and the derivatives of its start."""
+
+    wanted: list[Direction]
+    programs: Programs
+    start: Tangent
+
+
+class MadeRun(TangentRun):
+    """A run that is asked for with derivatives.
+
+    ready : what it carries; None where its first row does not come at once, so that it has to be made again
+    """
+
+    ends_exactly = repeats = False
+    ways: Ways
+    ready: Ready | None = None
+
+    def at_start(self) -> Self:
+        """The same; what rows hold at the first instant, which derivatives of the start follow, is found and undone."""
+        rows = self._rows()
+        ways, held = self.ways(dict(zip(rows.record.parameter_names, self.first_parameters, strict=False)))
+        wanted = directions(rows, ways)
+        programs = programs_of(rows, wanted)
+        self.moved_with_jump = lambda: None
+        self.begin_tangents(programs.places)
+        super().at_start()
+        point = save(self)
+        if call(self, self.now, np.inf) == codes.DONE and self.kernel.n_stored:
+            self.collect()
+            rows = self._rows()
+            self.ready = Ready(wanted, programs, start_tangent(rows, programs, wanted, held))
+        restore(self, point)
+        self.history, self.of_times, self.of_rows = [], [], {}
+        if self.ready is not None:
+            some = slice(0, min(len(wanted), DIRECTIONS))
+            seed(self, Charted(programs), rows.record.q[0], self.ready.start, restitutions_of(wanted), some)
+        return self
+
+    def _rows(self) -> RunRows:
+        """The first row, as far as it is there."""
+        return RunRows(Trajectory(record_of(self, self.table[:1])))
+
+    def complete(self) -> tuple[Trajectory, str]:
+        """The same; who goes on from the end has no use for derivatives."""
+        run, problem = super().complete()
+        final = run.record.final
+        if final is None or final.memory is None:
+            return run, problem
+        memory = sealed(replace(final.memory, scheme=self.stepper.plain.memory))
+        return Trajectory(replace(run.record, final=replace(final, memory=memory))), problem
+
+
+def made_with(ways: Ways, *given: Any) -> Run:
+    """A run with derivatives as it is made, or one without where what happens between its steps stands in its way.
+
+    That is: controllers, resets, forces that jump in time, trial runs to a tolerance, and schemes in Python alone.
+    """
+    model, mechanism, manager, scheme, own = *given[:4], given[9]
+    reacts = getattr(model, "controllers", ()) or any(guard.reset is not None for guard in manager.guards)
+    if reacts or "allowed" in own or own["locate"] != "root" or own_scheme(scheme) is NO_SCHEME:
+        return Run(*given)
+    if switches_of(mechanism.equations):
+        return Run(*given)
+    run = MadeRun(*given)
+    run.ways = ways
+    return run
