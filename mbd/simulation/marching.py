@@ -148,6 +148,8 @@ class Run(RunData):
         while not ended:
             known = len(self.events)
             target, due = self.boundaries.next(self.end)
+            jump = self.boundaries.ahead
+            self.kernel.next_jump = jump.left if jump is not None else np.nan
             self._make_room(2 * self.kernel.capacity)  # before they are made: then none is lost
             status = advance(self, target, due)
             self.collect()

@@ -212,3 +212,22 @@ def test_accelerations_in_the_step_before_a_jump_are_those_before_it(scheme):
         true = exact.at(times)[name]
         jump = np.ptp(exact[name][np.abs(exact.time - 0.123) < 2e-4])
         assert np.max(np.abs(run.at(times)[name] - true)) < 2e-3 * jump
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.GeneralizedAlpha(0.5), mbd.Newmark(), mbd.RadauIIA()], ids=str)
+def test_a_push_far_shorter_than_dt_gives_its_impulse(scheme):
+    """The jerk with which a scheme starts behind the first jump is not looked for behind the second."""
+    rng = np.random.default_rng(7)
+    for width in 10.0 ** rng.uniform(-5.0, -2.2, 8):
+        begin, impulse = rng.uniform(0.2, 0.4), rng.uniform(-2.0, 2.0)
+        model = mbd.Model("pushed", gravity=(0.0, 0.0, 0.0))
+        body = mbd.PointMass("body", 1.0)
+        model.connect(mbd.Prismatic("x", model.ground.origin, body.origin))
+
+        def push(t, begin=begin, width=width, impulse=impulse):
+            return mbd.where((t > begin) & (t < begin + width), impulse / width, 0.0)
+
+        model.apply(mbd.Applied("push", body.origin, force=(push, 0.0, 0.0), arguments=("t",)))
+        run = mbd.simulate(model, mbd.assemble(model), scheme, dt=0.01, until=0.5)
+        assert abs(run["x.displacement.rate"][-1] - impulse) < 1e-9
+        assert abs(run["x.displacement"][-1] - impulse * (0.5 - begin - 0.5 * width)) < 1e-9

@@ -106,3 +106,39 @@ def test_a_block_slips_where_its_limit_comes_down_to_what_holds_it(seed):
         run = mbd.simulate(model, start, scheme, dt=dt, until=min(0.82, onset + 2.0 * dt))
         slips = [event.time for event in run.events if event.kind == "slipped"]
         assert slips and abs(slips[0] - onset) <= 1e-9, scheme
+
+
+def turned(seed):
+    """A block on a table that turns ever faster, sticking at the start, and when it slips [s]."""
+    rng = np.random.default_rng(seed)
+    spin, radius, mu = rng.uniform(0.3, 1.0), rng.uniform(0.4, 1.0), rng.uniform(0.3, 0.6)
+    model = mbd.Model("turntable")
+    table, block = mbd.RigidBody("table", 5.0, (1.0, 1.0, 1.0)), mbd.PointMass("block", rng.uniform(0.5, 2.0))
+    turn = mbd.Revolute("turn", model.ground.origin, table.origin, axis=(0.0, 1.0, 0.0))
+    model.connect(turn, mbd.Translation("flight", model.ground.origin, block.origin, axes="xyz"))
+    model.constrain(mbd.Bilateral("drive", turn, value=lambda t: spin * t * t))
+    law = mu if seed % 2 else mbd.Stribeck(mu, 0.6 * mu, 0.08)
+    touch = mbd.touchdown(block.origin, mbd.Plane((0.0, 1.0, 0.0), 0.0, frame=table.origin))
+    model.constrain(mbd.Unilateral("foot", touch, friction=law))
+    onset = brentq(lambda t: radius * np.hypot(2.0 * spin, (2.0 * spin * t) ** 2) - 9.81 * mu, 0.0, 20.0, xtol=1e-14)
+    return model, mbd.assemble(model, position={"flight.x": radius}, closed="foot"), onset
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("scheme", [mbd.RungeKutta853(), mbd.RungeKutta4(), mbd.RadauIIA()], ids=str)
+def test_friction_goes_on_where_a_block_begins_to_slide_off_a_turntable(seed, scheme):
+    """What held the block is what it slides against at first, in steps that follow a tolerance too.
+
+    Its direction settles within ‖γ‖/(μ g), far below the steps that coordinates allow.
+    """
+    model, start, onset = turned(seed)
+    run = mbd.simulate(model, start, scheme, tol=1e-5, until=onset + 0.02)
+    assert [(event.kind, round(event.time - onset, 9)) for event in run.events] == [("slipped", 0.0)]
+    rows = run.time[(run.time > onset) & (run.time < onset + 2e-3)]
+    after = run.at(np.append(rows, onset + np.geomspace(1e-6, 2e-3, 20)))
+    before = run.at(onset, side="left")
+    friction = np.stack([after["foot.friction.forward"], after["foot.friction.sideways"]])
+    held = np.array([float(before["foot.friction.forward"]), float(before["foot.friction.sideways"])])
+    apart = np.linalg.norm(friction - held[:, None], axis=0)
+    assert np.max(apart) < 0.02 * np.linalg.norm(held)
+    assert not any("so sensitive" in str(note) for note in run.stats["notes"])

@@ -103,7 +103,7 @@ def approached_end(K: Switching, t1: float) -> float:
             end = K.time + K.begun_step
         else:
             K.begun_step = 0.0
-    if K.explicit == 1 and K.adaptive == 0:
+    if K.explicit == 1:
         rate = estimated_turn_rate(K)
         K.turning_step = max(stable_turn(K) / rate, BRIEFEST * K.dt) if rate > 0.0 else 0.0
         if 0.0 < K.turning_step < end - K.time:

@@ -45,7 +45,8 @@ def estimated_turn_rate(K: Switching) -> float:
             gain = product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate)
             speed = speed_of(K, f, K.guards0, K.at_slip)
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
-            if gain < 0.0 and speed > STILL and speed > SOON * change * K.dt:  # it slows down, and is still fast
+            still_fast = speed > STILL and speed > SOON * change * max(K.dt, K.step)
+            if gain < 0.0 and still_fast:  # it slows down
                 continue
             if rows < 0:
                 evaluate(K, K.time, K.q, K.y)

@@ -44,7 +44,10 @@ Errors of some ten times were found where forces rise and fall by much of themse
 
 
 def newmark_start(K: Kernel) -> int:
-    """Memory of the scheme at a consistent state: a₀ = v̇₀ + (α_m − α_f) dt j₀, j₀ by a difference (or a₀ = v̇₀)."""
+    """Memory of the scheme at a consistent state: a₀ = v̇₀ + (α_m − α_f) dt j₀, j₀ by a difference (or a₀ = v̇₀).
+
+    What forces are behind their next jump in time tells nothing of the jerk before it.
+    """
     full = start_step(K)
     step = full / 16.0
     t = K.time
@@ -67,7 +70,7 @@ def newmark_start(K: Kernel) -> int:
     K.uneven_masses = 0
     if K.vector == 0 and status == 0 and (excuses_much(K) or is_uneven(K, K.n_active)):
         K.uneven_masses = 1
-    if unresolved(K):
+    if unresolved(K) or t < K.next_jump < t + step:
         for i in range(K.n):
             K.slope[i] = 0.0
             K.aux[i] = K.rate[i]

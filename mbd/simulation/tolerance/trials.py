@@ -52,8 +52,10 @@ class Trial:
 
     @property
     def growth(self) -> float:
-        """Global error over the sum of local errors [-]."""
-        return self.error / self.spent if self.spent > 0.0 else np.nan
+        """Global error of coordinates over the sum of local errors [-]; forces of drives have no part in it."""
+        gap = self.gap
+        error = self.error * (gap.moved / gap.size if gap is not None and gap.size > gap.moved > 0.0 else 1.0)
+        return error / self.spent if self.spent > 0.0 else np.nan
 
 
 def least_error(trial: Trial, other: Trial, names: tuple[str, ...] = ()) -> float:
