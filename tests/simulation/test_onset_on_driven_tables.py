@@ -124,7 +124,7 @@ def turned(seed):
     return model, mbd.assemble(model, position={"flight.x": radius}, closed="foot"), onset
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("scheme", [mbd.RungeKutta853(), mbd.RungeKutta4(), mbd.RadauIIA()], ids=str)
 def test_friction_goes_on_where_a_block_begins_to_slide_off_a_turntable(seed, scheme):
     """What held the block is what it slides against at first, in steps that follow a tolerance too.
@@ -132,7 +132,7 @@ def test_friction_goes_on_where_a_block_begins_to_slide_off_a_turntable(seed, sc
     Its direction settles within ‖γ‖/(μ g), far below the steps that coordinates allow.
     """
     model, start, onset = turned(seed)
-    run = mbd.simulate(model, start, scheme, tol=1e-5, until=onset + 0.02)
+    run = mbd.simulate(model, start, scheme, tol=1e-4, until=onset + 0.02)
     assert [(event.kind, round(event.time - onset, 9)) for event in run.events] == [("slipped", 0.0)]
     rows = run.time[(run.time > onset) & (run.time < onset + 2e-3)]
     after = run.at(np.append(rows, onset + np.geomspace(1e-6, 2e-3, 20)))

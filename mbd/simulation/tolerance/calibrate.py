@@ -194,7 +194,8 @@ def _outcome(trials: Sequence[Trial], best: Trial, search: Search, problem: str)
         ],
         "comparing_seconds": search.comparing,
     }  # fmt: skip
-    if not problem and best.growth > REPORTED_GROWTH and not is_rounding(best) and not search.names:
+    sensitive = best.growth > REPORTED_GROWTH and best.error >= LOOSEN_SHARE * tol  # ratios of round-off tell nothing
+    if not problem and sensitive and not is_rounding(best) and not search.names:
         stats["notes"].append(
             f"errors grew {best.growth:.2g}-fold: the motion is so sensitive that small differences decide it"
         )
