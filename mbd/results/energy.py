@@ -259,7 +259,11 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
     """
     record, after = columns.record, _after_switch(columns)
     left = np.where(after, _steps(total), 0.0)
-    hits = [event for event in record.events if event.kind == "closed" and event.impulse.any() and after[event.row]]
+    hits = [
+        event
+        for event in record.events
+        if event.kind in ("closed", "stuck") and event.impulse.any() and after[event.row]
+    ]
     together: dict[int, list[EventRecord]] = {}
     for event in hits:
         together.setdefault(event.row, []).append(event)

@@ -36,12 +36,13 @@ class EventRecord:
         around), 'event' (a user's own, or a fall)
     name : of the contact, joint or event
     impulse : impulses of the contact's own rows at the instant, normal first, pushing ≥ 0 [N s or N m s]; zeros where
-        it closed or opened without one, empty for penalty contacts, frictions and a user's event
+        it closed or opened without one, empty for penalty contacts, a user's event and frictions, unless an impulse
+        without collision stops a slide (Painlevé)
     impulses : the same by name, with those of what rolls while it is closed, and those of the contacts (and dry
         frictions in joints) that took part in its impact without closing in it; where several contacts close in one
         impact, the first event has these. Each impulse of a run is thus in one event
-    energy_loss : kinetic energy that a contact took as it closed, −½ Σ Λ (γ⁻ + γ⁺) over its rows, and its part of what
-        friction in joints and contacts closed before took in the same impact, in the ratio of these [J]
+    energy_loss : kinetic energy that a contact took as it closed or was stopped, −½ Σ Λ (γ⁻ + γ⁺) over its rows, and
+        its part of what friction in joints and contacts closed before took in the same impact, in their ratio [J]
     row : the stored row just after it (the right side); the row before is the left side
     """
 

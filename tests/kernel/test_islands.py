@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
@@ -92,5 +91,6 @@ def test_painleves_paradox_is_found_beside_bodies_that_slide_well():
     mu = [0.3, 0.3, 5.0, 0.3]
     for order in ([0, 1, 2, 3], [2, 1, 0, 3]):
         model, start = sliding(4, [mu[k] for k in order])
-        with pytest.raises(mbd.SimulationError, match=f"Painlevé.*foot {order.index(2)}"):
-            mbd.simulate(model, start, dt=1e-3, until=0.02)
+        run = mbd.simulate(model, start, dt=1e-3, until=0.02)
+        (stopped,) = (event for event in run.events if event.impulse.any())
+        assert (stopped.name, stopped.kind) == (f"foot {order.index(2)}", "stuck")

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import STICK
-from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, estimated_turn_rate, stable_turn
+from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABLE, estimated_turn_rate
 from mbd.kernel.contact.cones import (
     HELD,
     NO_DIRECTION,
@@ -105,7 +105,7 @@ def approached_end(K: Switching, t1: float) -> float:
             K.begun_step = 0.0
     if K.explicit == 1:
         rate = estimated_turn_rate(K)
-        K.turning_step = max(stable_turn(K) / rate, BRIEFEST * K.dt) if rate > 0.0 else 0.0
+        K.turning_step = max(STABLE / rate, BRIEFEST * K.dt) if rate > 0.0 else 0.0
         if 0.0 < K.turning_step < end - K.time:
             end = K.time + K.turning_step
     return end

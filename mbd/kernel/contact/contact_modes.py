@@ -7,7 +7,6 @@ from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import (
     LOG_CLOSED,
-    LOG_EVENT,
     LOG_OPENED,
     LOG_SLIPPED,
     LOG_STUCK,
@@ -18,56 +17,17 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import aim, follows, hold_directions, set_loose, set_sticking
-from mbd.kernel.contact.impact_solve import strikes
-from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Sizes, Switching
+from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
+from mbd.kernel.contact.jams import stop_slide
+from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Switching
 from mbd.kernel.stepping.restart import active_rows, capture, evaluate, row_speed, take_consistent
 
-__all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "STILL", "log_event", "room_to_log", "resolve_contact_modes"]
+__all__ = ["STILL", "resolve_contact_modes"]
 
 STILL = 1e-9
 """Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
 CLOSE_TO_STILL = 1e-7
 """The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
-NO_IMPULSE, OWN_IMPULSE, ALL_IMPULSES = 0, 1, 2
-"""Which impulses a line of the event log holds [-]."""
-
-
-def room_to_log(K: Sizes) -> int:
-    """Lines of the event log that one step with its event and two restarts may fill.
-
-    A restart logs each contact and each friction at most once. An event logs each guard at most once, as a step over a
-    singular configuration does; an impact each contact at most three times: released by one that strikes, closed, and
-    opened again.
-    """
-    return int(5 * K.n_contacts + 2 * K.n_frictions + 2 * K.n_guards + 64 * K.n_machines + K.n_impulses + 8)
-
-
-def log_event(K: Switching, kind: int, index: int, loss: float, impulses: int) -> None:
-    """One line of the event log: t, kind, index, energy loss, row of results, impulses.
-
-    impulses : NO_IMPULSE; OWN_IMPULSE, those of the rows of contact `index`; ALL_IMPULSES, with those of the rows that
-        belong to no contact that closes in this impact
-    """
-    if K.n_machines > 0:
-        if kind == LOG_CLOSED or kind == LOG_OPENED:
-            K.happened[kind * K.n_contacts + index] = 1
-        elif kind == LOG_EVENT:
-            K.happened[2 * K.n_contacts + index] = 1
-    if K.n_logged >= K.event_capacity:  # never beyond the array; the run ends with an error
-        K.n_lost += 1
-        return
-    o = K.n_logged * K.event_width
-    K.log[o] = K.time
-    K.log[o + 1] = float(kind)
-    K.log[o + 2] = float(index)
-    K.log[o + 3] = loss
-    K.log[o + 4] = float(K.n_stored)
-    for k in range(K.n_rows):
-        c = K.row_contact[k]
-        logged = impulses != NO_IMPULSE and (c == index or (impulses == ALL_IMPULSES and (c < 0 or not strikes(K, c))))
-        K.log[o + 5 + k] = 0.0 - K.impulse[k] if logged else 0.0
-    K.n_logged += 1
-    K.n_events += 1
 
 
 def resolve_contact_modes(K: Switching) -> int:
@@ -75,18 +35,16 @@ def resolve_contact_modes(K: Switching) -> int:
 
     Frictions that do not move stick or begin to slide.
     """
-    if K.n_cones > 0:
-        hold_directions(K)
-    find_slips(K)
-    evaluate(K, K.time, K.q, K.y)
-    K.impulse[: K.n_rows] = K.lam[: K.n_rows]
-    for c in range(K.n_contacts):
-        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
-        K.free[c] = 0
-        if K.kind[c] == 0:
-            if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
-                K.free[c] = 1
-    status = find_branches(K)
+    status = choose_modes(K)
+    for _ in range(K.n_contacts):
+        if status >= 0:
+            break
+        status = stop_slide(K, -1 - status)
+        if status == 0:
+            status = choose_modes(K)
+    if status < 0:
+        K.failure_index = -1 - status
+        return NO_FORCE
     if status != 0:
         return status
     take_consistent(K)
@@ -120,8 +78,26 @@ def resolve_contact_modes(K: Switching) -> int:
     return 0
 
 
+def choose_modes(K: Switching) -> int:
+    """Who pushes, sticks and slides at the velocities of now, as `find_branches` tells."""
+    if K.n_cones > 0:
+        hold_directions(K)
+    find_slips(K)
+    evaluate(K, K.time, K.q, K.y)
+    K.impulse[: K.n_rows] = K.lam[: K.n_rows]
+    for c in range(K.n_contacts):
+        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
+        K.free[c] = 0
+        if K.kind[c] == 0:
+            if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
+                K.free[c] = 1
+    return find_branches(K)
+
+
 def find_branches(K: Balance) -> int:
     """`complementarity` at the acceleration level, without slides whose normal force is unstable; a status.
+
+    −1 − c where contact c slides so that no force is consistent: an impulse stops it.
 
     From rest in a plane such a slide is consistent only where sticking is: with ``(g̈, w) = w₀ + G (p, T)`` along the
     pull, ``w dg̈/dp = det G (μ p − |T|)`` of the sticking p and T. Both end at the limit ``|T| = μ p``, where the
@@ -135,7 +111,7 @@ def find_branches(K: Balance) -> int:
             break
         if K.free[c] == 0 or K.active[c] == 0 or parted == K.n_contacts or not slides_from_rest(K, c):
             K.failure_index = c
-            return NO_FORCE
+            return -1 - c if status == NO_IMPACT and K.closed[c] == 1 and K.strategy == 0 else NO_FORCE
         K.active[c] = 0
         parted += 1
         status = complementarity(K, 0)

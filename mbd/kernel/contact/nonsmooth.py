@@ -17,7 +17,8 @@ from __future__ import annotations
 from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import follows
-from mbd.kernel.contact.contact_modes import NO_IMPULSE, STILL, log_event
+from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
+from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.contact.nonsmooth_cones import hold_together, release, turned_in_plane
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.events.switching import close_by_impact, mark_touching

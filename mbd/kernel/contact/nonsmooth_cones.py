@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import PULL
 from mbd.kernel.contact.cone_contacts import all_hold
-from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, estimated_turn_rate, stable_turn
+from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABLE, estimated_turn_rate
 from mbd.kernel.contact.cones import HELD, aim_as_pulled, along, away, friction_size, leads_group, set_hold, speed_of
 from mbd.kernel.contact.contact_modes import STILL
 from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
@@ -28,7 +28,7 @@ def hold_for_step(K: Switching, h: float) -> None:
         if leads_group(K, f) and K.slip[f] != 0.0:
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
             set_hold(K, f, HELD if MIN_STEPS_TO_REST * h * change > speed_of(K, f, K.guards0, K.at_slip) else 0.0)
-    if K.explicit == 1 and h * estimated_turn_rate(K) > stable_turn(K):
+    if K.explicit == 1 and h * estimated_turn_rate(K) > STABLE:
         hold_all(K)
 
 

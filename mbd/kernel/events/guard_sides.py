@@ -15,7 +15,7 @@ before, ġ₀:
 from __future__ import annotations
 
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, LOG_EVENT, STICK
-from mbd.kernel.contact.contact_modes import NO_IMPULSE, log_event
+from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.events.guard_round_off import guard_round_off
 from mbd.kernel.events.guards import gap_tolerance, is_waiting, is_watched
 from mbd.kernel.records import Events, Guards, Switching

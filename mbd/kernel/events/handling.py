@@ -15,7 +15,7 @@ from mbd.kernel.codes import (
     OPEN_PULL,
     WATCH,
 )
-from mbd.kernel.contact.contact_modes import NO_IMPULSE, log_event
+from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.contact.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.events.crowding import count_impact
 from mbd.kernel.events.guard_sides import find_crossings, find_passed, is_at_event, keep_at_zero, log_crossings

@@ -9,7 +9,7 @@ marks of the next one, until a round takes none.
 from __future__ import annotations
 
 from mbd.kernel.codes import ENDLESS_TRANSITIONS, EPS, LOG_EVENT, LOG_OPENED
-from mbd.kernel.contact.contact_modes import NO_IMPULSE, log_event
+from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.events.guard_round_off import guard_round_off
 from mbd.kernel.events.guards import watch
 from mbd.kernel.records import Events, Guards, Switching

@@ -11,7 +11,7 @@ from __future__ import annotations
 from mbd.kernel.algebra.orthogonal import square
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CROSS, LOG_EVENT
-from mbd.kernel.contact.contact_modes import NO_IMPULSE, log_event
+from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.events.guard_substeps import copy_ends, interpolate_candidate, put_candidate_back
 from mbd.kernel.events.guards import judge_user
 from mbd.kernel.records import DependentRows, Kernel, SingularSteps, Switching

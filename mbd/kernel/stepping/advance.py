@@ -17,7 +17,7 @@ from mbd.kernel.contact.cone_steps import (
     slides_at_first,
     slides_on,
 )
-from mbd.kernel.contact.contact_modes import room_to_log
+from mbd.kernel.contact.contact_log import room_to_log
 from mbd.kernel.contact.nonsmooth_cones import hold_for_step
 from mbd.kernel.events.guard_sides import settle_sides
 from mbd.kernel.events.transitions import find_due, has_happened, is_due, settle_fresh, take_transitions

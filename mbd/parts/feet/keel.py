@@ -33,8 +33,8 @@ def keel_foot(
     for end-loaded, large-deflection beams in compliant mechanisms, J. Mech. Design 117 (1995) 156: the end's path is
     right to 0.5 % up to a slope of about 60°.
 
-    A rigid heel beside a light blade may strike such that no forces let both points push, or that friction has none
-    that is consistent (Painlevé); a run ends there and says so. With a `Penalty` at the heel, a cushion, it goes on.
+    A rigid heel beside a light blade may strike such that no forces let both points push; a run ends there and says
+    so. With a `Penalty` at the heel, a cushion, it goes on.
 
     The blade's bending is the joint '<name> keel', the contacts are '<name> heel' and '<name> toe'.
 

@@ -12,6 +12,7 @@ __all__ = ["EventLog", "Impulses"]
 
 KINDS = ("closed", "opened", "event", "stuck", "slipped", "pushed")
 """Kinds of events by their numbers in the log."""
+STUCK = KINDS.index("stuck")
 FIRST = 5
 """Place of the first impulse in a line: time, kind, number, energy loss and row come before."""
 
@@ -39,6 +40,7 @@ class EventLog:
             names,
             [each.name for each in manager.impulses],
         )
+        self._contacts = [friction.contact for friction in manager.frictions]
         self._bearers: list[Bearer] = [(contact.name, _place(contact.rows)) for contact in manager.contacts]
         frictions = manager.frictions
         joints = {f.group or (k,): f.name for k, f in enumerate(frictions) if f.contact < 0}
@@ -51,9 +53,11 @@ class EventLog:
         for number, (time, code, index, loss, row) in enumerate(lines[:, :FIRST].tolist()):
             kind, who = int(code), int(index)
             name, own, all_of_them = self._names[kind][who], impulses[number, :0], NONE
-            if kind < 2:
-                own = impulses[number, bearers[who][1]]
-                all_of_them = Impulses(bearers, who, impulses[number])
+            struck = kind == STUCK and bool(impulses[number].any())  # an impulse without collision
+            bearer = self._contacts[who] if struck else who
+            if kind < 2 or struck:
+                own = impulses[number, bearers[bearer][1]]
+                all_of_them = Impulses(bearers, bearer, impulses[number])
             found.append(EventRecord(time, KINDS[kind], name, own, loss, stored + int(row), all_of_them))
         return found
 

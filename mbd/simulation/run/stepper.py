@@ -17,7 +17,7 @@ from mbd.integrators.base import Integrator
 from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
 from mbd.kernel import codes
 from mbd.kernel.contact.active_set import ActiveSetManager
-from mbd.kernel.contact.contact_modes import room_to_log
+from mbd.kernel.contact.contact_log import room_to_log
 from mbd.kernel.records import PROGRAMS, Kernel
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.kernel.translation.interpreted import InterpretedScheme
