@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["UNKNOWN", "available", "size_in_words"]
+__all__ = ["ASSUMED_BYTES", "available", "size_in_words"]
 
-UNKNOWN = 4.0e9
+ASSUMED_BYTES = 4.0e9
 """Taken for the free memory where the system does not tell it [bytes]."""
 PROC, CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
 """Where Linux tells what it has, and what it allows to groups of processes."""
@@ -31,7 +31,7 @@ def _of_system() -> float:
                 return 1024.0 * float(line.split()[1])
         return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (OSError, ValueError, AttributeError):
-        return UNKNOWN
+        return ASSUMED_BYTES
 
 
 def _of_groups() -> float:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 __all__ = ["Progress", "counted", "in_notebook", "progress_bar", "run_bar", "share_bar", "trial_bar"]
 
-LATE = 3.0
+BAR_DELAY = 3.0
 """Seconds after which a slow run that nobody wanted to watch shows a bar all the same."""
 
 Progress = Callable[[float, float], None]
@@ -45,7 +45,7 @@ def run_bar(wanted: Any, slow: bool, begin: float, end: float) -> Iterator[Progr
     """Who is informed how far a run is.
 
     wanted : a function, which is given the time and the end; True for a bar on a terminal or in a notebook; 'late' for
-        one after `LATE` seconds where the run is `slow`; else nobody
+        one after `BAR_DELAY` seconds where the run is `slow`; else nobody
     begin, end : of the run [s]
     """
     if callable(wanted):
@@ -58,7 +58,7 @@ def run_bar(wanted: Any, slow: bool, begin: float, end: float) -> Iterator[Progr
     bar, began = (_Bar() if find_spec("tqdm") else _Line()), perf_counter()
 
     def show(t: float, until: float) -> None:
-        if bar.shown or not late or perf_counter() - began > LATE:
+        if bar.shown or not late or perf_counter() - began > BAR_DELAY:
             bar.show(t - begin, end - begin, perf_counter() - began)
 
     try:

@@ -101,7 +101,7 @@ class Terminal:
 @pytest.mark.parametrize(("late", "shown"), [(0.0, True), (1e9, False)])
 def test_a_slow_run_shows_a_bar_after_a_while(monkeypatch, library, late, shown):
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    monkeypatch.setattr(progress, "LATE", late)
+    monkeypatch.setattr(progress, "BAR_DELAY", late)
     if library is None:
         monkeypatch.setattr(progress, "find_spec", lambda name: None)
     model = ball()

@@ -38,7 +38,7 @@ from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.joints.orientations import ORTHONORMAL_ATOL
-from mbd.kernel.stepping.begin_run import BELOW
+from mbd.kernel.stepping.begin_run import MAX_START_DEPTH
 from mbd.notes import doubt
 from mbd.state import State, of_model
 
@@ -330,7 +330,7 @@ def _below(work: Posture, opened: set[str]) -> list[str]:
     for c, contact in enumerate(work.manager.contacts):
         named_off = isinstance(contact.only_while, str) and contact.only_while not in work.manager.mode(work.flags)
         off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
-        if values[c] < -BELOW and not work.flags[c] and contact.name not in opened and not off:
+        if values[c] < -MAX_START_DEPTH and not work.flags[c] and contact.name not in opened and not off:
             on = "let it push" if contact.kind == "penalty" else "set it on the surface"
             inside = (
                 f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} {_beyond(contact.unit)}, "
@@ -361,7 +361,7 @@ def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
     for c, contact in enumerate(work.manager.contacts):
         lifted = values[c] > OPEN_GAP
         trailing = bool(contact.when) or contact.name in opened
-        if not work.flags[c] and (lifted or (not trailing and values[c] > -BELOW)):
+        if not work.flags[c] and (lifted or (not trailing and values[c] > -MAX_START_DEPTH)):
             armed.add(contact.name)
     return frozenset(armed)
 

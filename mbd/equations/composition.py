@@ -21,7 +21,7 @@ __all__ = [
     "own_program",
 ]  # fmt: skip
 
-MANY = 8
+MIN_COMPOSED_CONTACTS = 8
 """Contacts from which on modes are composed [-]."""
 MATRIX, RIGHT, BOTTOM, RESIDUAL, VALUE, RATE, TURNING = range(7)
 """Blocks of the outputs of `programs.newton`: S, ∂r/∂λ, B̃, r, h, ḣ, ∂ḣ/∂x."""
@@ -36,7 +36,7 @@ def composes(equations: Equations) -> bool:
     Laws that read forces of contacts join contacts, so that there are none.
     """
     count, n = len(equations.contacts), equations.n_v + equations.n_z
-    if count < MANY or n <= programs.MAX_UNKNOWNS or equations.held_forces:
+    if count < MIN_COMPOSED_CONTACTS or n <= programs.MAX_UNKNOWNS or equations.held_forces:
         return False
     shared = 0  # entries of S that contacts may fill
     for contact in equations.contacts:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Branch", "branch"]
 
-FIRST, LARGEST, SMALLEST = 0.02, 0.1, 1e-6
+FIRST_DISTANCE, MAX_DISTANCE, MIN_DISTANCE = 0.02, 0.1, 1e-6
 """First, largest and least distance of two points in (c, p/σ) [-]."""
 MIN_DISTANCE_RATIO = 1e-3
 """Part of the first distance from which a test function that jumps is no reason for a shorter one [-]."""
@@ -207,7 +207,7 @@ def branch(
         first = _turned(first)
     curve, special, stopped = [first], list[SpecialPoint](), ""
     margins = _margins(given, watched, first)
-    ds = FIRST if step is None else float(step)
+    ds = FIRST_DISTANCE if step is None else float(step)
     while len(curve) < steps:
         last = curve[-1]
         made = _next(given, last, ds)
@@ -224,7 +224,7 @@ def branch(
         new, taken, quick = made
         beyond = (new.value - to) * toward >= 0.0
         between, complete = special_points(given, last, new, taken)
-        if not (complete or changed_events(last.events, new.events)) and taken > MIN_DISTANCE_RATIO * FIRST:
+        if not (complete or changed_events(last.events, new.events)) and taken > MIN_DISTANCE_RATIO * FIRST_DISTANCE:
             ds = 0.5 * taken
             continue
         if changed_events(last.events, new.events):
@@ -240,7 +240,7 @@ def branch(
             stopped = f"reached {parameter} = {to:g}"
             break
         curve.append(new)
-        ds = min(taken * (1.5 if quick else 1.0), LARGEST)
+        ds = min(taken * (1.5 if quick else 1.0), MAX_DISTANCE)
     stopped = stopped or f"ended after {len(curve)} points"
     return Branch(gait.name, parameter, tuple(curve), tuple(special), stopped, gait, given)
 
@@ -259,8 +259,8 @@ def _begun(
     faults += [] if is_finite_number(to) else [f"to must be a finite number, not {shown(to)}"]
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 2:
         faults.append(f"steps must be a whole number from 2 on, not {shown(steps)}")
-    if step is not None and not (is_finite_number(step) and SMALLEST <= step <= 1.0):
-        faults.append(f"step must be a number from {SMALLEST:g} to 1, not {shown(step)}")
+    if step is not None and not (is_finite_number(step) and MIN_DISTANCE <= step <= 1.0):
+        faults.append(f"step must be a number from {MIN_DISTANCE:g} to 1, not {shown(step)}")
     if friction is not None and not (is_finite_number(friction) and friction > 0.0):
         faults.append(f"friction must be a positive coefficient or None, not {shown(friction)}")
     if faults:
@@ -292,7 +292,7 @@ def _turned(point: BranchPoint) -> BranchPoint:
 def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoint, float, bool] | Forbidden | str:
     """The next point, its distance, and whether it came quickly; why there is none."""
     why = ""
-    while ds >= SMALLEST:
+    while ds >= MIN_DISTANCE:
         corrected = given.corrected(last, last.tangent, ds)
         if isinstance(corrected, Corrected):
             try:

@@ -10,7 +10,7 @@ from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation,
 __all__ = ["Newmark"]
 
 
-LARGEST = 10.0
+MAX_COEFFICIENT = 10.0
 """Coefficient above which the scheme is none: published ones have γ ≤ 3/2 and β ≤ 1 [-]."""
 
 
@@ -46,10 +46,10 @@ class Newmark(NewmarkFamily):
         tolerance: float = DEFAULT_TOLERANCE,
     ) -> None:
         good = is_number(beta) and is_number(gamma)
-        if not good or not 0.5 <= gamma <= LARGEST or not 0.0 < beta <= LARGEST:
+        if not good or not 0.5 <= gamma <= MAX_COEFFICIENT or not 0.0 < beta <= MAX_COEFFICIENT:
             raise CapabilityError(
-                f"Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, neither above {LARGEST:g}, "
-                f"not beta={shown(beta)}, gamma={shown(gamma)}; Newmark(0.25, 0.5) is the trapezoidal rule"
+                f"Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, "
+                f"neither above {MAX_COEFFICIENT:g}, not beta={shown(beta)}, gamma={shown(gamma)}; Newmark(0.25, 0.5) is the trapezoidal rule"
             )
         super().__init__(formulation, start, tolerance, beta=float(beta), gamma=float(gamma))
 

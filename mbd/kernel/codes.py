@@ -22,7 +22,7 @@ DOUBTFUL_START, NEEDS_PYTHON = 40, 41
 """Kinds of fired guards."""
 LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED, LOG_PUSHED = range(6)
 """Kinds in the log."""
-UNKNOWN = -9
+NOT_KNOWN_YET = -9
 """State of a friction before the first restart, in `was`: what it begins with is no event [-]."""
 PULL = 1e-9
 """Pull of a contact, relative to the forces, that is more than round-off [-]."""

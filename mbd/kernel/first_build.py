@@ -18,7 +18,7 @@ from mbd.compile.llvm import tag_key
 __all__ = ["build", "is_allowed", "keep", "start_build"]
 
 
-PAUSE = 0.5
+POLL_SECONDS = 0.5
 """Seconds between two looks at whether another process has built the kernel."""
 
 
@@ -72,7 +72,7 @@ def keep(tag: str, make: Callable[[], bytes]) -> None:
         try:
             mark.touch(mode=0o600, exist_ok=False)
         except FileExistsError:
-            time.sleep(PAUSE)
+            time.sleep(POLL_SECONDS)
             continue
         try:
             if store.load(key, lasting=True) is None:  # nobody has built it since the last look

@@ -23,8 +23,8 @@ from mbd.equal import REST_SPEED, ROUND_OFF_RTOL
 from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.equations.magnitudes import magnitudes
-from mbd.kernel.algebra.redundancy import LEAST_SHARE
-from mbd.kernel.stepping.restart import MAX_LOADS
+from mbd.kernel.algebra.redundancy import MIN_LIMIT_SHARE
+from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
@@ -119,7 +119,7 @@ class Balance:
         """The same in one mode; `mine` are the places of the results."""
         held = self.rows_in(mode)
         slides = bool(np.any(np.abs(rows.phase) == 1)) or self.loads_act
-        turns = MAX_LOADS if self.follows or (held.depend and self.equations.frictions) else 1
+        turns = MAX_LOAD_ITERATIONS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):
             M, f, R, B, _, _, bias, limits = self.terms_at(replace(rows, lam=lam))
@@ -165,7 +165,7 @@ class Balance:
             friction = self.equations.rows[row].friction
             if friction >= 0:
                 part = np.divide(limits[:, friction], largest, out=np.ones_like(largest), where=largest > 0.0)
-                weight[:, place] = np.maximum(part, LEAST_SHARE)
+                weight[:, place] = np.maximum(part, MIN_LIMIT_SHARE)
         return weight
 
     def terms_at(self, rows: Rows) -> tuple[Any, ...]:

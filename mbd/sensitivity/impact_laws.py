@@ -13,7 +13,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
-from mbd.kernel.contact.impact import APPROACH, MOST_BLOWS
+from mbd.kernel.contact.impact import APPROACH_RTOL, MAX_IMPACTS
 from mbd.sensitivity.motion import Mode, Motion
 from mbd.sensitivity.phases import BRANCH_RTOL, DERIVATIVE_RTOL, Law, OneSided, Unknown, chosen, speeds, undecided
 from mbd.sensitivity.programs import Programs
@@ -82,13 +82,13 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
     )  # fmt: skip
     size = np.zeros(len(before.tangent.t))
     normal = {c: contacts[c].rows[0] for c in sorted(who.touched)}
-    for _ in range(MOST_BLOWS):
+    for _ in range(MAX_IMPACTS):
         speed, of_speed, terms = speeds(programs, motion, mode)
         size = np.maximum(size, np.max(terms[list(normal.values())], axis=0, initial=0.0))
         approach = {c: abs(speed[k]) if c in held else -speed[k] for c, k in normal.items()}
         most = max(approach.values(), default=0.0)
         fastest = max(fastest, most)
-        if most <= APPROACH * fastest or most < 1e-14:
+        if most <= APPROACH_RTOL * fastest or most < 1e-14:
             edges = [
                 c for c, k in normal.items()
                 if c not in held and abs(speed[k]) <= BRANCH_RTOL * fastest
@@ -105,7 +105,7 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
         e = {normal[c]: contacts[c].restitution for c in free}
         law = Law(held, free, e, {normal[c]: who.of_e[c] for c in free if c in who.of_e})
         motion = chosen(programs, motion, mode, law, who.trivial).motion
-    raise Unknown(f"its sequence has more than {MOST_BLOWS} impacts")
+    raise Unknown(f"its sequence has more than {MAX_IMPACTS} impacts")
 
 
 def _refuse_ties(names: Sequence[str], changes: Sequence[Vector], terms: Vector) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-from mbd.kernel.contact.complementarity import ROUND_OFF
+from mbd.kernel.contact.complementarity import LAW_RTOL
 from mbd.sensitivity.balance import independent, saddle
 from mbd.sensitivity.motion import Mode, Motion, solved
 from mbd.sensitivity.programs import Programs
@@ -210,7 +210,7 @@ def _faults(programs: Programs, phase: Phase, mode: Mode, choice: Choice, law: L
     found, edges = list[tuple[str, int]](), list[str]()
     for kind, k, value, change, size, sizes in _slacks(programs, phase, mode, choice, law):
         equations = programs.equations
-        if value < -ROUND_OFF * size:
+        if value < -LAW_RTOL * size:
             found.append((kind, k))
         elif abs(value) <= BRANCH_RTOL * size and np.max(np.abs(change), initial=0.0) > DERIVATIVE_RTOL * sizes:
             edges.append(equations.contacts[k].name if kind == "contact" else equations.frictions[k].name)

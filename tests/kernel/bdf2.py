@@ -18,7 +18,7 @@ from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.iteration import predict
 from mbd.kernel.schemes.newmark import newmark_accept, newmark_error, newmark_resume, newmark_start
-from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
+from mbd.kernel.schemes.newton import BAD_FACTORS, PIVOTS_SEARCHED, solve_step
 from mbd.kernel.singular.newmark_step import singular_newmark_step
 
 LONGEST = 2.0
@@ -65,9 +65,9 @@ def step(K: Kernel, h: float, t1: float) -> int:
         if two:
             formula(K, w * w / (1.0 + 2.0 * w), c_C)
         status = solve_step(K, h, t1, c_C, c_C * c_C, tangents)
-        if status != UNSOUND:
+        if status != BAD_FACTORS:
             return status
-        tangents = SEARCHED
+        tangents = PIVOTS_SEARCHED
 
 
 def formula(K: Kernel, b: float, c: float) -> None:

@@ -10,7 +10,7 @@ from mbd.kernel import codes
 from mbd.kernel.contact import complementarity as solver
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cone_contacts import solve_cones
-from mbd.kernel.contact.cone_problem import CONE_TOLERANCE, cone_places
+from mbd.kernel.contact.cone_problem import CONE_RTOL, cone_places
 from mbd.kernel.records import TABLE, Kernel
 
 seeds = st.integers(0, 2**32 - 1)
@@ -236,7 +236,7 @@ def test_contacts_under_given_impulses_choose_whether_they_part(only_cones, seed
 
 # where they cannot --------------------------------------------------------------------------------------------------
 def solved(problem):
-    return solve_cones(problem.K, 0, CONE_TOLERANCE)
+    return solve_cones(problem.K, 0, CONE_RTOL)
 
 
 @pytest.mark.parametrize("level", [0, 1])
@@ -257,7 +257,7 @@ def test_masses_that_only_contacts_determine_are_left_to_newtons_method():
 def test_friction_that_follows_a_pin_is_left_to_newtons_method():
     pin = Problem(np.eye(2), [0.3, 1.0], N=[[0, 1]], T=[[1, 0]], mu=[0.1])
     assert solved(pin) == 1
-    assert solve_cones(Kernel(**vars(pin.K) | {"loaded": 1}), 0, CONE_TOLERANCE) == 0
+    assert solve_cones(Kernel(**vars(pin.K) | {"loaded": 1}), 0, CONE_RTOL) == 0
 
 
 def test_tangents_without_limit_stick_while_their_contact_pushes(only_cones):

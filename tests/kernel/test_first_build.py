@@ -52,7 +52,7 @@ def test_a_level_that_was_asked_for_and_a_cache_that_keeps_nothing_have_the_kern
 
 def test_two_processes_build_the_kernel_once(monkeypatch, tmp_path):
     monkeypatch.setenv("MBD_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(first_build, "PAUSE", 0.01)
+    monkeypatch.setattr(first_build, "POLL_SECONDS", 0.01)
     monkeypatch.setattr(os, "nice", lambda steps: 0, raising=False)
     monkeypatch.setattr(build, "kernel_text", lambda: "text")
     made: list[str] = []

@@ -11,8 +11,8 @@ from mbd.compile import orders
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.orders import flat_order
 from mbd.kernel.algebra.ordered import (
-    LOSS_AT_ONCE,
-    LOSS_OF_STEP,
+    DIRECT_PIVOT_RTOL,
+    NEWTON_PIVOT_RTOL,
     OF_ACCELERATIONS,
     OF_TANGENT,
     SYMMETRIC,
@@ -79,13 +79,13 @@ def test_sound_factors_solve_what_dense_ones_do(n, m, seed):
     K = kernel(A, n, m)
     o = order_at(K, m)
     assert o == 1
-    if factor_ordered(K, A.ravel(), o, OF_TANGENT, LOSS_AT_ONCE):
+    if factor_ordered(K, A.ravel(), o, OF_TANGENT, DIRECT_PIVOT_RTOL):
         assert_solves(K, A, rng)
         assert weakest_pivot(K) > 0.0 or m == 0
     acc = accelerations(M, R, B)
-    if factor_ordered(K, acc, o, OF_ACCELERATIONS, LOSS_AT_ONCE):
+    if factor_ordered(K, acc, o, OF_ACCELERATIONS, DIRECT_PIVOT_RTOL):
         assert_solves(K, A, rng)
-    if factor_ordered(K, acc, o, SYMMETRIC, LOSS_AT_ONCE):
+    if factor_ordered(K, acc, o, SYMMETRIC, DIRECT_PIVOT_RTOL):
         assert_solves(K, matrix(M, B.T, B), rng)
 
 
@@ -94,9 +94,9 @@ def test_matrices_of_mechanisms_of_like_masses_are_sound_in_their_order():
         rng, n = np.random.default_rng(seed), 4 + seed % 13
         M, R, B = saddle(rng, n, min(seed % 7, n // 2))
         K = kernel(matrix(M, R, B), n, len(B))
-        assert factor_ordered(K, matrix(M, R, B).ravel(), 1, OF_TANGENT, LOSS_AT_ONCE)
+        assert factor_ordered(K, matrix(M, R, B).ravel(), 1, OF_TANGENT, DIRECT_PIVOT_RTOL)
         for source in (OF_ACCELERATIONS, SYMMETRIC):
-            assert factor_ordered(K, accelerations(M, R, B), 1, source, LOSS_AT_ONCE)
+            assert factor_ordered(K, accelerations(M, R, B), 1, source, DIRECT_PIVOT_RTOL)
 
 
 @given(n=st.integers(4, 12), m=st.integers(1, 4), seed=st.integers(0, 2**32 - 1))
@@ -105,7 +105,7 @@ def test_symmetric_saddles_of_definite_masses_need_no_search(n, m, seed):
     M, _, B = saddle(rng, n, min(m, n // 2))
     A = matrix(M, B.T, B)
     K = kernel(A, n, len(B))
-    assert factor_ordered(K, A.ravel(), 1, OF_TANGENT, LOSS_OF_STEP)
+    assert factor_ordered(K, A.ravel(), 1, OF_TANGENT, NEWTON_PIVOT_RTOL)
     assert_solves(K, A, rng)
 
 
@@ -116,7 +116,7 @@ def test_rows_that_nearly_depend_on_each_other_are_not_sound(n, seed, apart):
     B[2] = B[0] - B[1] + apart * rng.normal(size=n) * (B[0] != 0.0)
     A = matrix(M, B.T, B)
     K = kernel(A, n, 3)
-    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, LOSS_OF_STEP)
+    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, NEWTON_PIVOT_RTOL)
     assert K.order_start == 0
 
 
@@ -127,7 +127,7 @@ def test_a_pivot_that_is_no_number_or_nothing_is_not_sound(wrong):
     K = kernel(A, 6, 2)
     A[3, 3] = wrong
     A[3, :3] = A[:3, 3] = 0.0
-    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, LOSS_OF_STEP)
+    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, NEWTON_PIVOT_RTOL)
 
 
 def test_an_order_is_for_its_own_rows_only():

@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.equations.programs import balance_with
-from mbd.kernel.algebra.redundancy import LEAST_SHARE
+from mbd.kernel.algebra.redundancy import MIN_LIMIT_SHARE
 from tests.simulation.frictions import check_friction
 from tests.simulation.mechanisms import G
 
@@ -100,7 +100,7 @@ def test_it_halts_on_a_slope_and_its_runners_then_share_by_their_limits(scheme, 
         check_friction(sled(slope=0.2), run)
     used = [run[f"runner {k}.friction"][-1] / (COEFFICIENTS[k] * run[f"runner {k}.force"][-1]) for k in range(3)]
     assert used == pytest.approx([used[0]] * 3, abs=1e-9)
-    assert LEAST_SHARE < abs(used[0]) < 1.0
+    assert MIN_LIMIT_SHARE < abs(used[0]) < 1.0
 
 
 def test_machine_code_and_plain_python_agree():

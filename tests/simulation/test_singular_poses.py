@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.kernel.singular.step_pairs import LONGER, SHORTER
+from mbd.kernel.singular.step_pairs import LONG_PART, SHORT_PART
 from tests.simulation.singular_linkages import Passage, four_bars, kite, platform, slider_crank, stopped
 
 MECHANISMS = {
@@ -152,8 +152,8 @@ def test_the_error_over_dt_squared_does_not_depend_on_where_the_grid_meets_the_p
 
 
 def test_a_pair_of_steps_lasts_half_a_step_less_and_errs_like_whole_steps():
-    assert abs(LONGER + SHORTER - 1.5) < 1e-15
-    assert abs(LONGER**3 + SHORTER**3 - 1.5) < 1e-15
+    assert abs(LONG_PART + SHORT_PART - 1.5) < 1e-15
+    assert abs(LONG_PART**3 + SHORT_PART**3 - 1.5) < 1e-15
 
 
 def paired_run(**settings):
@@ -165,7 +165,7 @@ def test_steps_of_a_pair_have_their_sizes_and_whole_ones_follow():
     run = paired_run(until=2.0)
     sizes = np.diff(run.time) / 5e-4
     (first, *_), short = np.flatnonzero(np.abs(sizes - 1.0) > 1e-6), run.stats["shortened"]
-    np.testing.assert_allclose(sizes[first - 1 : first + 3], [1.0, SHORTER, LONGER, 1.0], rtol=1e-9)
+    np.testing.assert_allclose(sizes[first - 1 : first + 3], [1.0, SHORT_PART, LONG_PART, 1.0], rtol=1e-9)
     assert short >= 1
 
 

@@ -71,7 +71,7 @@ def test_steps_become_long_again_where_a_contact_rests():
     start = mbd.assemble(model, position={"flight.y": 1e-3})
     run = mbd.simulate(model, start, dt=0.05, until=20.0)
     assert run["mat.force"][-1] == pytest.approx(2.0 * 9.81, rel=1e-6)
-    assert run.stats["steps"] < 20.0 / 0.05 + 40 * contact_step.WINDOW
+    assert run.stats["steps"] < 20.0 / 0.05 + 40 * contact_step.WINDOW_STEPS
 
 
 def test_a_contact_far_too_stiff_for_the_step_is_refused_by_name():

@@ -25,7 +25,7 @@ from mbd.state import State
 
 __all__ = ["Ball", "ball_of"]
 
-LARGEST, SMALLEST = 0.1, 1e-6
+MAX_RADIUS, MIN_RADIUS = 0.1, 1e-6
 """Radii that are tried, in the W-norm of coordinates of the section [m, rad, m/s, rad/s]."""
 INSIDE = (1.0, 0.5, 0.1)
 """Radii of the samples over that of the ball [-]."""
@@ -73,7 +73,7 @@ def ball_of(name: str, gait: LimitCycle, walked: Walked) -> Ball:
     Raises
     ------
     ModelError
-        for a gait that attracts nothing, and one round which no ball of `SMALLEST` holds.
+        for a gait that attracts nothing, and one round which no ball of `MIN_RADIUS` holds.
     """
     if not gait.success or gait.map_derivative is None:
         raise ModelError(f"{name} is no gait: {gait.outcome}")
@@ -102,14 +102,14 @@ def ball_of(name: str, gait: LimitCycle, walked: Walked) -> Ball:
     random = np.random.default_rng(7).normal(size=(48, size))
     directions = np.vstack([axes.T, -axes.T, random])
     directions /= np.sqrt(np.einsum("ni,ij,nj->n", directions, W, directions))[:, np.newaxis]
-    radius, base = LARGEST, Ball(gait.chart, np.array(W, dtype=np.float64), 0.0, 0, 0.0)
-    while radius >= SMALLEST:
+    radius, base = MAX_RADIUS, Ball(gait.chart, np.array(W, dtype=np.float64), 0.0, 0, 0.0)
+    while radius >= MIN_RADIUS:
         ratio = _worst(base, gait, directions, radius, walked)
         if ratio <= wanted:
             return replace(base, radius=radius, samples=len(directions) * len(INSIDE), contraction=ratio)
         radius *= 0.5
     raise ModelError(
-        f"{name}: no ball round it holds walks, down to a radius of {SMALLEST:g}; the step dt may be too coarse for "
+        f"{name}: no ball round it holds walks, down to a radius of {MIN_RADIUS:g}; the step dt may be too coarse for "
         "the gait, which was found with another one: take the dt of the gait"
     )
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from mbd.kernel.records import Model, Reals
 
-__all__ = ["LEAST_INERTIA", "counted_inertia", "least_inertia"]
+__all__ = ["MIN_INERTIA_SHARE", "counted_inertia", "least_inertia"]
 
-LEAST_INERTIA = 1e-8
+MIN_INERTIA_SHARE = 1e-8
 """Share of the largest inertia of its unit that a motion counts with at least, where rows are compared [-]."""
 
 
@@ -23,7 +23,7 @@ def least_inertia(K: Model, S: Reals, first: int, stride: int, unit: int) -> flo
     for j in range(K.n_v):
         if K.unit[j] == unit:
             largest = max(largest, abs(S[first + stride * j]))
-    return LEAST_INERTIA * largest
+    return MIN_INERTIA_SHARE * largest
 
 
 def counted_inertia(K: Model, j: int, inertia: float, least_mass: float, least_turning: float) -> float:

@@ -13,7 +13,7 @@ __all__ = [
     "eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes",
 ]  # fmt: skip
 
-MOST_ROUND_OFF = 1e-12
+PIVOT_RTOL = 1e-12
 """Part of the entries that a pivot came from which is more than round-off in any size of matrix [-]."""
 
 
@@ -90,7 +90,7 @@ def solve(A: Reals, n: int, pivots: Integers, b: Reals) -> None:
 
 def round_off(n: int) -> float:
     """What elimination of n unknowns may leave of a pivot that is zero, of the entries that it came from."""
-    return min(MOST_ROUND_OFF, 8.0 * EPS * (n + 8.0))
+    return min(PIVOT_RTOL, 8.0 * EPS * (n + 8.0))
 
 
 def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:

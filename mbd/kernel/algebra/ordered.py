@@ -13,17 +13,17 @@ from mbd.kernel.records import Equations, Motion, Reals
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = [
-    "HEAD", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt", "solve_ordered",
-    "weakest_pivot",
+    "HEADER_SIZE", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt",
+    "solve_ordered", "weakest_pivot",
 ]  # fmt: skip
 
-HEAD = 3
+HEADER_SIZE = 3
 """Numbers before the lists of an order."""
 OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)
 """Where values come from: the matrix of a step, row-major; the program `accelerations`; that with Bᵀ in place of R."""
-LOSS_OF_STEP = 1e-8
+NEWTON_PIVOT_RTOL = 1e-8
 """Part of its terms that a pivot must keep where Newton's method goes on with what is left [-]."""
-LOSS_AT_ONCE = 1e-4
+DIRECT_PIVOT_RTOL = 1e-4
 """The same where a solution is taken as it is: at most four digits of sixteen are lost [-]."""
 
 
@@ -36,7 +36,7 @@ def order_at(K: Motion, m: int) -> int:
     if o == 0 or K.orders[o + 1] != m:
         return 0
     for k in range(m):
-        if K.orders[o + HEAD + k] != K.rows[k]:
+        if K.orders[o + HEADER_SIZE + k] != K.rows[k]:
             return 0
     return int(o)
 
@@ -48,7 +48,7 @@ def factor_ordered(K: Equations, A: Reals, o: int, source: int, loss: float) -> 
     """
     size = K.orders[o]
     entries = K.orders[o + 2]
-    o_row = o + HEAD + K.orders[o + 1]
+    o_row = o + HEADER_SIZE + K.orders[o + 1]
     o_start = o_row + 2 * size
     o_own = o_start + size + 1
     o_turn = o_own + size
@@ -107,7 +107,7 @@ def weakest_pivot(K: Equations) -> float:
     """Largest inverse pivot of multipliers among the factors at hand."""
     o = K.order_start
     size = K.orders[o]
-    o_row = o + HEAD + K.orders[o + 1]
+    o_row = o + HEADER_SIZE + K.orders[o + 1]
     o_own = o_row + 3 * size + 1
     largest = 0.0
     for k in range(size):
@@ -121,7 +121,7 @@ def solve_ordered(K: Equations, b: Reals) -> None:
     """b ← A⁻¹ b with the factors of `factor_ordered`; K.spare is written to."""
     o = K.order_start
     size = K.orders[o]
-    o_row = o + HEAD + K.orders[o + 1]
+    o_row = o + HEADER_SIZE + K.orders[o + 1]
     o_start = o_row + 2 * size
     o_own = o_start + size + 1
     o_turn = o_own + size

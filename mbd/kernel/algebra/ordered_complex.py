@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import HEAD, is_sound
+from mbd.kernel.algebra.ordered import HEADER_SIZE, is_sound
 from mbd.kernel.records import Steps
 from mbd.kernel.tangent_rules import takes_part
 
@@ -16,7 +16,7 @@ def factor_pair_ordered(K: Steps, o_A: int, o: int, loss: float) -> bool:
     """
     size = K.orders[o]
     entries = K.orders[o + 2]
-    o_row = o + HEAD + K.orders[o + 1]
+    o_row = o + HEADER_SIZE + K.orders[o + 1]
     o_start = o_row + 2 * size
     o_own = o_start + size + 1
     o_turn = o_own + size
@@ -76,7 +76,7 @@ def solve_pair_ordered(K: Steps, o_A: int, o: int, o_b: int) -> None:
     """b ← A⁻¹ b with the factors of `factor_pair_ordered`; b is at K.stages[o_b:], N real and N imaginary parts."""
     size = K.orders[o]
     entries = K.orders[o + 2]
-    o_row = o + HEAD + K.orders[o + 1]
+    o_row = o + HEADER_SIZE + K.orders[o + 1]
     o_start = o_row + 2 * size
     o_own = o_start + size + 1
     o_turn = o_own + size

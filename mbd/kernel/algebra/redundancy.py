@@ -16,23 +16,23 @@ from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["find_dependent", "find_dependence", "find_shares", "shared", "sharing", "spread", "take_shares"]
 
-DEPENDENCE = 1e-9
+RANK_RTOL = 1e-9
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-]."""
 
-SHORT = 1e-2
+SHORT_ROW_RATIO = 1e-2
 """Length of a row over that of the longest of its unit below which it comes after the others [-].
 
 It vanishes at a singular configuration nearby: what errors of positions leave of it is no part of its own length.
 """
 
-WAITING = 2
+NOT_YET_JUDGED = 2
 """Mark in K.dropped of a row whose turn has not come [-].
 
 Two feet that stick hold the line through them twice. Of the four tangents the one that lies along that line is left
 out, else the coefficients of the one that is are large, and at the limit there are none.
 """
 
-LEAST_SHARE = 1e-4
+MIN_LIMIT_SHARE = 1e-4
 """Part of the largest limit of friction that even one without load counts as, where several hold together [-]."""
 
 
@@ -49,7 +49,7 @@ def find_dependent(K: DependentRows, m: int) -> None:
         return
     for k in range(m):
         K.work[k] = length_of(K, K.rows[k])
-        K.dropped[K.rows[k]] = WAITING
+        K.dropped[K.rows[k]] = NOT_YET_JUDGED
     lengths = longest_row(K, m, 0)
     angles = longest_row(K, m, 1)
     others = longest_row(K, m, 2)
@@ -59,23 +59,23 @@ def find_dependent(K: DependentRows, m: int) -> None:
     while waiting > 0:
         for k in range(m):
             row = K.rows[k]
-            if K.dropped[row] != WAITING:
+            if K.dropped[row] != NOT_YET_JUDGED:
                 continue
             unit = K.row_unit[row]
             far = lengths if unit == 0 else (angles if unit == 1 else others)
             part = K.work[k] / far if far > 0.0 else 1.0
-            left = remaining_norm(K, row, kept) * (part if part < SHORT else 1.0)
+            left = remaining_norm(K, row, kept) * (part if part < SHORT_ROW_RATIO else 1.0)
             if left > bar:
                 K.dropped[row] = 0
                 keep_row(K, row, kept)
                 kept += 1
                 waiting -= 1
-            elif left <= DEPENDENCE:
+            elif left <= RANK_RTOL:
                 K.dropped[row] = 1
                 K.n_dropped += 1
                 combine(K, row, kept)
                 waiting -= 1
-        bar = max(0.1 * bar, DEPENDENCE)
+        bar = max(0.1 * bar, RANK_RTOL)
 
 
 def longest_row(K: Equations, m: int, unit: int) -> float:
@@ -211,7 +211,7 @@ def share(K: ContactRows, row: int, largest: float) -> float:
     f = K.row_friction[row]
     if f < 0 or largest == 0.0:
         return 1.0
-    return float(max(K.limit[f] / largest, LEAST_SHARE))
+    return float(max(K.limit[f] / largest, MIN_LIMIT_SHARE))
 
 
 def spread(K: DependentRows, lam: Reals) -> None:

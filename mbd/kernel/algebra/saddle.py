@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 from mbd.kernel.algebra.islands import find_islands, gather_island, saddle_entry
-from mbd.kernel.algebra.linear import MOST_ROUND_OFF, eliminate, factor, round_off, sum_of_sizes
+from mbd.kernel.algebra.linear import PIVOT_RTOL, eliminate, factor, round_off, sum_of_sizes
 from mbd.kernel.algebra.ordered import (
-    LOSS_AT_ONCE,
+    DIRECT_PIVOT_RTOL,
     OF_ACCELERATIONS,
     SYMMETRIC,
     factor_ordered,
@@ -25,9 +25,9 @@ from mbd.kernel.tangent_rules import is_differentiated
 
 __all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_at", "solve_rows"]
 
-INCOMPATIBLE = 1e-6
+COMPATIBILITY_RTOL = 1e-6
 """Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
-ROUND_OFF = 64.0 * EPS
+ROW_RTOL = 64.0 * EPS
 """Round-off of a row on positions, relative to its terms [-]."""
 OWN_TERMS, VELOCITIES, POSITIONS = range(3)
 """What changes in a solution: accelerations, whose rows are measured by their own terms, velocities or positions."""
@@ -63,7 +63,7 @@ def correct_positions(K: Balance, m: int) -> int:
 def solve_change(K: Balance, y: Any, m: int, dropping: bool, what: int) -> int:
     """The same, contradictions measured by what changes: the velocities y, positions, or the rows' own terms."""
     size = K.n + m
-    rank = solve_matrix(K, m, not dropping and sharing(K), MOST_ROUND_OFF)
+    rank = solve_matrix(K, m, not dropping and sharing(K), PIVOT_RTOL)
     if rank == -CONFLICT and dropping:
         return solve_kept(K, y, m, what)
     if rank == -CONFLICT and K.failure_index < K.n:  # forces push along a motion of little inertia
@@ -104,7 +104,7 @@ def solve_kept(K: Balance, y: Any, m: int, what: int) -> int:
     kept = dependent_last(K, m)
     little = blocked < K.n
     if (kept < m or little) and not sharing(K):
-        rank = solve_matrix(K, kept, False, round_off(K.n + kept) if little else MOST_ROUND_OFF)
+        rank = solve_matrix(K, kept, False, round_off(K.n + kept) if little else PIVOT_RTOL)
         if rank == K.n + kept and (kept == m or not contradicts(K, y, m, what)):
             spread(K, K.impulse)
             return 0
@@ -140,7 +140,7 @@ def solve_to_round_off(K: Balance, m: int, dropping: bool) -> int:
 
 def solve_shared(K: Balance, m: int) -> int:
     """w and λ with the shares of dependent rows in K.shares, for the m independent rows that come first in K.rows."""
-    rank = solve_matrix(K, m, True, MOST_ROUND_OFF)
+    rank = solve_matrix(K, m, True, PIVOT_RTOL)
     if rank < 0:
         return -rank
     if rank < K.n + m:
@@ -193,7 +193,7 @@ def solve_islands(K: Balance, m: int, together: bool, tolerance: float) -> int:
     n = K.n
     size = n + m
     o = 0 if together else order_at(K, m)
-    if o > 0 and factor_ordered(K, K.acc, o, OF_ACCELERATIONS, LOSS_AT_ONCE):  # far from any loss of rank
+    if o > 0 and factor_ordered(K, K.acc, o, OF_ACCELERATIONS, DIRECT_PIVOT_RTOL):  # far from any loss of rank
         return solve_in_order(K, m)
     islands = 1
     if together:  # shares of dependent rows may couple any two
@@ -274,8 +274,8 @@ def contradicts(K: Balance, y: Any, m: int, what: int) -> bool:
                 worst = max(worst, abs(missed))
                 size = max(size, terms)
                 if what == POSITIONS:
-                    round_off = max(round_off, ROUND_OFF * max(K.scale[n + row], 1e-3))
-        if worst > INCOMPATIBLE * size + round_off:
+                    round_off = max(round_off, ROW_RTOL * max(K.scale[n + row], 1e-3))
+        if worst > COMPATIBILITY_RTOL * size + round_off:
             return True
     return False
 

@@ -6,7 +6,7 @@ from mbd.kernel.algebra.redundancy import sharing, spread
 from mbd.kernel.algebra.saddle import solve_at
 from mbd.kernel.contact.cone_loads import keep_in_cones
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Frictions, Reals
-from mbd.kernel.stepping.restart import MAX_LOADS, active_rows, evaluate_loaded, limit_of, load_accelerations
+from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, active_rows, evaluate_loaded, limit_of, load_accelerations
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["find_limits", "is_on", "load", "slides", "solve_directed", "whole"]
@@ -18,7 +18,7 @@ def solve_directed(K: Balance, level: int) -> int:
         load(K, level)
         return solve_at(K, active_rows(K, K.active), level)
     status = 0
-    for _ in range(MAX_LOADS):
+    for _ in range(MAX_LOAD_ITERATIONS):
         evaluate_loaded(K, whole(K, level))
         find_limits(K, level)
         load(K, level)
@@ -30,7 +30,9 @@ def solve_directed(K: Balance, level: int) -> int:
             break
     find_limits(K, level)
     if K.n_dropped > 0 and not sharing(K):
-        for _ in range(MAX_LOADS):  # frictions that hold together share by their limits, which follow their loads
+        for _ in range(
+            MAX_LOAD_ITERATIONS
+        ):  # frictions that hold together share by their limits, which follow their loads
             spread(K, K.impulse)
             change = evaluate_loaded(K, whole(K, level))
             find_limits(K, level)

@@ -23,20 +23,20 @@ from mbd.kernel.codes import CONFLICT, NO_IMPACT
 from mbd.kernel.contact.branches import is_on, solve_directed
 from mbd.kernel.contact.cone_contacts import keep_branches, solve_cones
 from mbd.kernel.contact.cone_directions import misses, turn_directions
-from mbd.kernel.contact.cone_problem import CONE_TOLERANCE
+from mbd.kernel.contact.cone_problem import CONE_RTOL
 from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, DependentRows, Motion
 from mbd.kernel.stepping.restart import active_rows, refresh_scales
 
-__all__ = ["ROUND_OFF", "complementarity"]
+__all__ = ["LAW_RTOL", "complementarity"]
 
 MAX_NEWTON = 12
 """Changes of all branches at once before and after the solution over cones [-]."""
-NEARLY_SOLVED = 0.1
+MAX_CONE_MISFIT = 0.1
 """Part of the largest impulse that cones may miss laws by for their branches to be tried [-]."""
-ROUND_OFF = 1e-11
+LAW_RTOL = 1e-11
 """What multipliers and velocities or accelerations may miss of their laws, relative to their terms [-]."""
-SURE = 1e-6
+SLIDING_LAW_RTOL = 1e-6
 """The same for a friction that an event has found to slide: its acceleration is still round-off [-]."""
 
 
@@ -48,7 +48,7 @@ def complementarity(K: Balance, level: int) -> int:
     level 0: accelerations, force and bias are those of K.acc; 1: velocities, bias and impulses K.given are in place.
     """
     measure_free(K, level)
-    if K.n_cones > 0 and K.strategy == 1 and level < 2 and solve_cones(K, level, CONE_TOLERANCE) == 1:
+    if K.n_cones > 0 and K.strategy == 1 and level < 2 and solve_cones(K, level, CONE_RTOL) == 1:
         return 0
     status = choose_branches(K, level)
     if status == 0 and level == 0 and K.strategy == 0 and K.n_cones > 0:
@@ -60,12 +60,12 @@ def choose_branches(K: Balance, level: int) -> int:
     """Branches that no solution contradicts, by Newton's method and over cones; a status."""
     status = change_branches(K, level, 0)
     if status == CONFLICT or status == NO_IMPACT:
-        solve_cones(K, level, NEARLY_SOLVED)  # else from the last branches
+        solve_cones(K, level, MAX_CONE_MISFIT)  # else from the last branches
         # changes of the worst branch that follow
         again = change_branches(K, level, 4 * (K.n_contacts + K.n_frictions))
         if again != CONFLICT and again != NO_IMPACT:
             return again
-        if level == 1 and status == NO_IMPACT and again == NO_IMPACT and solve_cones(K, level, CONE_TOLERANCE) == 1:
+        if level == 1 and status == NO_IMPACT and again == NO_IMPACT and solve_cones(K, level, CONE_RTOL) == 1:
             return 0
         if again == CONFLICT:
             return again
@@ -112,7 +112,7 @@ def is_held_still(K: ContactForces, f: int) -> bool:
     """Whether the acceleration along the group of a friction is round-off of its terms."""
     for g in range(f, f + K.group_size[f]):
         row = K.friction_row[g]
-        if departure(K, row, 1.0, ROUND_OFF) > 0.0 or departure(K, row, -1.0, ROUND_OFF) > 0.0:
+        if departure(K, row, 1.0, LAW_RTOL) > 0.0 or departure(K, row, -1.0, LAW_RTOL) > 0.0:
             return False
     return True
 
@@ -160,8 +160,8 @@ def departure(K: ContactForces, row: int, sign: float, tolerance: float) -> floa
 def contact_fault(K: ContactForces, c: int, largest: float) -> float:
     """How badly contact c breaks its law; ≤ 0 if it does not."""
     if K.active[c] == 1 and K.parting[c] == 0:
-        return float(K.impulse[K.normal[c]] - ROUND_OFF * largest)  # λ > 0 would pull
-    return departure(K, K.normal[c], 1.0, ROUND_OFF)
+        return float(K.impulse[K.normal[c]] - LAW_RTOL * largest)  # λ > 0 would pull
+    return departure(K, K.normal[c], 1.0, LAW_RTOL)
 
 
 def friction_fault(K: ContactForces, f: int, largest: float) -> float:
@@ -170,8 +170,10 @@ def friction_fault(K: ContactForces, f: int, largest: float) -> float:
     if K.group_size[f] > 1:
         return group_fault(K, f, largest)
     if K.sticks[f] == 1:
-        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - ROUND_OFF * largest)
-    return departure(K, row, K.slip[f], SURE if K.loose[f] == 2 else ROUND_OFF)  # it slides against its own friction
+        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - LAW_RTOL * largest)
+    return departure(
+        K, row, K.slip[f], SLIDING_LAW_RTOL if K.loose[f] == 2 else LAW_RTOL
+    )  # it slides against its own friction
 
 
 def group_fault(K: ContactForces, f: int, largest: float) -> float:
@@ -183,8 +185,8 @@ def group_fault(K: ContactForces, f: int, largest: float) -> float:
         for g in range(f, f + K.group_size[f]):
             pull = K.impulse[K.friction_row[g]] + K.past[K.friction_row[g]]
             square += pull * pull
-        return float(sqrt(square) - K.limit[f] - ROUND_OFF * largest)
-    return misses(K, f, SURE if K.loose[f] == 2 else ROUND_OFF)
+        return float(sqrt(square) - K.limit[f] - LAW_RTOL * largest)
+    return misses(K, f, SLIDING_LAW_RTOL if K.loose[f] == 2 else LAW_RTOL)
 
 
 def give_way(K: DependentRows) -> int:

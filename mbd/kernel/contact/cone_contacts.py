@@ -14,7 +14,7 @@ from __future__ import annotations
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.redundancy import find_dependence, shared, sharing
 from mbd.kernel.algebra.saddle import solve_at
-from mbd.kernel.contact.cone_problem import CONE_TOLERANCE, EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
+from mbd.kernel.contact.cone_problem import CONE_RTOL, EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
 from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, ContactForces, Frictions
 from mbd.kernel.stepping.restart import (
@@ -29,7 +29,7 @@ from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["all_hold", "keep_branches", "solve_cones"]
 
-STANDS = 1e-9
+REST_RTOL = 1e-9
 """Velocity, as the impulse that would stop it over the largest impulse, below which nothing slides or parts [-]."""
 
 
@@ -37,7 +37,7 @@ def solve_cones(K: Balance, level: int, allowed: float) -> int:
     """1 if all that may choose obeys its law, with K.jump, K.impulse and branches in place; 0 if nothing was found.
 
     Then everything is as it was. The levels, and what may choose, are those of `complementarity`; laws may be missed by
-    the part `allowed` of the largest impulse: `CONE_TOLERANCE`, or more where branches alone are asked for.
+    the part `allowed` of the largest impulse: `CONE_RTOL`, or more where branches alone are asked for.
     """
     if K.loaded == 1:
         return 0
@@ -57,7 +57,7 @@ def solve_cones(K: Balance, level: int, allowed: float) -> int:
         residual = K.cone_work[0]
         if residual <= allowed and take_impulses(K, level, count):
             take_cone_branches(K, level, count)
-            if residual <= CONE_TOLERANCE:
+            if residual <= CONE_RTOL:
                 K.cone_residual = max(K.cone_residual, residual)
             return 1
     keep_branches(K, False)
@@ -257,7 +257,7 @@ def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
     for c in range(K.n_contacts):
         u = K.cone_normal[c]
         if u >= 0:
-            parts = K.cone_owner[u] == PUSH and K.cone_work[o_w + count + u] * K.cone_work[o_w + u] > STANDS * size
+            parts = K.cone_owner[u] == PUSH and K.cone_work[o_w + count + u] * K.cone_work[o_w + u] > REST_RTOL * size
             if K.free[c] == 2:
                 K.parting[c] = 1 if parts else 0
             else:
@@ -265,7 +265,7 @@ def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
         if f >= 0 and K.loose[f] > 0:
-            take_friction(K, u, f, STANDS * size, o_w, count)
+            take_friction(K, u, f, REST_RTOL * size, o_w, count)
     for u in range(count):
         row = K.cone_rows[u]
         K.impulse[row] = -K.cone_found[u] - (K.past[row] if level == 1 else 0.0)
@@ -308,7 +308,7 @@ def all_hold(K: Balance, t1: float) -> bool:
     count = K.n_dropped
     K.cone_dropped[: K.n_rows] = K.dropped[: K.n_rows]
     evaluate(K, t1, K.q1, K.y1)
-    holds = solve_cones(K, 0, CONE_TOLERANCE) == 1
+    holds = solve_cones(K, 0, CONE_RTOL) == 1
     K.n_dropped = count
     K.dropped[: K.n_rows] = K.cone_dropped[: K.n_rows]
     for c in range(K.n_contacts):

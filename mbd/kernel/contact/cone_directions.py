@@ -16,11 +16,11 @@ from mbd.kernel.records import Balance, ContactForces, ContactRows
 
 __all__ = ["MAX_GROUP_SIZE", "fill_tangents", "misses", "turn_directions"]
 
-EXACT = 1e-14
+DIRECTION_RTOL = 1e-14
 """γ × e over its terms that is round-off [-]."""
-SMALL_TURN = 1e-6
+DIFFERENCE_ANGLE = 1e-6
 """Angle by whose effect slopes are measured [rad]."""
-LARGEST_TURN = 0.5
+MAX_TURN = 0.5
 """Most that a step of Newton's method turns [rad]."""
 MAX_GROUP_SIZE = 3
 """Frictions that slide together, at most: those of a ball joint [-]."""
@@ -105,7 +105,7 @@ def find_misses(K: ContactForces, count: int) -> float:
             miss += K.cone_across[MAX_GROUP_SIZE * i + k] * value
         K.cone_miss[i] = miss - leaned * forward
         worst = max(worst, abs(K.cone_miss[i]) / (size + 1e-300))
-        if forward < -EXACT * size:
+        if forward < -DIRECTION_RTOL * size:
             worst = max(worst, 1.0)
     return worst
 
@@ -161,13 +161,13 @@ def newton_turns(K: Balance, level: int, count: int) -> int:
         K.cone_turn[i] = -K.cone_miss[i]
     keep_directions(K, True)
     for j in range(count):
-        turn_by(K, j, SMALL_TURN)
+        turn_by(K, j, DIFFERENCE_ANGLE)
         status = solve_directed(K, level)
         if status != 0:
             return status
         find_misses(K, count)
         for i in range(count):
-            K.cone_slope[i * count + j] = (K.cone_miss[i] + K.cone_turn[i]) / SMALL_TURN
+            K.cone_slope[i * count + j] = (K.cone_miss[i] + K.cone_turn[i]) / DIFFERENCE_ANGLE
         keep_directions(K, False)
     if factor(K.cone_slope, count, K.cone_pivots) != 0:
         K.cone_turn[:count] = 0.0
@@ -200,7 +200,7 @@ def turn_directions(K: Balance, level: int) -> int:
         return 0
     best = find_misses(K, count)
     for turn in range(60):  # rounds in which directions are looked for
-        if best <= EXACT:
+        if best <= DIRECTION_RTOL:
             return 0
         by_newton = turn >= 3 and turn % 4 != 3  # three projections come before Newton's method
         if by_newton:
@@ -208,7 +208,7 @@ def turn_directions(K: Balance, level: int) -> int:
             if status != 0:
                 return status
             for i in range(count):
-                turn_by(K, i, max(min(K.cone_turn[i], LARGEST_TURN), -LARGEST_TURN))
+                turn_by(K, i, max(min(K.cone_turn[i], MAX_TURN), -MAX_TURN))
         else:
             project(K, count)
         status = solve_directed(K, level)
@@ -216,7 +216,7 @@ def turn_directions(K: Balance, level: int) -> int:
             return status
         now = measure_misses(K)
         if by_newton and now >= best:
-            if best <= 1e3 * EXACT:
+            if best <= 1e3 * DIRECTION_RTOL:
                 keep_directions(K, False)
                 return int(solve_directed(K, level))
             if now > best:

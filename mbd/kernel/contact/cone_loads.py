@@ -18,21 +18,21 @@ from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.redundancy import largest_limit, share, sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.contact.cones import follows, friction_size
-from mbd.kernel.contact.discs import DISC_LINES, disc_length, minimize_within_discs
+from mbd.kernel.contact.discs import DISC_SIZE, disc_length, minimize_within_discs
 from mbd.kernel.records import Balance, Complementarity, ContactForces, ContactRows, Frictions, Reals
 from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 
 __all__ = ["keep_in_cones"]
 
-BEYOND = 1e-12
+LIMIT_RTOL = 1e-12
 """Part of a limit by which multipliers of least norm may exceed it for round-off [-]."""
-PART_OF_IT = 1e-8
+DIRECTION_RTOL = 1e-8
 """Part of a unit vector that is more than round-off [-]."""
-LEAST_LIMIT = 1e-12
+MIN_LIMIT_RATIO = 1e-12
 """Limit of a foot that bears nothing, over the largest of all [-]."""
-LEAST_WEIGHT = 1e-4
+MIN_WEIGHT_RATIO = 1e-4
 """w of such a foot over the largest limit [-]."""
-NARROW = 1e-11
+SLACK_ATOL = 1e-11
 """−σ below which what cones leave open is nothing to choose from [-]."""
 
 
@@ -54,7 +54,7 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
     sigma = find_brink(K, spans, discs)
     for row in range(K.n_rows):
         K.lam_at_limit[row] = lam[row] + scale * freed(K, row, spans)
-    if sigma < -NARROW:
+    if sigma < -SLACK_ATOL:
         find_nearest(K, spans, discs)
     for row in range(K.n_rows):
         lam[row] += scale * freed(K, row, spans)
@@ -63,7 +63,7 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
 def exceeds(K: Frictions, lam: Reals) -> bool:
     """Whether a friction that sticks is beyond its limit."""
     for f in range(K.n_frictions):
-        if K.sticks[f] == 1 and friction_size(K, f, lam) > (1.0 - BEYOND) * K.limit[f]:
+        if K.sticks[f] == 1 and friction_size(K, f, lam) > (1.0 - LIMIT_RTOL) * K.limit[f]:
             return True
     return False
 
@@ -108,7 +108,7 @@ def find_freedoms(K: Balance, pushes_stay: bool) -> int:
                 for i in range(found):
                     clear_row(K.null_way, o, i * width, count)
             left = sqrt(square(K.null_way, o, count))
-            if size > PART_OF_IT and left > PART_OF_IT * max(size, 1.0):
+            if size > DIRECTION_RTOL and left > DIRECTION_RTOL * max(size, 1.0):
                 for d in range(count):
                     K.null_way[o + d] /= left
                 found += 1
@@ -141,7 +141,7 @@ def find_null_vectors(K: Balance) -> int:
             for i in range(count):
                 clear_row(K.null_vectors, o, i * K.n_rows, K.n_rows)
         left = sqrt(square(K.null_vectors, o, K.n_rows))
-        if left > PART_OF_IT * size:
+        if left > DIRECTION_RTOL * size:
             for row in range(K.n_rows):
                 K.null_vectors[o + row] /= left
             count += 1
@@ -153,7 +153,7 @@ def is_free(K: Complementarity, row: int, spans: int) -> bool:
     size = 0.0
     for j in range(spans):
         size = max(size, abs(K.freedom[row * K.n_disc_unknowns + j]))
-    return size > PART_OF_IT
+    return size > DIRECTION_RTOL
 
 
 def find_discs(K: ContactForces, lam: Reals, spans: int, scale: float) -> int:
@@ -170,19 +170,19 @@ def find_discs(K: ContactForces, lam: Reals, spans: int, scale: float) -> int:
             touched = touched or is_free(K, K.friction_row[g], spans)
         if not touched:
             continue
-        for k in range(DISC_LINES - 1):
+        for k in range(DISC_SIZE - 1):
             row = K.friction_row[f + k] if k < K.group_size[f] else -1
-            fill_line(K, DISC_LINES * discs + k, row, 1.0, lam[row] / scale if row >= 0 else 0.0, spans)
-        limit = max(K.limit[f] / scale, LEAST_LIMIT)
-        fill_line(K, DISC_LINES * discs + 3, push, -K.rise[f], limit, spans)
-        K.disc_weight[discs] = max(limit, LEAST_WEIGHT)
+            fill_line(K, DISC_SIZE * discs + k, row, 1.0, lam[row] / scale if row >= 0 else 0.0, spans)
+        limit = max(K.limit[f] / scale, MIN_LIMIT_RATIO)
+        fill_line(K, DISC_SIZE * discs + 3, push, -K.rise[f], limit, spans)
+        K.disc_weight[discs] = max(limit, MIN_WEIGHT_RATIO)
         discs += 1
     for c in range(K.n_contacts):
         push = K.normal[c]
         if K.kind[c] == 0 and K.opens[c] == 0 and push >= 0 and is_free(K, push, spans):
-            for k in range(DISC_LINES - 1):
-                fill_line(K, DISC_LINES * discs + k, -1, 0.0, 0.0, spans)
-            fill_line(K, DISC_LINES * discs + 3, push, -1.0, max(-lam[push] / scale, LEAST_LIMIT), spans)
+            for k in range(DISC_SIZE - 1):
+                fill_line(K, DISC_SIZE * discs + k, -1, 0.0, 0.0, spans)
+            fill_line(K, DISC_SIZE * discs + 3, push, -1.0, max(-lam[push] / scale, MIN_LIMIT_RATIO), spans)
             K.disc_weight[discs] = 1.0
             discs += 1
     return discs
@@ -228,12 +228,12 @@ def find_brink(K: Complementarity, spans: int, discs: int) -> float:
     K.disc_cost[spans] = 1.0
     far = 0.0
     for i in range(discs):
-        K.disc_map[(DISC_LINES * i + 3) * width + spans] = K.disc_weight[i]
-        far = max(far, (disc_length(K, i, spans) - K.disc_at[DISC_LINES * i + 3]) / K.disc_weight[i])
+        K.disc_map[(DISC_SIZE * i + 3) * width + spans] = K.disc_weight[i]
+        far = max(far, (disc_length(K, i, spans) - K.disc_at[DISC_SIZE * i + 3]) / K.disc_weight[i])
     K.disc_y[spans] = far + 1.0
     minimize_within_discs(K, spans + 1, discs)
     for i in range(discs):
-        K.disc_map[(DISC_LINES * i + 3) * width + spans] = 0.0
+        K.disc_map[(DISC_SIZE * i + 3) * width + spans] = 0.0
     return float(K.disc_y[spans])
 
 

@@ -24,19 +24,19 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import Integers, Reals
 
-__all__ = ["CONE_TOLERANCE", "EQUAL", "PUSH", "STEADY", "cone_places", "cone_solve"]
+__all__ = ["CONE_RTOL", "EQUAL", "PUSH", "STEADY", "cone_places", "cone_solve"]
 
 PUSH, EQUAL, STEADY = -1, -2, -3
 """In `owner`: a contact that pushes, one that is held, and friction whose limit no unknown changes."""
-CONE_TOLERANCE = 1e-10
+CONE_RTOL = 1e-10
 """Largest ‖F‖ that counts as solved, of the largest impulse."""
-CONE_EXACT = 1e-15
+CONE_FLOOR = 1e-15
 """‖F‖ of the largest impulse below which there is nothing to gain."""
-CONE_SOFT = 1e-7
+CONE_COMPLIANCE = 1e-7
 """Velocity by which a soft contact gives way to its impulse, of the least that any contact alone does."""
-CONE_REGULAR = 1e-9
+CONE_REGULARIZATION = 1e-9
 """ε, where the diagonal of the equations is 1."""
-CONE_RIGID = 1e-12
+RIGID_RTOL = 1e-12
 """Entry of the diagonal of G, of the largest, below which an impulse moves nothing and is zero."""
 
 
@@ -49,7 +49,7 @@ def cone_solve(
     G: Reals, n: int, shift: Reals, z: Reals, owner: Integers, twin: Integers, limit: Reals, slope: Reals, work: Reals,
     pivots: Integers,
 ) -> int:  # fmt: skip
-    """Solve for z from where it is: 0, or 1 where ‖F‖, of the largest impulse, stays above `CONE_TOLERANCE`.
+    """Solve for z from where it is: 0, or 1 where ‖F‖, of the largest impulse, stays above `CONE_RTOL`.
 
     Parameters
     ----------
@@ -68,20 +68,20 @@ def cone_solve(
         if work[n * n + 2 * n + u] > 0.0:
             least = min(least, 1.0 / work[n * n + 2 * n + u])
     for growth in range(4):  # ways to grow: friction at once, in 8 parts, in 32, in 128
-        if not (size < 1e300 and best > CONE_TOLERANCE):
+        if not (size < 1e300 and best > CONE_RTOL):
             break
         if growth > 0:
             z[:n] = 0.0
             parts *= 8 if growth == 1 else 4
         for part in range(parts):
             work[n * (n + 6)] = (part + 1.0) / parts
-            work[n * (n + 6) + 2] = CONE_SOFT * least
+            work[n * (n + 6) + 2] = CONE_COMPLIANCE * least
             if part == 0:
                 cone_iterate(G, n, shift, z, owner, twin, limit, slope, work, pivots, size)
             work[n * (n + 6) + 2] = 0.0
             best = cone_iterate(G, n, shift, z, owner, twin, limit, slope, work, pivots, size)
     work[0] = best
-    return 0 if best <= CONE_TOLERANCE else 1
+    return 0 if best <= CONE_RTOL else 1
 
 
 def cone_iterate(
@@ -93,13 +93,13 @@ def cone_iterate(
     best = cone_faults(G, n, shift, z, owner, twin, limit, slope, work) / cone_size(n, z, size)
     work[o_best : o_best + n] = z[:n]
     for turn in range(48):  # Newton steps and blocks of sweeps
-        if best <= CONE_EXACT:
+        if best <= CONE_FLOOR:
             break
         moved = False
-        if turn % 6 != 0 or (turn > 0 and best <= CONE_TOLERANCE):
+        if turn % 6 != 0 or (turn > 0 and best <= CONE_RTOL):
             moved = cone_newton(G, n, shift, z, owner, twin, limit, slope, work, pivots, turn % 6 == 1)
         if not moved:
-            if turn > 0 and best <= CONE_TOLERANCE:
+            if turn > 0 and best <= CONE_RTOL:
                 break
             cone_sweep(G, n, shift, z, owner, twin, limit, slope, work, 1.0 / (1.0 + turn // 6 % 7))
         now = cone_faults(G, n, shift, z, owner, twin, limit, slope, work) / cone_size(n, z, size)
@@ -107,9 +107,9 @@ def cone_iterate(
             last = best
             best = now
             work[o_best : o_best + n] = z[:n]
-            if best <= 1e-3 * CONE_TOLERANCE and best > 0.5 * last:
+            if best <= 1e-3 * CONE_RTOL and best > 0.5 * last:
                 break
-        elif best <= 1e-2 * CONE_TOLERANCE:
+        elif best <= 1e-2 * CONE_RTOL:
             break
     z[:n] = work[o_best : o_best + n]
     return best
@@ -146,7 +146,7 @@ def cone_metric(G: Reals, n: int, shift: Reals, twin: Integers, work: Reals) -> 
                 count += 1
                 v = twin[v]
             slack /= count
-        work[o_rho + u] = 1.0 / slack if slack > CONE_RIGID * largest else 0.0
+        work[o_rho + u] = 1.0 / slack if slack > RIGID_RTOL * largest else 0.0
         size = max(size, abs(work[o_rho + u] * shift[u]))
     return size
 
@@ -285,7 +285,7 @@ def cone_slopes(
         soft = work[n * (n + 6) + 2]
         for j in range(n):
             work[u * n + j] = rho * G[u * n + j] if held else 0.0
-        work[u * n + u] += CONE_REGULAR + (rho * soft if held else 0.0)
+        work[u * n + u] += CONE_REGULARIZATION + (rho * soft if held else 0.0)
         if not held or rho == 0.0:
             work[u * n + u] += 1.0
         if slides and rho > 0.0:

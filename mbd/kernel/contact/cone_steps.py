@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import STICK
-from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABLE, estimated_turn_rate
+from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABILITY_SHARE, estimated_turn_rate
 from mbd.kernel.contact.cones import (
-    HELD,
-    NO_DIRECTION,
-    ONSET,
+    HOLD_AT_ONSET,
+    HOLD_DIRECTION,
+    MIN_DIRECTION_SPEED,
     across,
     aim,
     along,
@@ -28,41 +28,41 @@ from mbd.kernel.contact.cones import (
     set_hold,
     speed_of,
 )
-from mbd.kernel.contact.contact_modes import STILL
-from mbd.kernel.events.guard_sides import LEAST_SPEED
+from mbd.kernel.contact.contact_modes import REST_SPEED
+from mbd.kernel.events.guard_sides import MIN_SPEED
 from mbd.kernel.events.guards import judge
 from mbd.kernel.events.locate import locate
 from mbd.kernel.records import Frictions, Guards, Kernel, Switching
 from mbd.kernel.stepping.trial_step import try_step, turns
 
 __all__ = [
-    "LONGER", "SHORTER", "TURNS_AWAY", "approached_end", "come_to_zero", "keeps_direction", "shorter_turn",
-    "slides_at_first", "slides_on", "slides_until_event", "speeds_up",
+    "ONSET_STEP_GROWTH", "ONSET_STEP_RATIO", "SLIDES_ON", "approached_end", "come_to_zero", "keeps_direction",
+    "shorter_turn", "slides_at_first", "slides_on", "slides_until_event", "speeds_up",
 ]  # fmt: skip
 
-PART = 0.5
+MAX_STEP_SHARE = 0.5
 """Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
-SHORTER = 0.1
+ONSET_STEP_RATIO = 0.1
 """Part of a step that is tried where Newton's method fails as sliding begins, four times at most [-]."""
-LONGER = 3.0
+ONSET_STEP_GROWTH = 3.0
 """Each of the steps that follow over the one before [-]."""
-BRIEFEST = 1e-7
+MIN_ONSET_STEP_RATIO = 1e-7
 """Part of dt below which no such step is tried, and none is shortened for a turn [-]."""
-SURELY = 0.8
+REACHES_ZERO_SHARE = 0.8
 """Part of a step within which γ reaches zero if a direction is held in it [-]."""
-STRAIGHT = 0.05
+HEAD_ON_SINE = 0.05
 """Sine of the angle between γ̇ and −γ below which γ runs into zero [-]."""
-LINE = 1e-9
+COLLINEAR_SINE = 1e-9
 """The same where γ moves along a line: a direction that is held is that of γ then, however long it slides on [-]."""
-SHORTEST = 1e-5
+MIN_REST_STEP_RATIO = 1e-5
 """Part of dt below which no step is shortened for this; where γ asks for less it runs into zero at any angle [-]."""
-FARTHEST = 0.25
+MAX_HELD_TURN = 0.25
 """Turn of the direction that is held, from γ at the start of the step, beyond which γ turns away before zero [rad]."""
-TURNS_AWAY = -2
+SLIDES_ON = -2
 """Of `come_to_zero`: what seemed to come to rest slides on."""
-TOGETHER = 0.02
+COMMON_REST_SHARE = 0.02
 """Part of its speed before the step at which another group rests at the same instant [-]."""
-AT_REST = 1e-10
+REST_RTOL = 1e-10
 """Speed across the direction that is held that counts as none, over ‖γ̇‖ dt [-]."""
 
 
@@ -76,36 +76,36 @@ def approached_end(K: Switching, t1: float) -> float:
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
             fall = -product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate)
             h = t1 - K.time
-            if K.hold[f] == ONSET and (speed <= STILL or fall < 0.0):
+            if K.hold[f] == HOLD_AT_ONSET and (speed <= REST_SPEED or fall < 0.0):
                 continue
             set_hold(K, f, 0.0)
-            if speed < NO_DIRECTION:  # it came to rest at the end of the last step: held, it is found to
-                set_hold(K, f, HELD)
+            if speed < MIN_DIRECTION_SPEED:  # it came to rest at the end of the last step: held, it is found to
+                set_hold(K, f, HOLD_DIRECTION)
                 continue
             if not change * MIN_STEPS_TO_REST * h > speed:
                 continue
             turns_at = turning_of(K, f)
-            slow = PART * speed <= SHORTEST * change * K.dt
-            straight = fall > 0.0 and (turns_at <= STRAIGHT * speed * change or slow)
-            ends = fall > 0.0 and speed * speed < SURELY * h * fall
-            line = turns_at <= LINE * speed * change
-            if straight and (ends or line or h < SHORTEST * K.dt):
-                set_hold(K, f, HELD)
+            slow = MAX_STEP_SHARE * speed <= MIN_REST_STEP_RATIO * change * K.dt
+            straight = fall > 0.0 and (turns_at <= HEAD_ON_SINE * speed * change or slow)
+            ends = fall > 0.0 and speed * speed < REACHES_ZERO_SHARE * h * fall
+            line = turns_at <= COLLINEAR_SINE * speed * change
+            if straight and (ends or line or h < MIN_REST_STEP_RATIO * K.dt):
+                set_hold(K, f, HOLD_DIRECTION)
                 rest = max(rest, speed * speed / fall)
-            elif fall > 0.0 or turns_at * h > PART * speed * speed:
-                end = min(end, K.time + max(PART * speed / change, SHORTEST * K.dt))
+            elif fall > 0.0 or turns_at * h > MAX_STEP_SHARE * speed * speed:
+                end = min(end, K.time + max(MAX_STEP_SHARE * speed / change, MIN_REST_STEP_RATIO * K.dt))
     # what is held needs a step in which it comes to rest
-    if 0.0 < LONGER * K.begun_step < MIN_STEPS_TO_REST * rest and not turns(K):
+    if 0.0 < ONSET_STEP_GROWTH * K.begun_step < MIN_STEPS_TO_REST * rest and not turns(K):
         K.begun_step = 0.0
     if K.begun_step > 0.0:
-        K.begun_step *= LONGER
+        K.begun_step *= ONSET_STEP_GROWTH
         if K.begun_step < end - K.time:
             end = K.time + K.begun_step
         else:
             K.begun_step = 0.0
     if K.explicit == 1:
         rate = estimated_turn_rate(K)
-        K.turning_step = max(STABLE / rate, BRIEFEST * K.dt) if rate > 0.0 else 0.0
+        K.turning_step = max(STABILITY_SHARE / rate, MIN_ONSET_STEP_RATIO * K.dt) if rate > 0.0 else 0.0
         if 0.0 < K.turning_step < end - K.time:
             end = K.time + K.turning_step
     return end
@@ -115,7 +115,7 @@ def speeds_up(K: Guards) -> bool:
     """Whether what slides in a direction that turns gets faster, as all does that has begun to slide."""
     found = True
     for f in range(K.n_frictions):
-        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HOLD_DIRECTION:
             found = found and product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate) >= 0.0
     return found
 
@@ -133,7 +133,7 @@ def turning_of(K: Guards, f: int) -> float:
 
 def slides_at_first(K: Frictions, h: float) -> bool:
     """Whether something slides whose direction may turn too fast for a step of dt: one of h may follow it."""
-    return not (K.adaptive == 1 or h < BRIEFEST * K.dt) and turns(K)
+    return not (K.adaptive == 1 or h < MIN_ONSET_STEP_RATIO * K.dt) and turns(K)
 
 
 def slides_on(K: Guards) -> bool:
@@ -142,7 +142,7 @@ def slides_on(K: Guards) -> bool:
     for f in range(K.n_frictions):
         if keeps_direction(K, f):
             forward = along(K, f, K.guards1, K.at_slip)
-            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > LINE * forward:
+            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > COLLINEAR_SINE * forward:
                 set_hold(K, f, 0.0)
                 found = True
     return found
@@ -157,7 +157,7 @@ def slides_until_event(K: Guards) -> bool:
     for f in range(K.n_frictions):
         if keeps_direction(K, f) and may_follow(K, f):
             forward = along(K, f, K.guards1, K.at_slip)
-            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > LINE * forward:
+            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > COLLINEAR_SINE * forward:
                 set_hold(K, f, 0.0)
                 found = True
     return found
@@ -167,22 +167,22 @@ def shorter_turn(K: Guards, h: float) -> float:
     """A step of at most h in which directions that are not held turn by no more than they may."""
     least = h
     for f in range(K.n_frictions):
-        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HOLD_DIRECTION:
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
             if change > 0.0:
-                least = min(least, PART * speed_of(K, f, K.guards0, K.at_slip) / change)
-    return max(least, SHORTEST * K.dt)
+                least = min(least, MAX_STEP_SHARE * speed_of(K, f, K.guards0, K.at_slip) / change)
+    return max(least, MIN_REST_STEP_RATIO * K.dt)
 
 
 def come_to_zero(K: Kernel, h: float, t1: float) -> int:
     """After sliding was found to end, at the candidate: correct directions that are held until γ is zero there.
 
     Feet of one body come to rest together: all directions turn by ω times what is left across them over γ before the
-    step, with ω by Aitken's relaxation, which is the secant method for one (Irons & Tuck 1969). `TURNS_AWAY` where no
+    step, with ω by Aitken's relaxation, which is the secant method for one (Irons & Tuck 1969). `SLIDES_ON` where no
     directions near those of γ lead to zero, and steps can still follow how they turn, and where another group that is
     held slides on: it is not held in a shorter step.
     """
-    given_up = TURNS_AWAY if may_follow(K, K.event_index) else 0
+    given_up = SLIDES_ON if may_follow(K, K.event_index) else 0
     relaxation = 1.0
     for turn in range(8):  # corrections of a direction that is held
         f = K.event_index
@@ -190,10 +190,10 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
         square = 0.0
         largest = 0.0
         for g in range(K.n_frictions):
-            if K.group_size[g] > 1 and K.slip[g] != 0.0 and K.hold[g] == HELD:
+            if K.group_size[g] > 1 and K.slip[g] != 0.0 and K.hold[g] == HOLD_DIRECTION:
                 speed = speed_of(K, g, K.guards0, K.at_slip)
-                largest = max(largest, away(K, g, K.guards1, K.at_slip) / (AT_REST * speed + 1e-13))
-                left = across(K, g, K.guards1, K.at_slip) / (speed + LEAST_SPEED)
+                largest = max(largest, away(K, g, K.guards1, K.at_slip) / (REST_RTOL * speed + 1e-13))
+                left = across(K, g, K.guards1, K.at_slip) / (speed + MIN_SPEED)
                 change = left - K.across[g]
                 product += K.across[g] * change
                 square += change * change
@@ -206,7 +206,9 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
         small = abs(angle) < 0.5
         if small:
             turn_directions(K, relaxation)
-            small = given_up == 0 or away(K, f, K.guards0, K.at_slip) < FARTHEST * speed_of(K, f, K.guards0, K.at_slip)
+            small = given_up == 0 or away(K, f, K.guards0, K.at_slip) < MAX_HELD_TURN * speed_of(
+                K, f, K.guards0, K.at_slip
+            )
         if not small:
             if given_up != 0:
                 set_hold(K, f, 0.0)
@@ -222,18 +224,18 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
             return status
         if K.event_kind != STICK or not keeps_direction(K, K.event_index):
             return 0
-    return TURNS_AWAY if given_up != 0 and another_slides_on(K, K.event_index) else 0
+    return SLIDES_ON if given_up != 0 and another_slides_on(K, K.event_index) else 0
 
 
 def may_follow(K: Guards, f: int) -> bool:
     """Whether steps can still be short enough to follow how γ of the group of f turns."""
     speed = speed_of(K, f, K.guards0, K.at_slip)
-    return bool(PART * speed > SHORTEST * K.dt * speed_of(K, f, K.guards0, K.at_slip_rate))
+    return bool(MAX_STEP_SHARE * speed > MIN_REST_STEP_RATIO * K.dt * speed_of(K, f, K.guards0, K.at_slip_rate))
 
 
 def keeps_direction(K: Frictions, f: int) -> bool:
     """Whether f stands for a group that slides in a direction that is held."""
-    return bool(leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] == HELD)
+    return bool(leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] == HOLD_DIRECTION)
 
 
 def turn_directions(K: Frictions, relaxation: float) -> None:
@@ -241,7 +243,7 @@ def turn_directions(K: Frictions, relaxation: float) -> None:
     for f in range(K.n_frictions):
         if keeps_direction(K, f):
             angle = abs(relaxation) * speed_of(K, f, K.across, 0)
-            part = relaxation * (FARTHEST / angle if angle > FARTHEST else 1.0)
+            part = relaxation * (MAX_HELD_TURN / angle if angle > MAX_HELD_TURN else 1.0)
             for g in range(f, f + K.group_size[f]):
                 K.slip[g] += part * K.across[g]
             aim(K, f)
@@ -253,7 +255,7 @@ def another_slides_on(K: Guards, event: int) -> bool:
     for f in range(K.n_frictions):
         if keeps_direction(K, f) and f != event and may_follow(K, f):
             left = along(K, f, K.guards1, K.at_slip)
-            if left > TOGETHER * speed_of(K, f, K.guards0, K.at_slip):
+            if left > COMMON_REST_SHARE * speed_of(K, f, K.guards0, K.at_slip):
                 set_hold(K, f, 0.0)
                 found = True
     return found

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents, mass_of
-from mbd.kernel.contact.cones import HELD, leads_group, product_of, speed_of
-from mbd.kernel.contact.contact_modes import STILL
+from mbd.kernel.contact.cones import HOLD_DIRECTION, leads_group, product_of, speed_of
+from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.records import Balance, ContactForces, Switching
 from mbd.kernel.stepping.restart import evaluate, stepping_rows
 
-__all__ = ["MIN_STEPS_TO_REST", "STABLE", "estimated_turn_rate"]
+__all__ = ["MIN_STEPS_TO_REST", "STABILITY_SHARE", "estimated_turn_rate"]
 
-STABLE = 2.0
+STABILITY_SHARE = 2.0
 """Step times the estimated rate at which friction turns directions that explicit schemes take [-].
 
 Beyond 2.785 that of order 4 lets what is across the direction grow from round-off until γ has turned away.
 """
 MIN_STEPS_TO_REST = 2.0
 """Steps in which γ must not reach zero, nor turn by a radian, for one to be as any other [-]."""
-SOON = 100.0
+MAX_STEPS_TO_REST = 100.0
 """Steps before it comes to rest from which on a motion that slows down is looked at [-]."""
 
 
@@ -35,11 +35,11 @@ def estimated_turn_rate(K: Switching) -> float:
     rate = 0.0
     rows = -1
     for f in range(K.n_frictions):
-        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HOLD_DIRECTION:
             gain = product_of(K, f, K.guards0, K.at_slip, K.at_slip_rate)
             speed = speed_of(K, f, K.guards0, K.at_slip)
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
-            still_fast = speed > STILL and speed > SOON * change * max(K.dt, K.step)
+            still_fast = speed > REST_SPEED and speed > MAX_STEPS_TO_REST * change * max(K.dt, K.step)
             if gain < 0.0 and still_fast:  # it slows down
                 continue
             if rows < 0:
@@ -56,7 +56,7 @@ def ease_across(K: Balance, f: int, rows: int) -> float:
     if K.group_size[f] == 2:
         mass = mass_of(K, f)
         return 1.0 / mass if mass > 0.0 else 0.0
-    return largest_ease(K, f, rows) if factor_saddle(K, rows, False, LOSS_AT_ONCE) else 0.0
+    return largest_ease(K, f, rows) if factor_saddle(K, rows, False, DIRECT_PIVOT_RTOL) else 0.0
 
 
 def largest_ease(K: Balance, f: int, rows: int) -> float:

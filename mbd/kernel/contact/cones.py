@@ -13,24 +13,24 @@ from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, Frictions, Guards, Reals
 
 __all__ = [
-    "HELD", "NO_DIRECTION", "ONSET", "across", "aim", "aim_along", "aim_as_pulled", "along", "away", "fill_slips",
-    "follow_motion", "follows", "friction_size", "hold_directions", "leads_group", "let_directions_go", "phase_of",
-    "product_of", "set_hold", "set_loose", "set_sticking", "sliding_force", "speed_of",
+    "HOLD_AT_ONSET", "HOLD_DIRECTION", "MIN_DIRECTION_SPEED", "across", "aim", "aim_along", "aim_as_pulled", "along",
+    "away", "fill_slips", "follow_motion", "follows", "friction_size", "hold_directions", "leads_group",
+    "let_directions_go", "phase_of", "product_of", "set_hold", "set_loose", "set_sticking", "sliding_force", "speed_of",
 ]  # fmt: skip
 
-HELD = 1e20
+HOLD_DIRECTION = 1e20
 """Of K.hold: λ_T keeps its direction whatever γ [-]."""
-ONSET = 1e-7
+HOLD_AT_ONSET = 1e-7
 """Of K.hold: λ_T keeps its direction while γ is round-off, and follows γ as it grows beyond [-]."""
-MOVING = 1e-3
+ONSET_END_SPEED = 1e-3
 """Speed [m/s] from which on the direction of the onset is forgotten."""
-BEGUN = 4e-6
+ONSET_SPEED = 4e-6
 """Speed [m/s] up to which it stays as it was, ten times what stands for γ then."""
-NO_DIRECTION = MOVING * ONSET
+MIN_DIRECTION_SPEED = ONSET_END_SPEED * HOLD_AT_ONSET
 """Speed [m/s, rad/s] below which γ is round-off, and K.slip stays that of the motion before."""
-LEAST = 1e-200
+MIN_COSINE = 1e-200
 """What stands for a cosine that is zero: 0.0 would say that nothing slides [-]."""
-LEAST_SQUARE = 1e-60
+MIN_SQUARED_SPEED = 1e-60
 """Square of a speed that is none, as in `mbd.equations.cones` [m²/s²]."""
 
 
@@ -69,10 +69,10 @@ def aim(K: Frictions, f: int) -> None:
         square += K.slip[g] * K.slip[g]
     size = sqrt(square)
     for g in range(first, first + K.group_size[f]):
-        none = 1.0 if g == first else LEAST
+        none = 1.0 if g == first else MIN_COSINE
         K.slip[g] = K.slip[g] / size if size > 0.0 else none
-        if abs(K.slip[g]) < LEAST:
-            K.slip[g] = LEAST
+        if abs(K.slip[g]) < MIN_COSINE:
+            K.slip[g] = MIN_COSINE
         K.lean[g] = K.slip[g]
 
 
@@ -122,7 +122,7 @@ def sliding_force(K: Frictions, f: int, limit: float, rates: Reals, first: int, 
         square += value * value
         if g == f:
             own = value
-    return float(own / sqrt(square + LEAST_SQUARE) * limit)
+    return float(own / sqrt(square + MIN_SQUARED_SPEED) * limit)
 
 
 def along(K: Frictions, f: int, values: Reals, first: int) -> float:
@@ -184,15 +184,15 @@ def phase_of(K: Frictions, f: int) -> float:
 def hold_directions(K: Frictions) -> None:
     """λ_T as K.slip has it, whatever γ: at instants."""
     for f in range(K.n_frictions):
-        K.hold[f] = HELD
+        K.hold[f] = HOLD_DIRECTION
 
 
 def let_directions_go(K: Guards) -> None:
     """After a restart: λ_T follows γ; where that is round-off it begins along K.slip."""
     for f in range(K.n_frictions):
         K.hold[f] = 0.0
-        if K.group_size[f] > 1 and K.slip[f] != 0.0 and speed_of(K, f, K.guards0, K.at_slip) < MOVING:
-            K.hold[f] = ONSET
+        if K.group_size[f] > 1 and K.slip[f] != 0.0 and speed_of(K, f, K.guards0, K.at_slip) < ONSET_END_SPEED:
+            K.hold[f] = HOLD_AT_ONSET
 
 
 def follow_motion(K: Guards) -> None:
@@ -203,10 +203,10 @@ def follow_motion(K: Guards) -> None:
     """
     for f in range(K.n_frictions):
         if leads_group(K, f) and K.slip[f] != 0.0:
-            least = BEGUN if K.hold[f] == ONSET else NO_DIRECTION
+            least = ONSET_SPEED if K.hold[f] == HOLD_AT_ONSET else MIN_DIRECTION_SPEED
             if speed_of(K, f, K.guards0, K.at_slip) >= least:
                 aim_along(K, f, K.guards0, K.at_slip)
     for f in range(K.n_frictions):
         if K.group_size[f] > 1 and K.slip[f] != 0.0:
-            if K.hold[f] == HELD or speed_of(K, f, K.guards0, K.at_slip) >= MOVING:
+            if K.hold[f] == HOLD_DIRECTION or speed_of(K, f, K.guards0, K.at_slip) >= ONSET_END_SPEED:
                 K.hold[f] = 0.0

@@ -12,8 +12,8 @@ from mbd.kernel.codes import (
     LOG_STUCK,
     NO_FORCE,
     NO_IMPACT,
+    NOT_KNOWN_YET,
     SLIP,
-    UNKNOWN,
 )
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import aim, follows, hold_directions, set_loose, set_sticking
@@ -22,11 +22,11 @@ from mbd.kernel.contact.jams import stop_slide
 from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Switching
 from mbd.kernel.stepping.restart import active_rows, capture, evaluate, row_speed, take_consistent
 
-__all__ = ["STILL", "resolve_contact_modes"]
+__all__ = ["REST_SPEED", "resolve_contact_modes"]
 
-STILL = 1e-9
+REST_SPEED = 1e-9
 """Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
-CLOSE_TO_STILL = 1e-7
+NEAR_REST_SPEED = 1e-7
 """The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
 
 
@@ -69,7 +69,7 @@ def resolve_contact_modes(K: Switching) -> int:
         if follows(K, f):  # the first of a group tells of all
             continue
         now = frictional_state(K, f)
-        if now != K.was[f] and K.was[f] != UNKNOWN:
+        if now != K.was[f] and K.was[f] != NOT_KNOWN_YET:
             if now == 2:
                 log_event(K, LOG_STUCK, f, 0.0, NO_IMPULSE)
             elif now != 0 and K.was[f] != 0:
@@ -166,8 +166,8 @@ def find_slips(K: Guards) -> None:
             K.loose[f] = 2 if K.strategy == 0 else 0
             continue
         small = max(1.0, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[f]])
-        still = abs(gamma) <= STILL * small
-        if (found == 2 and abs(gamma) <= CLOSE_TO_STILL * small) or (
+        still = abs(gamma) <= REST_SPEED * small
+        if (found == 2 and abs(gamma) <= NEAR_REST_SPEED * small) or (
             still and (K.slip[f] == 0.0 or K.event_kind != SLIP)
         ):
             K.loose[f] = 1
@@ -197,7 +197,7 @@ def find_slip_of_group(K: Guards, f: int) -> None:
         gamma = row_speed(K, K.friction_row[g])
         square += gamma * gamma
         small = max(small, 1e-2 * K.scale[K.n + K.n_rows + K.friction_row[g]])
-    if sqrt(square) <= (CLOSE_TO_STILL if found == 2 else STILL) * small:
+    if sqrt(square) <= (NEAR_REST_SPEED if found == 2 else REST_SPEED) * small:
         set_loose(K, f, 1)
         if K.slip[f] == 0.0 or K.event_kind != SLIP or found == 2:
             set_sticking(K, f, 1)

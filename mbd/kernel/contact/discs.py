@@ -13,15 +13,15 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import Complementarity
 
-__all__ = ["DISC_LINES", "disc_length", "disc_slack", "minimize_within_discs"]
+__all__ = ["DISC_SIZE", "disc_length", "disc_slack", "minimize_within_discs"]
 
-DISC_LINES = 4
+DISC_SIZE = 4
 """Numbers of a disc: three t_i and ℓ_i [-]."""
-FALL = 0.1
+GAP_REDUCTION = 0.1
 """Part of the present gap that the next step aims at [-]."""
-NO_GAP = 1e-15
+GAP_ATOL = 1e-15
 """κ_i (−g_i) that is none [-]."""
-NEARLY = 0.99
+BOUNDARY_SHARE = 0.99
 """Part of the way to the border that a step goes at most [-]."""
 
 
@@ -35,16 +35,16 @@ def disc_value(K: Complementarity, row: int, unknowns: int) -> float:
 
 def disc_length(K: Complementarity, i: int, unknowns: int) -> float:
     """‖t_i‖."""
-    x = disc_value(K, DISC_LINES * i, unknowns)
-    y = disc_value(K, DISC_LINES * i + 1, unknowns)
-    z = disc_value(K, DISC_LINES * i + 2, unknowns)
+    x = disc_value(K, DISC_SIZE * i, unknowns)
+    y = disc_value(K, DISC_SIZE * i + 1, unknowns)
+    z = disc_value(K, DISC_SIZE * i + 2, unknowns)
     return sqrt(x * x + y * y + z * z)
 
 
 def disc_slack(K: Complementarity, i: int, unknowns: int) -> float:
     """−g_i; negative as well where ℓ_i is."""
     length = disc_length(K, i, unknowns)
-    limit = disc_value(K, DISC_LINES * i + 3, unknowns)
+    limit = disc_value(K, DISC_SIZE * i + 3, unknowns)
     if not limit > 0.0:
         return -1.0
     return float((limit - length) * (limit + length) / limit)
@@ -53,11 +53,11 @@ def disc_slack(K: Complementarity, i: int, unknowns: int) -> float:
 def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
     """g_i′ into K.disc_slope, and what κ_i g_i″ and κ_i/s_i g_i′ g_i′ᵀ bring into the matrix K.disc_kkt."""
     width = K.n_disc_unknowns
-    limit = disc_value(K, DISC_LINES * i + 3, unknowns)
-    x = disc_value(K, DISC_LINES * i, unknowns) / limit
-    y = disc_value(K, DISC_LINES * i + 1, unknowns) / limit
-    z = disc_value(K, DISC_LINES * i + 2, unknowns) / limit
-    o = DISC_LINES * i * width
+    limit = disc_value(K, DISC_SIZE * i + 3, unknowns)
+    x = disc_value(K, DISC_SIZE * i, unknowns) / limit
+    y = disc_value(K, DISC_SIZE * i + 1, unknowns) / limit
+    z = disc_value(K, DISC_SIZE * i + 2, unknowns) / limit
+    o = DISC_SIZE * i * width
     o_l = o + 3 * width
     for j in range(unknowns):
         K.disc_slope[i * width + j] = (
@@ -113,7 +113,7 @@ def take_part(K: Complementarity, unknowns: int, discs: int) -> float:
     part = 1.0
     for i in range(discs):
         if K.disc_change[i] < 0.0:
-            part = min(part, -NEARLY * K.disc_force[i] / K.disc_change[i])
+            part = min(part, -BOUNDARY_SHARE * K.disc_force[i] / K.disc_change[i])
     for j in range(unknowns):
         K.disc_kept[j] = K.disc_y[j]
     for _ in range(60):
@@ -122,7 +122,7 @@ def take_part(K: Complementarity, unknowns: int, discs: int) -> float:
             K.disc_y[j] = K.disc_kept[j] + part * K.disc_step[j]
         for i in range(discs):
             left = disc_slack(K, i, unknowns)
-            inside = inside and left > (1.0 - NEARLY) * K.disc_left[i] * (1.0 - part)
+            inside = inside and left > (1.0 - BOUNDARY_SHARE) * K.disc_left[i] * (1.0 - part)
             inside = inside and left > 0.0
         if inside:
             for i in range(discs):
@@ -147,15 +147,15 @@ def minimize_within_discs(K: Complementarity, unknowns: int, discs: int) -> int:
         gap = 0.0
         for i in range(discs):
             gap += K.disc_force[i] * K.disc_left[i] / discs
-        if find_step(K, unknowns, discs, FALL * gap) != 0:
+        if find_step(K, unknowns, discs, GAP_REDUCTION * gap) != 0:
             return 0
         part = take_part(K, unknowns, discs)
         size = 0.0
         for j in range(unknowns):
             size = max(size, abs(part * K.disc_step[j]))
-        if part == 0.0 or (gap < NO_GAP and size < 1e-13):
+        if part == 0.0 or (gap < GAP_ATOL and size < 1e-13):
             return 0
-        small = small + 1 if gap < NO_GAP else 0
+        small = small + 1 if gap < GAP_ATOL else 0
         if small > 5:
             return 0
     return 0

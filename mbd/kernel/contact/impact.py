@@ -33,11 +33,11 @@ from mbd.kernel.stepping.restart import row_speed
 
 __all__ = ["impact"]
 
-MOST_BLOWS = 1000
+MAX_IMPACTS = 1000
 """Impacts of the sequential law at one instant [-]."""
-GAIN = 1e-12
+ENERGY_GAIN_RTOL = 1e-12
 """Energy that impulses add, relative to its terms, above which a law is given up: restitution that sticks can [-]."""
-APPROACH = 1e-11
+APPROACH_RTOL = 1e-11
 """Approach speed, relative to the fastest, that counts as none [-]."""
 
 
@@ -62,7 +62,7 @@ def impact(K: Switching, slow: bool) -> int:
     unsolved = status == CONFLICT or status == NO_IMPACT
     if status != 0 and not (unsolved and not slow and rebounds(K)):
         return status
-    if not slow and (unsolved or energy_gain(K) > GAIN):
+    if not slow and (unsolved or energy_gain(K) > ENERGY_GAIN_RTOL):
         for c in range(K.n_contacts):
             if K.closing[c] > 0 and K.restitution[c] > 1.0:
                 return status if unsolved else ENERGY_GAIN
@@ -71,7 +71,7 @@ def impact(K: Switching, slow: bool) -> int:
         status = poisson_law(K, True)
         if status != 0:
             return status
-        if energy_gain(K) > GAIN:
+        if energy_gain(K) > ENERGY_GAIN_RTOL:
             return ENERGY_GAIN
     if slow and K.strategy == 0:
         rest(K)
@@ -225,14 +225,14 @@ def sequential_law(K: Switching) -> int:
     for c in range(K.n_contacts):
         K.touched[c] = K.active[c]  # takes part
     fastest = 0.0
-    for _ in range(MOST_BLOWS):
+    for _ in range(MAX_IMPACTS):
         most = 0.0
         for c in range(K.n_contacts):
             if K.touched[c] == 1:
                 approach = -speed(K, K.normal[c])
                 most = max(most, abs(approach) if is_held_through(K, c) else approach)
         fastest = max(fastest, most)
-        if most <= APPROACH * fastest or most < 1e-14:
+        if most <= APPROACH_RTOL * fastest or most < 1e-14:
             end_together(K, fastest)
             return 0
         for c in range(K.n_contacts):

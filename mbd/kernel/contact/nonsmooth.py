@@ -18,7 +18,7 @@ from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import follows
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
-from mbd.kernel.contact.contact_modes import STILL
+from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.contact.nonsmooth_cones import hold_together, release, turned_in_plane
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.events.switching import close_by_impact, mark_touching
@@ -28,11 +28,11 @@ from mbd.kernel.stepping.restart import consistent, displace, evaluate, is_held,
 
 __all__ = ["keep", "closes_below_surface", "must_release", "put_back", "rebound", "strike"]
 
-SUNK = 1e4
+MAX_DEPTH_OVER_ROUND_OFF = 1e4
 """Depth over the round-off of a gap at which a correction of positions has failed [-]."""
-HELD = 1024.0 * EPS
+HELD_ROW_RTOL = 1024.0 * EPS
 """What a row on positions is off by, relative to its terms, where it holds [-]."""
-RESTING = 2.0
+REST_SPEED_RATIO = 2.0
 """Approach speed over the change of speed in a step below which a contact rests instead of rebounding [-]."""
 
 
@@ -102,7 +102,7 @@ def closes_below_surface(K: Guards) -> bool:
             found = found or (K.slip[f] != 0.0 and not follows(K, f) and turned_in_plane(K, f))
         elif K.slip[f] != 0.0:
             turned = -K.slip[f] * K.guards1[K.at_slip + f]
-            if turned > STILL:
+            if turned > REST_SPEED:
                 found = True
     return found
 
@@ -143,7 +143,7 @@ def project_gaps(K: Switching) -> int:
             break
     K.slip[: K.n_frictions] = K.base_limit[: K.n_frictions]
     K.lifting[: K.n_rows] = 0
-    if status == 0 and left > SUNK:
+    if status == 0 and left > MAX_DEPTH_OVER_ROUND_OFF:
         return NO_IMPACT
     return status
 
@@ -175,7 +175,7 @@ def touches(K: ContactRows) -> bool:
     """Whether all rows that act hold at K.q but for round-off, in which rows that nearly depend may contradict."""
     for row in range(K.n_rows):
         if is_held(K, row, K.active) and K.row_level[row] == 0:
-            if not abs(K.acc[K.acc_h + row]) <= HELD * max(K.scale[K.n + row], 1e-3):
+            if not abs(K.acc[K.acc_h + row]) <= HELD_ROW_RTOL * max(K.scale[K.n + row], 1e-3):
                 return False
     return True
 
@@ -205,7 +205,7 @@ def rebound(K: Switching) -> int:
         if K.closing[c] == 1:
             approach = max(-K.before[c], 0.0)
             gained = abs(K.guards0[K.at_gap_rate + c] - K.before[c])
-            if approach < RESTING * gained:
+            if approach < REST_SPEED_RATIO * gained:
                 K.before[c] = 0.0  # it rests
             else:
                 K.before[c] = max(

@@ -10,15 +10,24 @@ from __future__ import annotations
 
 from mbd.kernel.codes import PULL
 from mbd.kernel.contact.cone_contacts import all_hold
-from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABLE, estimated_turn_rate
-from mbd.kernel.contact.cones import HELD, aim_as_pulled, along, away, friction_size, leads_group, set_hold, speed_of
-from mbd.kernel.contact.contact_modes import STILL
+from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABILITY_SHARE, estimated_turn_rate
+from mbd.kernel.contact.cones import (
+    HOLD_DIRECTION,
+    aim_as_pulled,
+    along,
+    away,
+    friction_size,
+    leads_group,
+    set_hold,
+    speed_of,
+)
+from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate, evaluate_loaded, largest_force, limit_of
 
 __all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release", "turned_in_plane"]
 
-TURNED = 1e-6
+MAX_HELD_SINE = 1e-6
 """Sine of the angle by which γ may leave the direction that a step holds [-]."""
 
 
@@ -27,8 +36,10 @@ def hold_for_step(K: Switching, h: float) -> None:
     for f in range(K.n_frictions):
         if leads_group(K, f) and K.slip[f] != 0.0:
             change = speed_of(K, f, K.guards0, K.at_slip_rate)
-            set_hold(K, f, HELD if MIN_STEPS_TO_REST * h * change > speed_of(K, f, K.guards0, K.at_slip) else 0.0)
-    if K.explicit == 1 and h * estimated_turn_rate(K) > STABLE:
+            set_hold(
+                K, f, HOLD_DIRECTION if MIN_STEPS_TO_REST * h * change > speed_of(K, f, K.guards0, K.at_slip) else 0.0
+            )
+    if K.explicit == 1 and h * estimated_turn_rate(K) > STABILITY_SHARE:
         hold_all(K)
 
 
@@ -39,8 +50,8 @@ def hold_all(K: Frictions) -> bool:
     """
     found = False
     for f in range(K.n_frictions):
-        if K.group_size[f] > 1 and K.slip[f] != 0.0 and K.hold[f] != HELD:
-            K.hold[f] = HELD
+        if K.group_size[f] > 1 and K.slip[f] != 0.0 and K.hold[f] != HOLD_DIRECTION:
+            K.hold[f] = HOLD_DIRECTION
             found = True
     return found
 
@@ -48,9 +59,9 @@ def hold_all(K: Frictions) -> bool:
 def turned_in_plane(K: Guards, f: int) -> bool:
     """Whether the group of f ends a step in another direction than it held, beyond zero, or at rest."""
     forward = along(K, f, K.guards1, K.at_slip)
-    if K.hold[f] != HELD:
-        return forward < -STILL
-    return bool(forward <= STILL or away(K, f, K.guards1, K.at_slip) > TURNED * forward)
+    if K.hold[f] != HOLD_DIRECTION:
+        return forward < -REST_SPEED
+    return bool(forward <= REST_SPEED or away(K, f, K.guards1, K.at_slip) > MAX_HELD_SINE * forward)
 
 
 def release(K: Switching, f: int, least: float) -> int:

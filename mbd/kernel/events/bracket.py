@@ -12,9 +12,9 @@ from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate, 
 
 __all__ = ["bracket", "flag_of"]
 
-MAX_LOOKS = 12
+MAX_HALVINGS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
-AT_SURFACE = 1e-10
+SURFACE_RTOL = 1e-10
 """Part of its terms within which a gap is at rest on its surface [-]."""
 
 
@@ -39,7 +39,7 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         low = find_way(K, kind, index, high, root_tolerance(K, kind, index, f_low, f_high))
         if low < 0.0:
             return int(-low)
-        if low == 0.0 and kind == CLOSE and abs(K.guards0[index]) <= AT_SURFACE * gap_scale(K, index):
+        if low == 0.0 and kind == CLOSE and abs(K.guards0[index]) <= SURFACE_RTOL * gap_scale(K, index):
             status = parts_slowly(K, index, high)
             if status == 0:
                 reject_event(K, kind, index)
@@ -147,7 +147,7 @@ def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> floa
     It is seen where the guard is above `tiny`. 0 if none sees it; − status if a step fails.
     """
     low = high
-    for _ in range(MAX_LOOKS):
+    for _ in range(MAX_HALVINGS):
         low *= 0.5
         status = event_candidate(K, low, K.time + low)
         if status != 0:
@@ -165,7 +165,7 @@ def parts_slowly(K: Kernel, c: int, high: float) -> int:
     """
     place = high
     rising = 0
-    for _ in range(MAX_LOOKS):
+    for _ in range(MAX_HALVINGS):
         place *= 0.5
         status = event_candidate(K, place, K.time + place)
         if status != 0:

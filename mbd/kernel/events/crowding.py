@@ -13,11 +13,11 @@ from mbd.kernel.records import Guards, Switching
 
 __all__ = ["count_impact", "crowd", "crowds"]
 
-MOST_CROWDED = 64.0
+MAX_EXCESS_IMPACTS = 64.0
 """Impacts through several contacts, less one for each dt, from which on steps are non-smooth [-]."""
-SEVERAL = 2
+MIN_CONTACTS = 2
 """Contacts closed already that take part in such an impact [-]."""
-PART = 1e-6
+IMPULSE_RTOL = 1e-6
 """Impulse over the largest of an impact that is more than round-off [-]."""
 
 
@@ -34,16 +34,16 @@ def count_impact(K: Switching) -> None:
             largest = max(largest, abs(K.impulse[K.normal[c]]))
     several = 0
     for c in range(K.n_contacts):
-        if K.kind[c] == 0 and K.closing[c] == 0 and abs(K.impulse[K.normal[c]]) > PART * largest:
+        if K.kind[c] == 0 and K.closing[c] == 0 and abs(K.impulse[K.normal[c]]) > IMPULSE_RTOL * largest:
             several += 1
-    if several >= SEVERAL:
+    if several >= MIN_CONTACTS:
         K.crowding = crowd(K) + 1.0
         K.crowding_time = K.time
 
 
 def crowds(K: Guards) -> bool:
     """Whether non-smooth steps follow from now on, as impacts have crowded; said once."""
-    if K.auto == 0 or K.fallback > 0 or K.crowding <= MOST_CROWDED:
+    if K.auto == 0 or K.fallback > 0 or K.crowding <= MAX_EXCESS_IMPACTS:
         return False
     K.fallback = 1
     K.fallback_time = K.time

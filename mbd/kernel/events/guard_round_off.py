@@ -23,17 +23,17 @@ from mbd.kernel.hooks import call
 from mbd.kernel.records import Guards, Model, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate, is_held
 
-__all__ = ["STEADY", "condition_round_off", "guard_round_off"]
+__all__ = ["TRUSTED_CHANGE", "condition_round_off", "guard_round_off"]
 
-OWN = 4.0
+NUMBER_ULPS = 4.0
 """Round-off of a number, in units of its last place [-]."""
-ROUGH = 64.0
+ROW_ULPS = 64.0
 """The same of what rows leave open, in which many terms take part [-]."""
-LASTING = 2.0**14
+BALANCE_ULPS = 2.0**14
 """The same of the balance, which may push the same way in many steps: near rest, for part of a period of motion [-]."""
-STEADY = 4.0
+TRUSTED_CHANGE = 4.0
 """Round-offs of a change whose sign is to be trusted [-]."""
-MAGNIFIED = 2.0**20
+PROBE_ULPS = 2.0**20
 """Times round-off by which a coordinate is moved to see what it does to a guard, so that it is seen at all [-]."""
 
 
@@ -51,7 +51,7 @@ def inherited(K: Switching, place: int, term: int, t: float, q: Reals, y: Reals)
     """Round-off of the guard value at a place, whose terms have another in their program."""
     evaluate(K, t, q, y)
     call(K, TERMS, K.doubt)
-    doubt = OWN * EPS * K.doubt[term]
+    doubt = NUMBER_ULPS * EPS * K.doubt[term]
     call(K, GUARDS, K.doubt)
     here = K.doubt[place]
     doubts_of_state(K, q, y)
@@ -65,10 +65,10 @@ def inherited(K: Switching, place: int, term: int, t: float, q: Reals, y: Reals)
 def change_by(K: Guards, place: int, here: float, at: int, doubt: float) -> float:
     """What round-off of one input of the block does to a guard value, which is `here` without it."""
     kept = K.block[at]
-    K.block[at] = kept + MAGNIFIED * doubt
+    K.block[at] = kept + PROBE_ULPS * doubt
     call(K, GUARDS, K.doubt)
     K.block[at] = kept
-    return float(abs(K.doubt[place] - here) / MAGNIFIED)
+    return float(abs(K.doubt[place] - here) / PROBE_ULPS)
 
 
 def doubts_of_state(K: Switching, q: Reals, y: Reals) -> None:
@@ -83,25 +83,25 @@ def doubts_of_state(K: Switching, q: Reals, y: Reals) -> None:
         mass = abs(K.acc[i * n + i])
         acceleration = K.scale[i] / mass if mass > 0.0 else 0.0
         fastest = max(fastest, acceleration)
-        K.doubt[K.doubt_v + i] = OWN * EPS * abs(y[i]) + LASTING * EPS * h * acceleration
+        K.doubt[K.doubt_v + i] = NUMBER_ULPS * EPS * abs(y[i]) + BALANCE_ULPS * EPS * h * acceleration
     for i in range(K.n_v):
-        K.doubt[K.doubt_x + i] = OWN * EPS * (abs(q[i]) if K.vector == 1 else largest)
+        K.doubt[K.doubt_x + i] = NUMBER_ULPS * EPS * (abs(q[i]) if K.vector == 1 else largest)
     o_B = K.acc_B
-    loose = K.tolerance / (ROUGH * EPS) * h * h * fastest
+    loose = K.tolerance / (ROW_ULPS * EPS) * h * h * fastest
     for k in range(K.n_rows):
         if not is_held(K, k, K.closed) or K.dropped[k] == 1:
             continue
         size = 0.0
         for j in range(K.n_v):
             size += K.acc[o_B + k * n + j] * K.acc[o_B + k * n + j] * lightness(K, j)
-        missed = max(EPS * ROUGH * K.scale[n + k], abs(K.acc[K.acc_h + k]))
+        missed = max(EPS * ROW_ULPS * K.scale[n + k], abs(K.acc[K.acc_h + k]))
         for i in range(K.n_v):
             share = abs(K.acc[o_B + k * n + i]) * lightness(K, i) / (size + 1e-300)
-            K.doubt[K.doubt_v + i] += EPS * ROUGH * share * K.scale[n + K.n_rows + k]
+            K.doubt[K.doubt_v + i] += EPS * ROW_ULPS * share * K.scale[n + K.n_rows + k]
             if K.row_level[k] == 0:
                 K.doubt[K.doubt_x + i] += share * missed
                 if K.stabilized == 0:
-                    K.doubt[K.doubt_v + i] += EPS * ROUGH * share * (K.scale[n + k] + loose) / h
+                    K.doubt[K.doubt_v + i] += EPS * ROW_ULPS * share * (K.scale[n + k] + loose) / h
     for i in range(K.n_v):
         K.doubt[K.doubt_x + i] += h * K.doubt[K.doubt_v + i]
 

@@ -21,8 +21,8 @@ from mbd.kernel.events.guards import gap_tolerance, is_waiting, is_watched
 from mbd.kernel.records import Events, Guards, Switching
 
 __all__ = [
-    "LEAST_SPEED",
-    "SAME_INSTANT",
+    "MIN_SPEED",
+    "INSTANT_RTOL",
     "find_crossings",
     "find_passed",
     "is_at_event",
@@ -32,15 +32,15 @@ __all__ = [
     "striking_contact",
 ]
 
-SAME_INSTANT = 1e-9
+INSTANT_RTOL = 1e-9
 """Part of the way to an event by which another of the same instant may seem to come later [-]."""
-IN_REACH = 1e-3
+REACH_SHARE = 1e-3
 """Part of a step within which a guard must reach zero at its rate, for its round-off to be looked at [-]."""
-AT_REST = 1e-10
+REST_RATE_RTOL = 1e-10
 """Rate of a guard after an event, over that before, which is none [-]."""
-LEAST_SPEED = 1e-200
+MIN_SPEED = 1e-200
 """What is added to a speed that may be zero [m/s, rad/s]."""
-NEAR_ZERO = 2.0**20
+RESET_ROUND_OFFS = 2.0**20
 """Round-offs of a guard beyond which a reset has moved it away from zero [-]."""
 
 
@@ -66,9 +66,9 @@ def mark(K: Events, e: int) -> None:
 
 def is_at_event(K: Guards, e: int) -> bool:
     """Whether guard e is zero at the event, as far as its instant is known; the state is there."""
-    known = max(SAME_INSTANT * K.event_after, 8.0 * EPS * abs(K.time))
+    known = max(INSTANT_RTOL * K.event_after, 8.0 * EPS * abs(K.time))
     if K.event_kind == CLOSE:
-        known += gap_tolerance(K, K.event_index) / (abs(K.guards0[K.at_gap_rate + K.event_index]) + LEAST_SPEED)
+        known += gap_tolerance(K, K.event_index) / (abs(K.guards0[K.at_gap_rate + K.event_index]) + MIN_SPEED)
     return bool(abs(K.guards0[K.at_user + e]) <= known * abs(K.guards0[K.at_user_rate + e]))
 
 
@@ -79,7 +79,7 @@ def reaches_zero(K: Switching, e: int) -> bool:
     side = K.side[e]
     rate = -side * K.guards0[K.at_user_rate + e]
     left = side * K.guards0[K.at_user + e]
-    if rate <= 0.0 or K.direction[e] * side > 0.0 or left > IN_REACH * K.step * rate:
+    if rate <= 0.0 or K.direction[e] * side > 0.0 or left > REACH_SHARE * K.step * rate:
         return False
     return is_at_event(K, e) or bool(left <= guard_round_off(K, e, K.time, K.q, K.y))
 
@@ -89,7 +89,7 @@ def striking_contact(K: Guards) -> int:
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and is_watched(K, c, K.guards0):
             speed = -K.guards1[K.at_gap_rate + c]
-            if speed > 0.0 and K.guards1[c] <= max(gap_tolerance(K, c), SAME_INSTANT * K.event_after * speed):
+            if speed > 0.0 and K.guards1[c] <= max(gap_tolerance(K, c), INSTANT_RTOL * K.event_after * speed):
                 return c
     return -1
 
@@ -113,7 +113,7 @@ def keep_at_zero(K: Switching, h: float) -> None:
         if K.passing[e] == 1:
             K.met[e] = K.guards0[K.at_user + e]
             left = K.side[e] * K.met[e]
-            near = SAME_INSTANT * h * abs(K.met[K.n_guards + e])
+            near = INSTANT_RTOL * h * abs(K.met[K.n_guards + e])
             if left > near and left > guard_round_off(K, e, K.time, K.q, K.y):
                 K.passing[e] = 0
 
@@ -141,9 +141,9 @@ def settle_sides(K: Switching) -> None:
         value = K.guards0[K.at_user + e]
         before = K.met[K.n_guards + e]
         after = K.guards0[K.at_user_rate + e]
-        if value != K.met[e] and abs(value) > NEAR_ZERO * guard_round_off(K, e, K.time, K.q, K.y):
+        if value != K.met[e] and abs(value) > RESET_ROUND_OFFS * guard_round_off(K, e, K.time, K.q, K.y):
             K.side[e] = 1.0 if value > 0.0 else -1.0
-        elif before != 0.0 and abs(after) <= AT_REST * abs(before):
+        elif before != 0.0 and abs(after) <= REST_RATE_RTOL * abs(before):
             K.side[e] = 0.0
         elif before < 0.0 < after or after < 0.0 < before or (before == 0.0 and K.n_switches > 0):
             K.side[e] = -K.side[e]

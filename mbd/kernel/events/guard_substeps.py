@@ -21,7 +21,7 @@ from mbd.kernel.stepping.restart import compose, consistent, fill_block
 
 __all__ = ["copy_ends", "interpolate_candidate", "parts_to_take", "put_candidate_back"]
 
-FINEST = 16.0
+INTERPOLATION_ULPS = 16.0
 """Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""
 
 
@@ -104,7 +104,7 @@ def interpolate_candidate(K: Switching, t: float, h: float, s: float, asked: boo
             end = K.inside[K.inside_q + i] - K.q[i] if K.vector == 1 else K.chart_end[i]
             size = abs(K.q[i]) if K.vector == 1 else 1.0
             gap = end - h * whole
-            if abs(gap) <= FINEST * EPS * size:  # round-off over h would be a velocity
+            if abs(gap) <= INTERPOLATION_ULPS * EPS * size:  # round-off over h would be a velocity
                 gap = 0.0
             x = y0 * (s + u * s * (0.5 * s - 1.0)) + y1 * u * s * (1.0 - 0.5 * s)
             x += d0 * u * (0.5 + s * (0.25 * s - 2.0 / 3.0)) + d1 * u * s * (0.25 * s - 1.0 / 3.0)

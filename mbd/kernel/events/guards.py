@@ -25,8 +25,8 @@ from mbd.kernel.codes import (
     STICK_BRIEF,
     WATCH,
 )
-from mbd.kernel.contact.cones import HELD, along, follows, friction_size
-from mbd.kernel.events.guard_round_off import STEADY, condition_round_off, guard_round_off
+from mbd.kernel.contact.cones import HOLD_DIRECTION, along, follows, friction_size
+from mbd.kernel.events.guard_round_off import TRUSTED_CHANGE, condition_round_off, guard_round_off
 from mbd.kernel.events.hermite import crossing, hermite, hermite_turn
 from mbd.kernel.hooks import call
 from mbd.kernel.records import (
@@ -47,7 +47,7 @@ from mbd.kernel.stepping.restart import (
     largest_force,
     limit_of,
 )
-from mbd.kernel.stepping.scales import ROUGH
+from mbd.kernel.stepping.scales import FORCE_ULPS
 
 __all__ = [
     "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
@@ -55,17 +55,17 @@ __all__ = [
 ]  # fmt: skip
 
 
-DOUBTFUL = 0.25
+DOUBTFUL_SHARE = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
-REST = 1e-12
+SLIP_RTOL = 1e-12
 """Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
-CLOSE_BY = 1e-3
+NEAR_TURN_RATIO = 1e-3
 """Part of what a guard changes by in a step, at its first rate, above zero where the turn is looked at itself [-]."""
-LOST = 1e-10
+FALL_RTOL = 1e-10
 """Part of its terms by which a gap may fall though its rate is none or positive at both ends of a step [-]."""
-CLEARLY = 16.0
+RETREAT_ROUND_OFFS = 16.0
 """Round-offs of a guard by which it has gone back; a contact at its surface may leave it off by some of them [-]."""
-APART = 1e-6
+CLEAR_GAP = 1e-6
 """Gap [m, rad] above which a contact is clearly open."""
 
 
@@ -159,7 +159,7 @@ def goes_back(K: Switching, e: int, value: float, t: float, q: Reals, y: Reals) 
     back = -K.direction[e]
     if not (back * K.side[e] < 0.0 and back * value > 0.0):
         return False
-    return bool(abs(value) > CLEARLY * guard_round_off(K, e, t, q, y))
+    return bool(abs(value) > RETREAT_ROUND_OFFS * guard_round_off(K, e, t, q, y))
 
 
 def consider(K: Events, kind: int, index: int, estimate: float, low: float) -> None:
@@ -178,7 +178,7 @@ def is_quiet(K: Guards) -> bool:
     for c in range(K.n_contacts):
         if K.closed[c] != 0 or K.armed[c] != 1 or K.while_kind[c] != 0:
             return False
-        if not (K.guards0[c] > APART and K.guards1[c] > APART):
+        if not (K.guards0[c] > CLEAR_GAP and K.guards1[c] > CLEAR_GAP):
             return False
         if K.guards0[K.at_gap_rate + c] < 0.0 < K.guards1[K.at_gap_rate + c]:
             return False
@@ -206,7 +206,7 @@ def judge(K: Switching, h: float) -> bool:
             if K.armed[c] != 1 or not is_watched(K, c, K.guards0):
                 continue
             if g1 < -tiny:
-                if min(d0, d1) >= -tiny and rises(g0, g1 + tiny, d0, d1, LOST * gap_scale(K, c), d1 * K.dt / h):
+                if min(d0, d1) >= -tiny and rises(g0, g1 + tiny, d0, d1, FALL_RTOL * gap_scale(K, c), d1 * K.dt / h):
                     continue
                 slow = d0 >= -tiny and g0 - g1 > tiny  # what comes before it is looked at first
                 if g0 > tiny:
@@ -219,7 +219,7 @@ def judge(K: Switching, h: float) -> bool:
                         consider(K, CLOSE, c, sqrt(tiny / (g0 - g1)) if slow else 0.0, 0.0)
             elif d0 < -tiny and d1 > 0.0:
                 bottom = hermite_turn(g0, g1, d0, d1, False)
-                limit = -CLOSE_BY * d0 if g0 > tiny else min(g0, 0.0) - 4.0 * tiny
+                limit = -NEAR_TURN_RATIO * d0 if g0 > tiny else min(g0, 0.0) - 4.0 * tiny
                 if bottom > 0.0 and hermite(g0, g1, d0, d1, bottom) < limit:
                     consider(K, GRAZE, c, bottom, 0.0)
         elif K.kind[c] == 0:
@@ -285,7 +285,7 @@ def judge_user(K: Switching, e: int, h: float) -> None:
     d0 = side * K.guards0[K.at_user_rate + e] * h
     d1 = side * K.guards1[K.at_user_rate + e] * h
     doubt = guard_round_off(K, e, K.time + h, K.q1, K.y1)
-    if -v1 <= doubt and min(v0, -d1) <= STEADY * doubt:
+    if -v1 <= doubt and min(v0, -d1) <= TRUSTED_CHANGE * doubt:
         return
     top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
     if top > 0.0:
@@ -300,7 +300,7 @@ def judge_return(K: Events, e: int, v0: float, v1: float, h: float) -> None:
     d1 = K.side[e] * K.guards1[K.at_user_rate + e] * h
     if v0 > 0.0 and d0 < 0.0 < d1:
         bottom = hermite_turn(v0, v1, d0, d1, False)
-        if bottom > 0.0 and hermite(v0, v1, d0, d1, bottom) < -CLOSE_BY * d0:
+        if bottom > 0.0 and hermite(v0, v1, d0, d1, bottom) < -NEAR_TURN_RATIO * d0:
             consider(K, CROSS_BRIEF, e, bottom, 0.0)
 
 
@@ -327,7 +327,7 @@ def is_doubtful(K: Model, force: float, change: float) -> bool:
         return False
     if abs(force) < abs(change):
         return True
-    return bool(K.stabilized == 0 and abs(force) < DOUBTFUL * largest_force(K))
+    return bool(K.stabilized == 0 and abs(force) < DOUBTFUL_SHARE * largest_force(K))
 
 
 def judge_friction(K: Switching, f: int, h: float) -> None:
@@ -343,13 +343,15 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
         return
     s = K.slip[f]
-    if s == 0.0 or (K.group_size[f] > 1 and K.hold[f] != HELD):  # in a plane γ passes zero where its direction is held
+    if s == 0.0 or (
+        K.group_size[f] > 1 and K.hold[f] != HOLD_DIRECTION
+    ):  # in a plane γ passes zero where its direction is held
         return
     v0 = along(K, f, K.guards0, K.at_slip)
     v1 = along(K, f, K.guards1, K.at_slip)
     d0 = along(K, f, K.guards0, K.at_slip_rate) * h
     d1 = along(K, f, K.guards1, K.at_slip_rate) * h
-    tiny = REST * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
+    tiny = SLIP_RTOL * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
     if v1 < -tiny:
         top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
         if v0 > tiny:
@@ -366,7 +368,7 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
 
 def pull_round_off(K: ContactRows, f: int, lam: Reals) -> float:
     """Round-off of what is left of a sticking friction at given multipliers: that of all forces enters each of them."""
-    return ROUGH * EPS * max(friction_size(K, f, lam), largest_force(K))
+    return FORCE_ULPS * EPS * max(friction_size(K, f, lam), largest_force(K))
 
 
 def change_of_margin(K: Guards, f: int) -> float:

@@ -15,7 +15,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.events.bracket import bracket, flag_of
 from mbd.kernel.events.guard_round_off import guard_round_off
-from mbd.kernel.events.guard_sides import SAME_INSTANT, striking_contact
+from mbd.kernel.events.guard_sides import INSTANT_RTOL, striking_contact
 from mbd.kernel.events.guards import (
     gap_scale,
     gap_tolerance,
@@ -28,9 +28,9 @@ from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["find_jump", "jumps_over_stop", "locate"]
 
-JUMP = 1e-6
+ANGLE_RTOL = 1e-6
 """Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
-UNEXPLAINED = 0.5
+MAX_UNEXPLAINED_TURN = 0.5
 """What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
 EARLIER, LATER = -2, -1
 """Where `fall_back` has seen another guard fire: before the place looked at, or in the full step."""
@@ -117,7 +117,7 @@ def locate(K: Kernel, h: float) -> int:
         found = K.event_after
         if found <= 0.0:
             return 0
-        together = found_kind >= 0 and found > (1.0 - SAME_INSTANT) * end  # as the one it was looked for before
+        together = found_kind >= 0 and found > (1.0 - INSTANT_RTOL) * end  # as the one it was looked for before
         if together or not another_before(K, kind, index, found):
             take_event(K, kind, index, found)
             if (kind == CROSS or kind == CROSS_BACK) and K.strategy == 0:  # of one instant, the contact comes first
@@ -161,7 +161,7 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
 
 def jumps(K: Switching, c: int) -> bool:
     """Whether the angle of contact c is nowhere zero as it closes, as a twist at half a turn: K.failure_index."""
-    if K.row_unit[K.normal[c]] != 1 or abs(K.guards1[c]) <= JUMP * gap_scale(K, c):
+    if K.row_unit[K.normal[c]] != 1 or abs(K.guards1[c]) <= ANGLE_RTOL * gap_scale(K, c):
         return False
     K.failure_index = c
     return True
@@ -175,7 +175,7 @@ def find_jump(K: Kernel, h: float, t1: float) -> int:
     for c in range(K.n_contacts):
         if K.closing[c] == 1 and K.row_unit[K.normal[c]] == 1 and K.guards0[c] > 0.0:
             mean = 0.5 * (K.guards0[K.at_gap_rate + c] + K.guards1[K.at_gap_rate + c])
-            if abs(K.guards1[c] - K.guards0[c] - h * mean) > UNEXPLAINED:
+            if abs(K.guards1[c] - K.guards0[c] - h * mean) > MAX_UNEXPLAINED_TURN:
                 status = bracket(K, CLOSE, c, 0.0, h)
                 if status == 0 and K.event_after > 0.0 and jumps(K, c):
                     return JUMPED
@@ -194,7 +194,11 @@ def jumps_over_stop(K: Switching, h: float) -> bool:
     for c in range(K.n_contacts):
         if K.row_unit[K.normal[c]] == 1 and K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1:
             there = K.guards0[c] + 0.5 * h * (K.guards0[K.at_gap_rate + c] + K.guards1[K.at_gap_rate + c])
-            if there < 0.0 < K.guards1[c] and K.guards1[c] - there > UNEXPLAINED and is_watched(K, c, K.guards0):
+            if (
+                there < 0.0 < K.guards1[c]
+                and K.guards1[c] - there > MAX_UNEXPLAINED_TURN
+                and is_watched(K, c, K.guards0)
+            ):
                 K.failure_index = c
                 found = True
     return found
@@ -205,7 +209,7 @@ def another_before(K: Switching, kind: int, index: int, found: float) -> bool:
     place = flag_of(K, kind, index)
     quiet = K.active[place]
     K.active[place] = 1
-    other = judge(K, found) and K.event_place < 1.0 - SAME_INSTANT
+    other = judge(K, found) and K.event_place < 1.0 - INSTANT_RTOL
     K.active[place] = quiet
     return other
 
@@ -247,5 +251,5 @@ def left_alone(K: Guards, c: int) -> bool:
     place = K.at_condition + c
     change = abs(K.guards0[place] - K.guards1[place])
     fall = abs(K.guards0[c] - K.guards1[c])
-    apart = SAME_INSTANT * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
+    apart = INSTANT_RTOL * K.step / K.event_after + gap_tolerance(K, c) / (fall + 1e-300)  # of the way here, at most
     return bool(K.guards1[place] <= apart * change)

@@ -9,7 +9,7 @@ from mbd.kernel.stepping.accept_restart import event_candidate
 
 __all__ = ["enough", "refine"]
 
-NO_MOVE = 1e300
+NOT_TRUSTED = 1e300
 """What `interpolated` gives where its move is not to be trusted."""
 
 
@@ -48,7 +48,7 @@ def refine(K: Kernel, kind: int, index: int, low: float, f_low: float, high: flo
             trusted = interpolated(a, b, c, fa, fb, fc, before, limit)
         before = move
         move = trusted
-        if trusted == NO_MOVE:
+        if trusted == NOT_TRUSTED:
             move = half
             before = half
         a = b
@@ -81,10 +81,10 @@ def enough(K: ContactRows, kind: int, index: int, f_low: float, f_high: float) -
 def interpolated(a: float, b: float, c: float, fa: float, fb: float, fc: float, before: float, limit: float) -> float:
     """The move from b to the zero of the inverse parabola through three points (of the line through two, a = c).
 
-    `NO_MOVE` where it leaves the bracket from b to c, or the iterates do not close in by half as fast as two moves ago.
+    `NOT_TRUSTED` where it leaves the bracket from b to c, or iterates do not close in half as fast as two moves ago.
     """
     if not (abs(before) >= limit and abs(fa) > abs(fb)):
-        return NO_MOVE
+        return NOT_TRUSTED
     half = 0.5 * (c - b)
     s = fb / fa
     if a == c:
@@ -101,4 +101,4 @@ def interpolated(a: float, b: float, c: float, fa: float, fb: float, fc: float, 
         p = -p
     if 2.0 * p < min(3.0 * half * r - abs(limit * r), abs(before * r)):
         return p / r
-    return NO_MOVE
+    return NOT_TRUSTED

@@ -17,7 +17,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact.cones import aim_as_pulled, friction_size, leads_group, set_loose, set_sticking, speed_of
 from mbd.kernel.contact.contact_log import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, log_event
-from mbd.kernel.contact.contact_modes import STILL
+from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.contact.impact import impact
 from mbd.kernel.contact.impact_solve import strikes
 from mbd.kernel.events.guards import gap_scale, is_watched
@@ -28,9 +28,9 @@ from mbd.kernel.stepping.restart import active_rows, capture, consistent, evalua
 
 __all__ = ["switch"]
 
-TOGETHER = 1e-3
+COMMON_REST_SHARE = 1e-3
 """Part of dt within which contacts that come to rest do so together [-]."""
-AT_LIMIT = 1e-9
+FRICTION_LIMIT_RTOL = 1e-9
 """Part of its limit by which a friction may be below it and begin to slide with others [-]."""
 
 
@@ -49,13 +49,13 @@ def gather_closing(K: Guards) -> float:
         near = abs(K.guards0[c]) <= 1e-10 * gap_scale(K, c)
         ready = K.armed[c] == 1 and is_watched(K, c, K.guards0)
         approach = -K.guards0[K.at_gap_rate + c]
-        if fired or (near and ready and K.kind[c] == 0 and approach > STILL):
+        if fired or (near and ready and K.kind[c] == 0 and approach > REST_SPEED):
             K.closing[c] = 1
             if K.kind[c] == 0:
                 # located by interpolation it may part already, which is no rest; located exactly it parts only where
                 # its next contact is at this instant as well
                 fastest = max(fastest, abs(approach) if K.linear == 1 else approach)
-        elif near and ready and K.kind[c] == 0 and (approach >= -STILL or K.plastic_impact == 1):
+        elif near and ready and K.kind[c] == 0 and (approach >= -REST_SPEED or K.plastic_impact == 1):
             K.closing[c] = 2
     return fastest
 
@@ -159,7 +159,7 @@ def mark_touching(K: Guards) -> None:
         if K.kind[c] == 0 and K.closed[c] == 0 and K.armed[c] == 1 and near and is_watched(K, c, K.guards0):
             still = True
             for k in range(K.n_rows):
-                if K.row_contact[k] == c and K.row_friction[k] < 0 and abs(K.acc[K.acc_rate + k]) > STILL:
+                if K.row_contact[k] == c and K.row_friction[k] < 0 and abs(K.acc[K.acc_rate + k]) > REST_SPEED:
                     still = False
             K.touched[c] = 1 if still else 0
 
@@ -193,7 +193,7 @@ def stop_together(K: Switching, index: int) -> None:
     for f in range(K.n_frictions):
         if leads_group(K, f) and K.slip[f] != 0.0 and is_closed(K, f):
             speed = speed_of(K, f, K.guards0, K.at_slip)
-            if f == index or speed <= TOGETHER * K.dt * speed_of(K, f, K.guards0, K.at_slip_rate):
+            if f == index or speed <= COMMON_REST_SHARE * K.dt * speed_of(K, f, K.guards0, K.at_slip_rate):
                 set_loose(K, f, 2)
                 set_sticking(K, f, 1)
                 if K.friction_contact[f] >= 0:
@@ -220,7 +220,9 @@ def slip_together(K: Balance, index: int) -> None:
     for f in range(K.n_frictions):
         if status == 0 and leads_group(K, f) and K.sticks[f] == 1 and is_closed(K, f):
             limit = limit_of(K, f)
-            if f == index or (limit > 0.0 and friction_size(K, f, K.lam_at_limit) > (1.0 - AT_LIMIT) * limit):
+            if f == index or (
+                limit > 0.0 and friction_size(K, f, K.lam_at_limit) > (1.0 - FRICTION_LIMIT_RTOL) * limit
+            ):
                 set_loose(K, f, 3)
                 set_sticking(K, f, 0)
                 aim_as_pulled(K, f, K.lam_at_limit)

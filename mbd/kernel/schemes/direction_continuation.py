@@ -10,14 +10,14 @@ Continuation Methods, ch. 2).
 from __future__ import annotations
 
 from mbd.kernel.codes import NOT_CONVERGED, STAGNATED
-from mbd.kernel.contact.cones import HELD, ONSET, fill_slips
+from mbd.kernel.contact.cones import HOLD_AT_ONSET, HOLD_DIRECTION, fill_slips
 from mbd.kernel.records import ContactRows, Frictions
 
-__all__ = ["FOLLOWS", "OWN", "begin_continuation", "continue_directions", "wants_continuation"]
+__all__ = ["NO_HOLD", "LAST_HOLD", "begin_continuation", "continue_directions", "wants_continuation"]
 
-FOLLOWS = -1.0
+NO_HOLD = -1.0
 """In place of a hold: the step is not continued, its directions do what K.hold says."""
-OWN = 0.0
+LAST_HOLD = 0.0
 """In place of a hold: the last of a continuation, directions do what K.hold says again."""
 FIRST_HOLD = 1.8
 """Of K.hold, after directions that are held: σ is some 3 m/s [-]."""
@@ -31,7 +31,7 @@ def wants_continuation(K: Frictions, status: int) -> bool:
         return False
     found = False
     for f in range(K.n_frictions):
-        found = found or (K.group_size[f] > 1 and K.slip[f] != 0.0 and K.hold[f] != HELD)
+        found = found or (K.group_size[f] > 1 and K.slip[f] != 0.0 and K.hold[f] != HOLD_DIRECTION)
     return found
 
 
@@ -39,18 +39,18 @@ def begin_continuation(K: Frictions) -> float:
     """Hold all directions; what they did is kept. The hold."""
     for f in range(K.n_frictions):
         K.own_hold[f] = K.hold[f]
-        K.hold[f] = HELD
-    return HELD
+        K.hold[f] = HOLD_DIRECTION
+    return HOLD_DIRECTION
 
 
 def continue_directions(K: ContactRows, hold: float, status: int) -> float:
-    """The hold after a solution with this one, in the block; `OWN` where it is the last, or there is no solution."""
-    smaller = FIRST_HOLD if hold == HELD else HOLD_FACTOR * hold
-    if status != 0 or smaller < ONSET:
-        smaller = OWN
+    """The hold after a solution with this one, in the block; `LAST_HOLD` where it is the last or none is solved."""
+    smaller = FIRST_HOLD if hold == HOLD_DIRECTION else HOLD_FACTOR * hold
+    if status != 0 or smaller < HOLD_AT_ONSET:
+        smaller = LAST_HOLD
     for f in range(K.n_frictions):
         K.hold[f] = K.own_hold[f]
-        if smaller > 0.0 and K.own_hold[f] != HELD:
+        if smaller > 0.0 and K.own_hold[f] != HOLD_DIRECTION:
             K.hold[f] = smaller
     fill_slips(K)
     return smaller

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.records import Memory, Steps
@@ -64,7 +64,7 @@ def hold_error(K: Steps) -> bool:
     n = K.n
     n_v = K.n_v
     m = K.n_active
-    if not factor_saddle(K, m, True, LOSS_AT_ONCE):
+    if not factor_saddle(K, m, True, DIRECT_PIVOT_RTOL):
         return False
     for level in range(2):
         K.rhs[:n] = 0.0

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import solve_definite, sum_of_sizes
-from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import NOT_FINITE, SINGULAR
 from mbd.kernel.hooks import call_on
 from mbd.kernel.records import Balance
 from mbd.kernel.stepping.free_rates import NOT_CLEAR, free_rates
-from mbd.kernel.stepping.mass_ratios import LOSS, polish_rates, polish_with_rows
+from mbd.kernel.stepping.mass_ratios import CORRECTED_PIVOT_RTOL, polish_rates, polish_with_rows
 from mbd.kernel.stepping.restart import consistent, evaluate
 
 __all__ = ["explicit_rates", "rates_at_end"]
@@ -40,18 +40,18 @@ def explicit_rates(K: Balance, t: float) -> int:
             K.jump[i] = -K.acc[K.acc_f + i]
         kept = solve_definite(K.acc, n, K.jump, K.spare)
         if K.vector == 0:
-            if kept >= LOSS:
+            if kept >= CORRECTED_PIVOT_RTOL:
                 note_pull(K)
             else:
                 K.stage_pull = 1e300
         if kept == 0.0:
             return consistent(K, t, K.q1, K.y1)
-        if kept < LOSS:
+        if kept < CORRECTED_PIVOT_RTOL:
             polish_rates(K, kept)
         return 0
     if K.uneven_masses == 0 and solve_straight(K, m):
         return 0
-    if not factor_saddle(K, m, False, LOSS_AT_ONCE):
+    if not factor_saddle(K, m, False, DIRECT_PIVOT_RTOL):
         return SINGULAR
     for i in range(n):
         K.rhs[i] = -K.acc[K.acc_f + i]

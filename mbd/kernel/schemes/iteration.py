@@ -6,20 +6,21 @@ from mbd.kernel.codes import EPS
 from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Model, Motion, Settings, SingularSteps, Steps
-from mbd.kernel.singular.step_pairs import WHOLE
+from mbd.kernel.singular.step_pairs import STEP_RTOL
 from mbd.kernel.stepping.restart import compose, note_scales
-from mbd.kernel.stepping.scales import ROUGH, add_force_floors
+from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 
 __all__ = [
-    "BENT", "BYSTANDER", "LOOK_TWICE", "MIN_HALVED_RESIDUAL", "finish", "is_below_floors", "is_small", "overturns",
+    "MAX_CURVATURE", "MAX_UNCHECKED_ERROR", "MIN_HALVED_RESIDUAL", "MIN_RATE_SHARE", "finish", "is_below_floors",
+    "is_small", "overturns",
     "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at", "weigh_by_accelerations",
 ]  # fmt: skip
 
-LOOK_TWICE = 0.01
+MAX_UNCHECKED_ERROR = 0.01
 """Estimated error of a rate, over the rate, up to which a step needs no closer look, whatever the scheme [-]."""
-BENT = 0.1
+MAX_CURVATURE = 0.1
 """Change of accelerations in a step, times its size, over the fastest rate, above which poles are looked for [-]."""
-BYSTANDER = 0.01
+MIN_RATE_SHARE = 0.01
 """Part of the fastest rate below which another one hardly takes part in the motion [-]."""
 MIN_HALVED_RESIDUAL = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
@@ -57,7 +58,7 @@ def predict(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> No
 
 def shift_growth(K: Steps, h: float) -> float:
     """The factor by which a position correction, that of order h³, grows from the last step to this one."""
-    if h > (1.0 + WHOLE) * K.step:  # the longer of a pair: round-off of the shorter does not grow
+    if h > (1.0 + STEP_RTOL) * K.step:  # the longer of a pair: round-off of the shorter does not grow
         return 1.0
     stretch = h / K.aux_step
     return float(stretch * stretch * stretch)
@@ -122,7 +123,7 @@ def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
 
     Scales, which were raised to terms at the iterate, are those with their floors then.
     """
-    add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
+    add_force_floors(K, min(1.0, FORCE_ULPS * EPS / K.tolerance))
     if residual_size(K, o_r, m, 0.0, 0.0, 1.0, both) > 16.0:  # rows
         return False
     return residual_size(K, o_r, 0, 0.0, 0.0, K.tolerance, both) <= 1.0
@@ -141,7 +142,7 @@ def weigh_by_accelerations(K: Motion) -> bool:
     there the way in the step is one.
     """
     note_scales(K)
-    add_force_floors(K, ROUGH * EPS)
+    add_force_floors(K, FORCE_ULPS * EPS)
     nothing = False
     force = 0.0
     way = K.extent
@@ -162,7 +163,7 @@ def weigh_by_accelerations(K: Motion) -> bool:
             if unit == 1 and K.acc[i * K.n + i] == 0.0:
                 size = max(size, force * way)
             if K.unit[i] == unit and size < 1e300:
-                nothing = nothing or K.known[i] < K.scale[i] or K.known[i] < ROUGH * EPS * size
+                nothing = nothing or K.known[i] < K.scale[i] or K.known[i] < FORCE_ULPS * EPS * size
                 K.weight[i] = 1.0 / max(K.scale[i], size)
     return nothing
 
@@ -224,8 +225,8 @@ def finish(K: Steps, h: float) -> bool:
 def is_small(K: Settings, h: float, stretch: float, most: float, unforeseen: float, fastest: float) -> bool:
     """Whether the largest changes of rates in a step, in all and unpredicted, are small beside the fastest of them."""
     cube = stretch * stretch * stretch
-    small = h * unforeseen * cube <= 12.0 * LOOK_TWICE * max(K.rest_speed, BYSTANDER * fastest)
-    return bool(small and h * most <= BENT * max(K.rest_speed, fastest))
+    small = h * unforeseen * cube <= 12.0 * MAX_UNCHECKED_ERROR * max(K.rest_speed, MIN_RATE_SHARE * fastest)
+    return bool(small and h * most <= MAX_CURVATURE * max(K.rest_speed, fastest))
 
 
 def error_share(K: Settings, h: float) -> float:

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import PASSING
-from mbd.kernel.contact.cones import HELD, follows, friction_size
+from mbd.kernel.contact.cones import HOLD_DIRECTION, follows, friction_size
 from mbd.kernel.records import Balance, Guards, Kernel, Steps
 from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.schemes.direction_continuation import (
-    FOLLOWS,
+    NO_HOLD,
     begin_continuation,
     continue_directions,
     wants_continuation,
 )
 from mbd.kernel.schemes.iteration import predict, shift_growth
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead, start_step
-from mbd.kernel.schemes.newton import SEARCHED, UNSOUND, solve_step
+from mbd.kernel.schemes.newton import BAD_FACTORS, PIVOTS_SEARCHED, solve_step
 from mbd.kernel.singular.newmark_step import singular_newmark_step
 from mbd.kernel.stepping.charts import find_chart_end
 from mbd.kernel.stepping.conditioning import is_ill_conditioned, refine_accelerations
@@ -36,7 +36,7 @@ from mbd.kernel.stepping.restart import (
 
 __all__ = ["SCHEME", "newmark_accept", "newmark_error", "newmark_resume", "newmark_start", "newmark_step"]
 
-CHANGES = 16.0
+MAX_MULTIPLIER_ERROR_RATIO = 16.0
 """Error of multipliers of a step, over their change in it, that is taken into account [-].
 
 Errors of some ten times were found where forces rise and fall by much of themselves from step to step.
@@ -102,15 +102,17 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
     c_C = K.gamma * h * c
     c_K = K.beta * h * h * c
     tangents = 0
-    hold = FOLLOWS
+    hold = NO_HOLD
     while True:  # called from one place, the iteration stays in one piece with the step
-        if hold == FOLLOWS or hold == HELD:
+        if hold == NO_HOLD or hold == HOLD_DIRECTION:
             predict(K, h, t1, c_C, c_K)
         status = solve_step(K, h, t1, c_C, c_K, tangents)
-        if status == UNSOUND and hold == FOLLOWS:
-            tangents = SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search
-        elif hold == FOLLOWS and wants_continuation(K, status):
-            tangents = SEARCHED
+        if status == BAD_FACTORS and hold == NO_HOLD:
+            tangents = (
+                PIVOTS_SEARCHED  # pivots in a fixed order were round-off: from the prediction again, with a search
+            )
+        elif hold == NO_HOLD and wants_continuation(K, status):
+            tangents = PIVOTS_SEARCHED
             hold = begin_continuation(K)
         elif hold > 0.0:
             hold = continue_directions(K, hold, status)
@@ -121,11 +123,13 @@ def newmark_step(K: Kernel, h: float, t1: float) -> int:
                 balance_end(K, t1)
             return status
         else:
-            hold = FOLLOWS
+            hold = NO_HOLD
 
 
 def may_switch(K: Guards) -> bool:
-    """Whether `CHANGES` times what the step changes of multipliers takes a contact to pull, or a friction to its limit.
+    """Whether a contact may come to pull, or a friction to its limit, within the errors of the multipliers of a step.
+
+    These are `MAX_MULTIPLIER_ERROR_RATIO` times what the step changes of them.
 
     Elsewhere nothing hangs on multipliers that alternate.
     The limit of a friction falls in the ratio of its contact force.
@@ -134,7 +138,7 @@ def may_switch(K: Guards) -> bool:
     for c in range(K.n_contacts):
         if K.closed[c] == 1 and K.kind[c] == 0 and K.opens[c] == 0 and K.normal[c] >= 0:
             row = K.normal[c]
-            if K.lam1[row] + CHANGES * abs(K.lam1[row] - K.lam[row]) > 0.0:
+            if K.lam1[row] + MAX_MULTIPLIER_ERROR_RATIO * abs(K.lam1[row] - K.lam[row]) > 0.0:
                 return True
     # frictions, each group once
     for f in range(K.n_frictions):
@@ -143,14 +147,14 @@ def may_switch(K: Guards) -> bool:
             c = K.friction_contact[f]
             if c >= 0 and K.normal[c] >= 0:
                 row = K.normal[c]
-                limit -= CHANGES * abs(K.lam1[row] - K.lam[row]) / (abs(K.lam[row]) + 1e-300) * limit
+                limit -= MAX_MULTIPLIER_ERROR_RATIO * abs(K.lam1[row] - K.lam[row]) / (abs(K.lam[row]) + 1e-300) * limit
             elif K.loaded > 0:  # the limit may follow any multiplier
                 return True
             square = 0.0
             for g in range(f, f + K.group_size[f]):
                 change = K.lam1[K.friction_row[g]] - K.lam[K.friction_row[g]]
                 square += change * change
-            if friction_size(K, f, K.lam1) + CHANGES * sqrt(square) > limit:
+            if friction_size(K, f, K.lam1) + MAX_MULTIPLIER_ERROR_RATIO * sqrt(square) > limit:
                 return True
     return False
 

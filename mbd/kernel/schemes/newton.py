@@ -7,7 +7,7 @@ straight-line code. The stabilized form corrects positions by U first, then the 
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, OF_TANGENT, factor_ordered, order_at, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, TOO_NEAR, TOO_TIGHT
 from mbd.kernel.hooks import call, call_on
@@ -23,7 +23,13 @@ from mbd.kernel.schemes.iteration import (
     soundness_at,
     weigh_by_accelerations,
 )
-from mbd.kernel.singular.newmark_step import WITHIN, misses, singular_newmark_step, steps_by_pivot, steps_to_singularity
+from mbd.kernel.singular.newmark_step import (
+    MAX_STEPS_AWAY,
+    misses,
+    singular_newmark_step,
+    steps_by_pivot,
+    steps_to_singularity,
+)
 from mbd.kernel.singular.step_pairs import is_whole
 from mbd.kernel.stepping.mass_ratios import has_settled
 from mbd.kernel.stepping.restart import (
@@ -44,22 +50,22 @@ from mbd.kernel.tangent_rules import (
     note_solution,
 )
 
-__all__ = ["SEARCHED", "UNSOUND", "solve_step"]
+__all__ = ["PIVOTS_SEARCHED", "BAD_FACTORS", "solve_step"]
 
-MOST_STRAIGHT = 2
+MAX_FIXED_ORDER = 2
 """Tangents of a step that straight-line code may factor: where it takes more, pivots are searched for."""
-SEARCHED = 3
-"""More than `MOST_STRAIGHT`: counted as the tangents before the first of a step whose pivots are all searched for."""
-UNSOUND = -1
+PIVOTS_SEARCHED = 3
+"""More than `MAX_FIXED_ORDER`: counted as the tangents before the first of a step whose pivots are all searched for."""
+BAD_FACTORS = -1
 """Result of `solve_step` where factors in a fixed order led to a correction that is no solution at all."""
 
 
 def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents: int) -> int:
-    """The candidate from the prediction in the block; 0, or why there is none; `UNSOUND`.
+    """The candidate from the prediction in the block; 0, or why there is none; `BAD_FACTORS`.
 
     Newton's method, its corrections halved where the residual grows: one tangent, then residuals with its factors; a
     new tangent where the residual falls by less than a factor of three. Factors in a fixed order are tried where fewer
-    than `MOST_STRAIGHT` `tangents` were counted; a pivot of round-off passes for one of its own size, so it is the
+    than `MAX_FIXED_ORDER` `tangents` were counted; a pivot of round-off passes for one of its own size, so it is the
     residual that judges them.
     """
     if is_differentiated():
@@ -103,7 +109,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
         if halvings < 10 and iteration > 0 and (error < 0.0 or grown):
             if fixed:
                 K.inverse_pivot = 0.0
-                return UNSOUND
+                return BAD_FACTORS
             retreat(K, m, c_C, c_K)  # a full Newton step jumped over a steep place
             halvings += 1
             continue
@@ -203,13 +209,13 @@ def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, toleranc
 def pass_singularity(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: float, straight: bool) -> int:
     """−1 where no singular configuration is near; else how a step that passes it ends, or that this must not."""
     fall = steps_by_pivot(K, m, straight)
-    if not fall < WITHIN + 2.0:
+    if not fall < MAX_STEPS_AWAY + 2.0:
         return -1
     away = steps_to_singularity(K, m, h, c_K / c_C, straight) * h / K.step
     if misses(K, away, h):
         K.inverse_pivot = 0.0
         return TOO_NEAR
-    if fall < WITHIN and away < WITHIN and (away < 1.0 or is_whole(K, h)):
+    if fall < MAX_STEPS_AWAY and away < MAX_STEPS_AWAY and (away < 1.0 or is_whole(K, h)):
         known = K.near_singular
         status = singular_newmark_step(K, h, t1)
         if status != 0 and K.adaptive == 1:  # a step that is half as long is judged by itself
@@ -227,7 +233,7 @@ def renew(K: Equations, m: int, tangents: int) -> bool:
     K.n_tangents += 1
     first = K.correction_program
     if first > 0 and not is_differentiated():
-        if tangents < MOST_STRAIGHT:
+        if tangents < MAX_FIXED_ORDER:
             call(K, first, K.out)
             if K.out[soundness_at(K, m)] == 1.0:
                 K.n_factorizations += 1
@@ -295,8 +301,8 @@ def factorize(K: DependentRows, size: int, tangents: int) -> bool:
     """
     m = size - K.n
     o = 0 if sharing(K) else order_at(K, m)
-    if o > 0 and tangents <= MOST_STRAIGHT:
-        if factor_ordered(K, K.out, o, OF_TANGENT, LOSS_OF_STEP):
+    if o > 0 and tangents <= MAX_FIXED_ORDER:
+        if factor_ordered(K, K.out, o, OF_TANGENT, NEWTON_PIVOT_RTOL):
             K.n_factorizations += 1
             return True
     if o > 0:

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT
-from mbd.kernel.contact.cones import HELD
+from mbd.kernel.contact.cones import HOLD_DIRECTION
 from mbd.kernel.records import Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
 from mbd.kernel.schemes.direction_continuation import (
-    FOLLOWS,
+    NO_HOLD,
     begin_continuation,
     continue_directions,
     wants_continuation,
@@ -41,14 +41,14 @@ from mbd.kernel.schemes.stages import (
     retreat_stages,
 )
 from mbd.kernel.singular.stages import (
-    BESIDE_NOISY,
+    MAX_NOISY_STEPS_AWAY,
     is_beside_singularity,
     replace_row_rates,
     solve_singular_stages,
     spans_singularity,
 )
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms
-from mbd.kernel.stepping.mass_ratios import SETTLED
+from mbd.kernel.stepping.mass_ratios import RESIDUAL_CORRECTION_RTOL
 from mbd.kernel.stepping.restart import (
     lower_to_step,
     measure_accepted,
@@ -57,22 +57,22 @@ from mbd.kernel.stepping.restart import (
     restore_scales,
     retain_scales,
 )
-from mbd.kernel.stepping.scales import ROUGH, add_force_floors
+from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 from mbd.kernel.tangent_rules import NOT_FOLLOWED, follow_stages, further_corrections, is_differentiated
 
 __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 
-SLOW = 0.5
+MAX_CONTRACTION = 0.5
 """Part of the residual left by a correction above which the matrices are made again."""
 
-PATIENT = 6
+MAX_CORRECTIONS = 6
 """Corrections after which residuals that meet the tolerance asked for are taken for what they are [-]."""
-STUCK = 0.9
+STALL_RATIO = 0.9
 """Part of the residual left by a correction above which it falls no more; between both it falls slowly."""
-WILD = 2.0
+MAX_CORRECTION_RATIO = 2.0
 """Size of a correction over the largest rate above which it is made with the masses of each stage instead [-]."""
 
-NEGLIGIBLE = 1e-2
+NEGLIGIBLE_CORRECTION = 1e-2
 """The same over the square of the first correction, the size of the step's own error [-]."""
 
 
@@ -112,10 +112,10 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
     if m > 0 and spans_singularity(K, h):
         return singular_stages_step(K, h, t1)
     K.near_singular = 0
-    hold = FOLLOWS
+    hold = NO_HOLD
     while True:
-        status = plain_step(K, h, t1, m, hold == FOLLOWS or hold == HELD)
-        if hold == FOLLOWS and wants_continuation(K, status):
+        status = plain_step(K, h, t1, m, hold == NO_HOLD or hold == HOLD_DIRECTION)
+        if hold == NO_HOLD and wants_continuation(K, status):
             hold = begin_continuation(K)
         elif hold > 0.0:
             hold = continue_directions(K, hold, status)
@@ -126,7 +126,7 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
     if (
         (status == NOT_CONVERGED or status == STAGNATED or status == TOO_TIGHT)
         and m > 0
-        and is_beside_singularity(K, h, BESIDE_NOISY)
+        and is_beside_singularity(K, h, MAX_NOISY_STEPS_AWAY)
     ):
         return singular_stages_step(K, h, t1)
     return status
@@ -176,14 +176,16 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
             break
         K.failure_size = error
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
-            status = judge_stagnation(K, h, t1, m, tolerance, iteration >= PATIENT and error > STUCK * before)
+            status = judge_stagnation(
+                K, h, t1, m, tolerance, iteration >= MAX_CORRECTIONS and error > STALL_RATIO * before
+            )
             if status == 0:
                 error = 1.0
             elif status != NOT_CONVERGED or K.failure_size < 0.0:
                 break
         if error > 1.0 and was_enough(K, h, t1, m, iteration, error, left):
             return complete(K, h, t1, m, renew, True)
-        if error > 1.0 and not renew and error > SLOW * before:
+        if error > 1.0 and not renew and error > MAX_CONTRACTION * before:
             renew = True  # the old matrices have done their work: make them again at the same iterate
             slow = True
             before = 1e300
@@ -205,11 +207,11 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
             renew = False
             if has_converged(moved, last, first):
                 if further == further_corrections():
-                    return complete(K, h, t1, m, False, iteration >= PATIENT)
+                    return complete(K, h, t1, m, False, iteration >= MAX_CORRECTIONS)
                 further += 1
             continue
         moved = correct_by_own_masses(K, m, h, t1, renew, slow)
-        if moved > WILD and m > 0 and K.vector == 0 and not slow:
+        if moved > MAX_CORRECTION_RATIO and m > 0 and K.vector == 0 and not slow:
             retreat_stages(K, m, 1.0)
             slow = True
             renew = True
@@ -232,7 +234,9 @@ def has_converged(moved: float, last: float, first: float) -> bool:
 
     Masses that differ by 10⁶ make a change of 10⁻³ in the rates of the light one of residuals of 10⁻⁹.
     """
-    return moved <= max(SETTLED, NEGLIGIBLE * first * first) or (last > 0.0 and moved > 0.5 * last)
+    return moved <= max(RESIDUAL_CORRECTION_RTOL, NEGLIGIBLE_CORRECTION * first * first) or (
+        last > 0.0 and moved > 0.5 * last
+    )
 
 
 def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
@@ -260,10 +264,10 @@ def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
         if error < 0.0:
             return NOT_FINITE
         K.failure_size = error
-        if error > 1.0 and iteration > 2 and error > SLOW * before:
+        if error > 1.0 and iteration > 2 and error > MAX_CONTRACTION * before:
             if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
                 return complete(K, h, t1, m, True, False)
-            if iteration >= PATIENT:
+            if iteration >= MAX_CORRECTIONS:
                 return NOT_CONVERGED
             evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
         if error <= 1.0 and iteration > 0 and has_converged(moved, last, first):
@@ -317,7 +321,7 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
     if status == NOT_CONVERGED and evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
         return 0
     if m > 0 or stuck:
-        add_force_floors(K, min(1.0, ROUGH * EPS / K.tolerance))
+        add_force_floors(K, min(1.0, FORCE_ULPS * EPS / K.tolerance))
         if evaluate_stages(K, h, t1, m, 1.0, 0.0, 0.0, False) <= 16.0:  # rows are round-off
             if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
                 K.n_stagnations += 1
@@ -338,7 +342,7 @@ def was_enough(K: Kernel, h: float, t1: float, m: int, iteration: int, error: fl
         retreat_stages(K, m, -1.0)
         evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False)
         return False
-    if iteration < PATIENT:
+    if iteration < MAX_CORRECTIONS:
         return False
     return evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0
 

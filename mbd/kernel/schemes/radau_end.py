@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import NOT_CONVERGED, SINGULAR
 from mbd.kernel.records import Balance, Kernel, Steps
@@ -37,7 +37,7 @@ from mbd.kernel.tangent_rules import follow_rates
 
 __all__ = ["complete"]
 
-BETWEEN = 0.4
+CHECK_POINT = 0.4
 """Part of a step, amid the widest gap between stages, at which a second estimate looks at the balance [-]."""
 
 
@@ -98,7 +98,7 @@ def end_rates(K: Balance, t1: float, m: int) -> bool:
     n = K.n
     evaluate(K, t1, K.q1, K.y1)
     load_accelerations(K)
-    if not factor_saddle(K, m, False, LOSS_AT_ONCE):
+    if not factor_saddle(K, m, False, DIRECT_PIVOT_RTOL):
         return False
     for i in range(n):
         K.rhs[i] = -K.force[i]
@@ -159,7 +159,7 @@ def estimate_error(K: Steps, h: float, m: int) -> None:
 
 
 def misses_balance(K: Kernel, h: float) -> bool:
-    """What the parabola through the rates of the stages misses at `BETWEEN`, f − W, into K.stages; whether it is known.
+    """What the parabola through the rates of the stages misses at `CHECK_POINT`, into K.stages; whether it is known.
 
     Positions and velocities there are integrals of that parabola and of the one through the velocities of the stages.
     The factors of the step are lost.
@@ -168,7 +168,7 @@ def misses_balance(K: Kernel, h: float) -> bool:
     n = K.n
     o_W = stage_place(K, STAGE_RATES)
     o_D = stage_place(K, CHANGES)
-    t = K.time + BETWEEN * h
+    t = K.time + CHECK_POINT * h
     fill_block(K, t, K.q, K.y)
     for j in range(n):
         K.y1[j] = K.y[j]
@@ -178,8 +178,8 @@ def misses_balance(K: Kernel, h: float) -> bool:
         a = S[C_ + (i + 1) % 3]
         b = S[C_ + (i + 2) % 3]
         over = 1.0 / ((S[C_ + i] - a) * (S[C_ + i] - b))
-        value = (BETWEEN - a) * (BETWEEN - b) * over
-        integral = BETWEEN * (BETWEEN * (BETWEEN / 3.0 - 0.5 * (a + b)) + a * b) * over
+        value = (CHECK_POINT - a) * (CHECK_POINT - b) * over
+        integral = CHECK_POINT * (CHECK_POINT * (CHECK_POINT / 3.0 - 0.5 * (a + b)) + a * b) * over
         for j in range(n):
             K.y1[j] += h * integral * S[o_W + i * n + j]
             S[o_D + j] -= value * S[o_W + i * n + j]
@@ -206,7 +206,7 @@ def raise_error(K: Steps, h: float, m: int) -> None:
     o_M = stage_place(K, MASS_PART)
     part = 1.0  # of the same third difference, seen at 0 and seen between
     for i in range(3):
-        part *= S[C_ + i] / (S[C_ + i] - BETWEEN)
+        part *= S[C_ + i] / (S[C_ + i] - CHECK_POINT)
     for i in range(n):
         total = 0.0
         for j in range(n):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR
-from mbd.kernel.contact.contact_modes import STILL
+from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.hooks import call_on
 from mbd.kernel.records import DependentRows, Equations
-from mbd.kernel.singular.newmark_step import CONTINUOUS
+from mbd.kernel.singular.newmark_step import VELOCITY_RTOL
 from mbd.kernel.stepping.restart import displace, evaluate, raise_scales
 from mbd.kernel.tangent_rules import follow_factors, follow_solution, is_differentiated
 
@@ -69,7 +69,7 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
             fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
         K.y1[i] += K.rhs[i]
     if change > max(
-        CONTINUOUS * fastest, K.rest_speed + STILL
+        VELOCITY_RTOL * fastest, K.rest_speed + REST_SPEED
     ):  # rows near a singular configuration take the branch for another
         K.failure_size = 0.0
         return NOT_CONVERGED
@@ -88,7 +88,7 @@ def factor_returns(K: Equations, m: int) -> bool:
     """Factors of [M Bᵀ; B 0] from K.acc in K.kkt; false where a pivot is missing."""
     if is_differentiated():
         return follow_factors(K, m)
-    return bool(factor_saddle(K, m, True, LOSS_AT_ONCE))
+    return bool(factor_saddle(K, m, True, DIRECT_PIVOT_RTOL))
 
 
 def solve_returns(K: Equations, m: int) -> None:

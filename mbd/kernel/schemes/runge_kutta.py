@@ -11,7 +11,7 @@ that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import LOSS_AT_ONCE
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import INCREMENT_RATES, NOT_CONVERGED, PASSING, SINGULAR
 from mbd.kernel.hooks import call
@@ -106,7 +106,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
     else:
         status = rates_at_end(K, t1)
         note_uneven(K)
-        if status == 0 and K.uneven_masses == 1 and factor_saddle(K, K.n_active, False, LOSS_AT_ONCE):
+        if status == 0 and K.uneven_masses == 1 and factor_saddle(K, K.n_active, False, DIRECT_PIVOT_RTOL):
             polish_with_rows(K, K.n_active)
     if status != 0:
         return status

@@ -50,7 +50,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-MOST_STRETCHED = 4.0
+MAX_EXTRAPOLATION = 4.0
 """Size of a step over that of the last above which its stages predict nothing: a parabola would go far astray [-]."""
 
 
@@ -78,7 +78,7 @@ def predict_stages(K: Steps, h: float, m: int) -> None:
         l0 = (s - S[C_ + 1]) * (s - S[C_ + 2]) / ((S[C_] - S[C_ + 1]) * (S[C_] - S[C_ + 2]))
         l1 = (s - S[C_]) * (s - S[C_ + 2]) / ((S[C_ + 1] - S[C_]) * (S[C_ + 1] - S[C_ + 2]))
         l2 = 1.0 - l0 - l1
-        if stretch > MOST_STRETCHED:
+        if stretch > MAX_EXTRAPOLATION:
             l0 = 0.0
             l1 = 0.0
             l2 = 1.0
@@ -92,7 +92,7 @@ def predict_stages(K: Steps, h: float, m: int) -> None:
         o = 3 * n + 3 * K.n_rows + i * K.n_v
         for j in range(K.n_v):
             shift = stretch * stretch * stretch * stretch * P[o + j]
-            S[o_U + i * K.n_v + j] = shift if stretch <= MOST_STRETCHED else 0.0
+            S[o_U + i * K.n_v + j] = shift if stretch <= MAX_EXTRAPOLATION else 0.0
 
 
 def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:

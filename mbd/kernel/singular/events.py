@@ -15,18 +15,18 @@ from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.events.guard_substeps import copy_ends, interpolate_candidate, put_candidate_back
 from mbd.kernel.events.guards import judge_user
 from mbd.kernel.records import DependentRows, Kernel, SingularSteps, Switching
-from mbd.kernel.singular.step_size import NEGLIGIBLE_NOISE, TOO_NOISY, motion, noise_coefficient, row_norms
+from mbd.kernel.singular.step_size import MAX_NOISE, NOISE_RTOL, motion, noise_coefficient, row_norms
 from mbd.kernel.stepping.candidate import accept_guards
 from mbd.kernel.stepping.observe import store_state
 from mbd.kernel.stepping.restart import evaluate
 
 __all__ = ["find_passed_events", "log_passed_events", "may_pass_events", "refuses"]
 
-DISTANT = 0.05
+REGULAR_RTOL = 0.05
 """What is left of a row, over the longest row, above which no singular configuration is near [-]."""
-NEXT_TO = 1e-3
+WELL_CONDITIONED_RTOL = 1e-3
 """The same above which restarts are well-conditioned [-]."""
-ELSEWHERE = -2.0
+EVENT_ELSEWHERE = -2.0
 """In place of the time to an event: it fires in this step, but not next to a singular configuration [-]."""
 
 
@@ -57,12 +57,12 @@ def find_passed_events(K: Kernel, h: float) -> int:
             judge_user(K, e, h / K.n_substeps)
             if K.event_kind != CROSS:
                 continue
-            K.crossed[e] = ELSEWHERE
+            K.crossed[e] = EVENT_ELSEWHERE
             place = (part - 1 + K.event_place) / K.n_substeps
             low = (part - 1 + K.event_low) / K.n_substeps
             if share_inside(K, t, h, place) > 0.0:
                 place = root_inside(K, e, t, h, low, part / K.n_substeps)
-                if share_inside(K, t, h, place) > NEGLIGIBLE_NOISE:
+                if share_inside(K, t, h, place) > NOISE_RTOL:
                     K.crossed[e] = place * h
                     found += 1
             show(K, t, h, part / K.n_substeps)
@@ -122,7 +122,7 @@ def share_inside(K: Kernel, t: float, h: float, s: float) -> float:
     The candidate's place holds the interpolant afterwards.
     """
     interpolate_candidate(K, t, h, s, False)
-    if not comes_close(K, t + s * h, DISTANT):
+    if not comes_close(K, t + s * h, REGULAR_RTOL):
         return 0.0
     m = K.n_active
     keep_parts(K, m)
@@ -184,14 +184,14 @@ def refuses(K: SingularSteps, h: float) -> bool:
     K.detail tells when it ends, the share and the size of the step; K.failure_index the row.
     """
     t = K.time
-    if K.n_active == 0 or h < 1e-6 * K.step or not comes_close(K, t + h, NEXT_TO):
+    if K.n_active == 0 or h < 1e-6 * K.step or not comes_close(K, t + h, WELL_CONDITIONED_RTOL):
         return False
     m = K.n_active
     keep_parts(K, m)
     evaluate(K, t, K.q, K.y)
     row_norms(K, m)
     share = largest_noise_share(K, m, h)
-    if share <= TOO_NOISY:
+    if share <= MAX_NOISE:
         return False
     K.failure_time = t + h
     K.failure_size = min(share, 1.0)

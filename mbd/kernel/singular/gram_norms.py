@@ -14,7 +14,7 @@ from mbd.kernel.records import DependentRows, Singular, SingularSteps
 
 __all__ = ["gram_norms", "pivoted_gram_norms"]
 
-NOTHING_LEFT = 1e-15
+SQUARED_ROW_RTOL = 1e-15
 """Square of a scaled row below which it is round-off of its terms [-]."""
 
 
@@ -119,7 +119,7 @@ def take_out(K: DependentRows, m: int, n: int, done: int, G: int) -> None:
     """Clear the rows still to come of their parts along the one that is done."""
     row = K.columns[done]
     pivot = K.spare[G + row * (m + 1)]
-    if not pivot > NOTHING_LEFT:
+    if not pivot > SQUARED_ROW_RTOL:
         return
     near = m * (n + 1)
     count = 0

@@ -1,13 +1,13 @@
 """The Newmark family next to a singular configuration: a few steps of the stabilized form taken as index 3.
 
-Within `WITHIN` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are projected
-onto the rows and the scheme starts again, but for the average that it carries. Why: see `mbd.kernel.singular`.
+Within `MAX_STEPS_AWAY` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are projected
+onto the rows and the scheme starts again, but for the average that it carries. `mbd.kernel.singular` says why.
 """
 
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import LOSS_OF_STEP, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
+from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
@@ -36,15 +36,15 @@ from mbd.kernel.stepping.scales import still_speed
 
 __all__ = ["misses", "singular_newmark_step", "steps_by_pivot", "steps_to_singularity"]
 
-WITHIN = 4.0
+MAX_STEPS_AWAY = 4.0
 """Steps to a singular configuration, at the present speed, below which positions alone are held [-]."""
-NEAREST = 0.2
+MIN_STEPS_AWAY = 0.2
 """Steps from one below which no step ends where round-off of h makes too much of rates [-]."""
-FORESEEN = 0.25
+MIN_PREDICTED_STEPS_AWAY = 0.25
 """The same, of the end of a step still to come: more, since how far the singularity is then is only estimated [-]."""
-VANISHING = 0.5
+VANISHING_RATIO = 0.5
 """What is left of a row where it should vanish, over that of now: more, and there is no singularity [-]."""
-CONTINUOUS = 0.05
+VELOCITY_RTOL = 0.05
 """Part of the speed by which a step near it may differ from its prediction: the branch goes on in v [-]."""
 
 
@@ -107,11 +107,11 @@ def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, strai
             across = 4.0 * EPS * K.scale[K.n + K.rows[K.columns[k]]] / (here * K.spare[3 * m + k] + 1e-300)
             K.velocity_noise = across / (K.step * sqrt(speed) + 1e-300)
     if (
-        NEAREST < fewest < WITHIN + 2.0
+        MIN_STEPS_AWAY < fewest < MAX_STEPS_AWAY + 2.0
     ):  # a row that turns, beside others that turn with it, changes but does not vanish
         pivoted_gram_norms(K, m, h, ratio, -fewest * h, m, o_S, stride, o_H, width)
         pivoted_gram_norms(K, m, h, ratio, fewest * h, 2 * m, o_S, stride, o_H, width)
-        if min(K.spare[m + nearest], K.spare[2 * m + nearest]) > VANISHING * K.spare[nearest]:
+        if min(K.spare[m + nearest], K.spare[2 * m + nearest]) > VANISHING_RATIO * K.spare[nearest]:
             return 1e300
     return fewest
 
@@ -122,13 +122,15 @@ def misses(K: DependentRows, away: float, h: float) -> bool:
     While ḣ is held too, steps may do that; those that hold h alone begin to oscillate. It is the last whole one before
     these that is looked at, or one that was shortened for another reason; those of a pair (`step_pairs`) are not.
     """
-    if away < 1.0 or away >= WITHIN + 1.0 or is_of_pair(h / K.step):
+    if away < 1.0 or away >= MAX_STEPS_AWAY + 1.0 or is_of_pair(h / K.step):
         return False
     part = away - int(away)
     part = min(part, 1.0 - part)
-    foreseen = away >= WITHIN - FORESEEN and is_whole(K, h)  # nearer it was judged already, as a rule
-    doubt = FORESEEN - NEAREST if foreseen else 0.0
-    return bool(part < NEAREST + doubt and K.velocity_noise * away > K.tolerance * max(part - doubt, 1e-3))
+    foreseen = away >= MAX_STEPS_AWAY - MIN_PREDICTED_STEPS_AWAY and is_whole(
+        K, h
+    )  # nearer it was judged already, as a rule
+    doubt = MIN_PREDICTED_STEPS_AWAY - MIN_STEPS_AWAY if foreseen else 0.0
+    return bool(part < MIN_STEPS_AWAY + doubt and K.velocity_noise * away > K.tolerance * max(part - doubt, 1e-3))
 
 
 def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
@@ -168,7 +170,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
         if iteration == 0:
             K.turning[: m * K.n_v] = K.out[o_r + K.n + 2 * m : o_r + K.n + 2 * m + m * K.n_v]
             away = steps_to_singularity(K, m, h, c_K / c_C, False)
-            if away < NEAREST and K.velocity_noise > K.tolerance:
+            if away < MIN_STEPS_AWAY and K.velocity_noise > K.tolerance:
                 return SINGULAR
         # the candidate, or the next iterate
         if error <= 1.0:
@@ -221,7 +223,7 @@ def conclude_singular_step(K: SingularSteps, h: float, away: float) -> int:
         K.failure_size = -1.0
         return NOT_CONVERGED
     K.n_singular_steps += 1
-    K.near_singular = PASSING if away < WITHIN else LEFT
+    K.near_singular = PASSING if away < MAX_STEPS_AWAY else LEFT
     return 0
 
 
@@ -258,7 +260,7 @@ def factor_positions(K: DependentRows, m: int) -> bool:
     """LU factors of the index-3 tangent in K.out; false if a pivot is missing."""
     size = K.n + m
     o = 0 if sharing(K) else order_at(K, m)
-    if o > 0 and factor_ordered(K, K.out, o, OF_TANGENT, LOSS_OF_STEP):
+    if o > 0 and factor_ordered(K, K.out, o, OF_TANGENT, NEWTON_PIVOT_RTOL):
         return True
     K.n_pivoted += 1 if o > 0 else 0
     K.order_start = 0
@@ -275,4 +277,4 @@ def leaves_branch(K: Motion, h: float) -> bool:
     for i in range(K.n_v):
         fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])) + h * abs(K.rate[i]))
         change = max(change, abs(K.block[K.o_v + i] - K.y1[i]) - still_speed(K, i))
-    return change > CONTINUOUS * fastest
+    return change > VELOCITY_RTOL * fastest

@@ -15,7 +15,7 @@ linearly, the faster the shorter the step.
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import LOSS_OF_STEP, solve_kkt
+from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, NOT_FINITE, PASSING, SINGULAR
@@ -24,17 +24,25 @@ from mbd.kernel.schemes.stage_layout import A2_, CHANGES, PAIR, STAGE_LAM, STAGE
 from mbd.kernel.schemes.stages import hold_block, load_stage
 from mbd.kernel.stepping.restart import compose, evaluate
 
-__all__ = ["BESIDE_NOISY", "spans_singularity", "is_beside_singularity", "solve_singular_stages", "replace_row_rates"]
+__all__ = [
+    "MAX_NOISY_STEPS_AWAY",
+    "spans_singularity",
+    "is_beside_singularity",
+    "solve_singular_stages",
+    "replace_row_rates",
+]
 
-BESIDE = 2.0
+MAX_STEPS_AWAY = 2.0
 """Steps to or from a singularity within which rows change too much from stage to stage for one matrix [-]."""
-BESIDE_NOISY = 1000.0
+MAX_NOISY_STEPS_AWAY = 1000.0
 """The same within which round-off of rows may keep the residuals of a step with one matrix from falling [-]."""
 
 
 def spans_singularity(K: DependentRows, h: float) -> bool:
     """Whether a step of size h goes over a singular configuration, or close by it."""
-    return bool(K.near_singular == PASSING and K.loaded == 0 and not sharing(K)) or is_beside_singularity(K, h, BESIDE)
+    return bool(K.near_singular == PASSING and K.loaded == 0 and not sharing(K)) or is_beside_singularity(
+        K, h, MAX_STEPS_AWAY
+    )
 
 
 def is_beside_singularity(K: DependentRows, h: float, steps: float) -> bool:
@@ -90,7 +98,7 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, afresh:
         K.rhs[n + k] = 0.0 if below else -rate
     solve_kkt(K, n + m, K.rhs)
     S[o_s : o_s + n] = K.rhs[:n]
-    if K.n_frictions > 0 and not factor_saddle(K, m, False, LOSS_OF_STEP):
+    if K.n_frictions > 0 and not factor_saddle(K, m, False, NEWTON_PIVOT_RTOL):
         return SINGULAR
     for j in range(n):
         load = K.acc[K.acc_f + j]
@@ -129,7 +137,7 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afre
                 return NOT_FINITE
             K.rhs[n + k] = -off
             size = max(size, abs(off) / (16.0 * EPS * K.scale[n + row] + 1e-300))
-        if not factor_saddle(K, m, True, LOSS_OF_STEP):
+        if not factor_saddle(K, m, True, NEWTON_PIVOT_RTOL):
             return SINGULAR
         if turn == 0 and not afresh:
             take_back(K, i, m)

@@ -31,33 +31,33 @@ from mbd.kernel.singular.gram_norms import gram_norms
 from mbd.kernel.stepping.restart import compose, evaluate, fill_block
 
 __all__ = [
-    "NEGLIGIBLE_NOISE", "TOO_NOISY", "forget_row_norms", "is_resolved", "accept_row_norms", "row_norms", "motion",
+    "NOISE_RTOL", "MAX_NOISE", "forget_row_norms", "is_resolved", "accept_row_norms", "row_norms", "motion",
     "note_row_norms", "singular_step_size", "noise_share", "noise_coefficient", "is_too_noisy",
 ]  # fmt: skip
 
-NEAR_STEPS = 3.5
+MAX_STEPS_CHECKED = 3.5
 """Steps to a singularity, as the last step tells, below which is looked closer [-]."""
-CERTAIN = 6.0
+MAX_CERTAIN_STEPS = 6.0
 """Steps to it below which it is taken for one; beyond, where nothing else asks for it, it may be none [-]."""
-FAR_STEPS = 14.0
+MAX_NOISY_STEPS = 14.0
 """The same where round-off asks for longer steps over the singularity; of a scheme K.far_look [-]."""
 NOISE_GROWTH = 16.0
 """What round-off of a row makes of velocities over what it would if it were one unit in the last place [-]."""
-NEGLIGIBLE_NOISE = 1e-9
+NOISE_RTOL = 1e-9
 """Share of velocities that round-off may make up before the step over a singularity is longer than others [-]."""
-TOO_NOISY = 1e-5
+MAX_NOISE = 1e-5
 """The same above which a step over a singularity is refused [-]."""
-RESOLVED = 1e-8
+MAX_LONG_STEP_ERROR = 1e-8
 """Share of velocities by which a step over a singularity that is longer than others may err [-]."""
-SMALLEST = 0.1
+MIN_STEP_SHARE = 0.1
 """Part of a step below which none is made to lead up to a singularity [-]."""
-CLEAR = 0.06
+MIN_NODE_DISTANCE = 0.06
 """Part of a step by which a singularity must be away from all nodes [-]."""
-NEAR_ENOUGH = 0.01
+PLACE_RTOL = 0.01
 """Part of a step by which the last of these may differ from where w vanishes [-]."""
-VANISHED = 0.2
+VANISHING_RATIO = 0.2
 """Length of w at a singularity, over that of now: more, and rows only come close to losing rank [-]."""
-NOWHERE = 1e300
+NEVER = 1e300
 """Time to a singularity where there is none [s]."""
 
 
@@ -68,7 +68,7 @@ def may_take_long_step(K: SchemeAbilities) -> bool:
 
 def forget_row_norms(K: DependentRows) -> None:
     """Nothing is known at the start of the scheme: whether a singularity is near is looked at before the first step."""
-    K.singular_time = -NOWHERE
+    K.singular_time = -NEVER
     K.misfit = 0.0
     for k in range(K.n_rows):
         K.left[k] = -1.0
@@ -99,11 +99,11 @@ def accept_row_norms(K: DependentRows, h: float) -> None:
     near = 0.0
     for k in range(m):
         fall = K.left[k] - K.left1[k]
-        if K.left[k] < 0.0 or K.left1[k] < NEAR_STEPS * fall:
+        if K.left[k] < 0.0 or K.left1[k] < MAX_STEPS_CHECKED * fall:
             near = 1.0
         elif K.left1[k] < K.far_look * fall and K.adaptive == 0 and may_take_long_step(K):
-            reach = sqrt(noise_coefficient(K, k, fall / h, K.left1[m]) / NEGLIGIBLE_NOISE)
-            if reach > K.middle * h and K.left1[k] * h < (2.0 * reach + NEAR_STEPS * h) * fall:
+            reach = sqrt(noise_coefficient(K, k, fall / h, K.left1[m]) / NOISE_RTOL)
+            if reach > K.middle * h and K.left1[k] * h < (2.0 * reach + MAX_STEPS_CHECKED * h) * fall:
                 near = 1.0
         K.left[k] = K.left1[k]
     K.left[m] = near
@@ -206,43 +206,43 @@ def times_to_singularities(K: SingularSteps, m: int, unit: float) -> float:
     K.turning[: m * n] = K.basis[: m * n]
     for k in range(m):
         K.work[2 * m + k] = K.work[k]
-        K.work[m + k] = NOWHERE
+        K.work[m + k] = NEVER
     ahead = unit
-    first = NOWHERE
+    first = NEVER
     for _ in range(4):
         evaluate_ahead(K, ahead)
         row_norms(K, m)
-        first = NOWHERE
+        first = NEVER
         for k in range(m):
             along = 0.0
             for j in range(n):
                 along += K.basis[k * n + j] * K.turning[k * n + j]
             here = K.work[2 * m + k]
             fall = here - along * K.work[k]
-            until = ahead * here / fall if fall > 1e-3 * here else NOWHERE
-            if abs(until - ahead) < 0.1 * ahead and K.work[k] > VANISHED * here:
-                until = NOWHERE
+            until = ahead * here / fall if fall > 1e-3 * here else NEVER
+            if abs(until - ahead) < 0.1 * ahead and K.work[k] > VANISHING_RATIO * here:
+                until = NEVER
             K.work[m + k] = until
             first = min(first, until)
-        if first > horizon(K, m, unit, first) or abs(first - ahead) < NEAR_ENOUGH * unit:
+        if first > horizon(K, m, unit, first) or abs(first - ahead) < PLACE_RTOL * unit:
             break
         ahead = first
     K.velocity_noise = 0.0
     speed = max(motion(K, K.y), motion(K, K.y1))  # it may start from rest
     for k in range(m):
-        if K.work[m + k] < 1.1 * first and first < NOWHERE:
+        if K.work[m + k] < 1.1 * first and first < NEVER:
             K.velocity_noise += noise_coefficient(K, k, K.work[2 * m + k] / K.work[m + k], speed)
     return first
 
 
 def horizon(K: Equations, m: int, unit: float, first: float) -> float:
     """Time beyond which none is looked for: nothing is arranged so early, and the motion is not known so far."""
-    limit = 4.0 * FAR_STEPS * unit
-    if K.stretches == 1 and first < NOWHERE:
+    limit = 4.0 * MAX_NOISY_STEPS * unit
+    if K.stretches == 1 and first < NEVER:
         speed = max(motion(K, K.y), motion(K, K.y1))
         for k in range(m):
             if K.work[m + k] == first:
-                reach = sqrt(noise_coefficient(K, k, K.work[2 * m + k] / first, speed) / NEGLIGIBLE_NOISE)
+                reach = sqrt(noise_coefficient(K, k, K.work[2 * m + k] / first, speed) / NOISE_RTOL)
                 limit = max(limit, 4.0 * min(reach, K.longest_over * unit))
     return limit
 
@@ -259,19 +259,19 @@ def singular_step_size(K: SingularSteps, unit: float, longest: float) -> float:
         return unit
     first = times_to_singularities(K, m, unit)
     limit = horizon(K, m, unit, first)
-    stretched = limit > 4.0 * FAR_STEPS * unit and first <= limit
-    if K.stretches == 0 or first <= CERTAIN * unit or stretched:
+    stretched = limit > 4.0 * MAX_NOISY_STEPS * unit and first <= limit
+    if K.stretches == 0 or first <= MAX_CERTAIN_STEPS * unit or stretched:
         K.singular_time = K.time + first
     span = unit
     if may_take_long_step(K):
-        span = min(max(sqrt(K.velocity_noise / NEGLIGIBLE_NOISE) / K.middle, unit), longest * unit)
+        span = min(max(sqrt(K.velocity_noise / NOISE_RTOL) / K.middle, unit), longest * unit)
     rest = (first - K.middle * span) / unit
     if rest >= 2.0:
         K.velocity_noise = 0.0  # far: what may come of it is judged nearer
         return unit
     if rest > 1.0:
         return 0.5 * rest * unit
-    if rest >= SMALLEST:
+    if rest >= MIN_STEP_SHARE:
         return rest * unit
     K.near_singular = PASSING
     return clearest(K, m, span, min(1.0, first / K.middle / span))
@@ -288,7 +288,7 @@ def noise_share(K: DependentRows, h: float) -> float:
 def is_too_noisy(K: SingularSteps, h: float) -> bool:
     """Whether round-off makes too much of velocities in such a step; K.detail then tells when, where, how much."""
     share = noise_share(K, h)
-    if share <= TOO_NOISY:
+    if share <= MAX_NOISE:
         return False
     m = K.n_active
     first = times_to_singularities(K, m, h)
@@ -308,7 +308,7 @@ def is_resolved(K: Steps, h: float) -> bool:
         fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
     for i in range(K.n):
         size = fastest if i < K.n_v else max(max(abs(K.y[i]), abs(K.y1[i])), h * abs(K.rate[i]))
-        if not abs(K.error[K.n_v + i]) <= RESOLVED * size:
+        if not abs(K.error[K.n_v + i]) <= MAX_LONG_STEP_ERROR * size:
             return False
     return True
 
@@ -326,7 +326,7 @@ def clearest(K: LinearAlgebra, m: int, unit: float, wanted: float) -> float:
         if clear > widest + 1e-9:
             best = part
             widest = clear
-        if widest >= CLEAR:
+        if widest >= MIN_NODE_DISTANCE:
             break
     return best * unit
 

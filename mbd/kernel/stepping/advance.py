@@ -11,8 +11,8 @@ from mbd.kernel.codes import (
     PAUSE,
 )
 from mbd.kernel.contact.cone_steps import (
-    LONGER,
-    SHORTER,
+    ONSET_STEP_GROWTH,
+    ONSET_STEP_RATIO,
     approached_end,
     slides_at_first,
     slides_on,
@@ -24,7 +24,7 @@ from mbd.kernel.events.transitions import find_due, has_happened, is_due, settle
 from mbd.kernel.records import Kernel
 from mbd.kernel.singular.step_pairs import ALONE, FIRST
 from mbd.kernel.stepping.charts import divides_further, turned_end
-from mbd.kernel.stepping.judge_step import MAX_SHORTER, end_timer, judge_step
+from mbd.kernel.stepping.judge_step import MAX_SHORTENINGS, end_timer, judge_step
 from mbd.kernel.stepping.observe import is_awaited, store_row
 from mbd.kernel.stepping.starting import find_mode, restart
 from mbd.kernel.stepping.step_retry import is_shortened, part_end, step_end, tried_step
@@ -118,20 +118,20 @@ def take_step(K: Kernel) -> int:
     full = h
     if K.n_cones > 0 and K.strategy == 1:
         hold_for_step(K, h)
-    begun = K.begun_step / LONGER
+    begun = K.begun_step / ONSET_STEP_GROWTH
     status = tried_step(K, h, t1)
     # sliding that begins or comes to rest in the step is followed by shorter ones
     if K.n_cones > 0 and K.strategy == 0:
         released = False
-        for _ in range(MAX_SHORTER):
+        for _ in range(MAX_SHORTENINGS):
             if status == 0:
                 if not slides_on(K):
                     break
                 if not released:  # what was to rest in the whole step may slide on in half of it: let go at the same h
                     h = min(0.5 * h, K.step_taken)
                 released = True
-            elif is_shortened(K, status) and slides_at_first(K, SHORTER * h):
-                h *= SHORTER
+            elif is_shortened(K, status) and slides_at_first(K, ONSET_STEP_RATIO * h):
+                h *= ONSET_STEP_RATIO
                 K.begun_step = h
             else:
                 break

@@ -13,7 +13,7 @@ __all__ = ["begin_run", "judge_start"]
 
 LONG_AGO = float("-inf")
 """When the last switch was, before any [s]."""
-BELOW = 1e-6
+MAX_START_DEPTH = 1e-6
 """Depth inside a surface from which an open contact cannot start, and a start is reported [m, rad]."""
 INCONSISTENT, ROUND_OFF = 1e-6, 1e-8
 """Residuals of rows, as in `mbd.assembly.consistency`."""
@@ -115,7 +115,7 @@ def touch(K: Guards) -> bool:
             if K.row_contact[k] == c and K.row_friction[k] < 0:
                 near = near and abs(K.acc[K.acc_rate + k]) <= SLOW
         K.touched[c] = 1 if ready and K.kind[c] == 0 and near else 0
-        if ready and K.closed[c] == 0 and K.guards1[c] < -BELOW:
+        if ready and K.closed[c] == 0 and K.guards1[c] < -MAX_START_DEPTH:
             return False
     return True
 

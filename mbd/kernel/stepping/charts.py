@@ -18,11 +18,11 @@ __all__ = ["divides_further", "find_chart_end", "leave_chart", "turned_end", "tu
 
 QUARTER_TURN = 1.5707963267948966
 """Way of a joint at the speed with which a step begins, above which the step is divided [rad]."""
-LEAST_PART = 0.1
+MIN_TURN = 0.1
 """Way below which a step that fails does so for another reason than how far it turns a joint [rad]."""
-LONGER_PART = 1.02
+PART_GROWTH = 1.02
 """Growth of the parts from one to the next, after a step has failed for how far it turns a joint [-]."""
-MOST_TURN = 2.356194490192345
+MAX_TURN = 2.356194490192345
 """Way at the speed with which it ends, above which a step is not accepted: three eighths of a turn [rad]."""
 
 
@@ -42,7 +42,7 @@ def turned_end(K: Motion, t1: float) -> float:
     part = QUARTER_TURN
     if K.part_turn > 0.0:
         part = min(part, K.part_turn)
-        K.part_turn = LONGER_PART * part if part < QUARTER_TURN else 0.0
+        K.part_turn = PART_GROWTH * part if part < QUARTER_TURN else 0.0
     parts = largest_turn(K, K.y, h) / part
     if not 1.0 < parts < 1e4:  # beyond, the motion is lost otherwise
         return t1
@@ -61,7 +61,7 @@ def divides_further(K: Motion, h: float) -> bool:
     if K.vector == 1 or K.explicit == 1 or K.n_nodes == 0:
         return False
     way = largest_turn(K, K.y, h)
-    if way < LEAST_PART:
+    if way < MIN_TURN:
         return False
     K.part_turn = way
     return True
@@ -69,7 +69,7 @@ def divides_further(K: Motion, h: float) -> bool:
 
 def turns_too_far(K: Motion, h: float) -> bool:
     """Whether the candidate turns a joint so fast that the increment of its step may not be unique."""
-    return bool(largest_turn(K, K.y1, h) > MOST_TURN)
+    return bool(largest_turn(K, K.y1, h) > MAX_TURN)
 
 
 def largest_turn(K: Model, y: Reals, h: float) -> float:
@@ -90,7 +90,7 @@ def wants_row(K: Motion, h: float) -> bool:
     """Whether a row is stored after a step of h, as another one might turn a joint too far away from the last row."""
     way = largest_turn(K, K.y, h)
     K.turned += way
-    return bool(K.turned + way > MOST_TURN)
+    return bool(K.turned + way > MAX_TURN)
 
 
 def find_chart_end(K: Motion) -> None:

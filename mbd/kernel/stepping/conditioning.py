@@ -9,7 +9,7 @@ error e is what each correction by the balance leaves of the error before (Wilki
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import LOSS_AT_ONCE, solve_kkt
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, ILL_CONDITIONED
@@ -19,15 +19,15 @@ from mbd.kernel.stepping.restart import stepping_rows
 
 __all__ = ["refine_accelerations", "is_ill_conditioned"]
 
-FEW_DIGITS = 1e-6
+CORRECTED_PIVOT_RTOL = 1e-6
 """Smallest pivot of the scaled matrix below which solutions are corrected [-]."""
-HOPELESS = 0.1
+MAX_ERROR = 0.1
 """Relative error of accelerations known beforehand above which they are refused [-]."""
 
 
 def is_ill_conditioned(K: Report) -> bool:
     """Whether a pivot of the scaled matrix of accelerations was so small that solutions lose digits."""
-    return bool(K.least_pivot < FEW_DIGITS)
+    return bool(K.least_pivot < CORRECTED_PIVOT_RTOL)
 
 
 def refine_accelerations(K: Balance) -> int:
@@ -39,12 +39,12 @@ def refine_accelerations(K: Balance) -> int:
         return 0
     n = K.n
     m = stepping_rows(K)
-    if not factor_saddle(K, m, False, LOSS_AT_ONCE):
+    if not factor_saddle(K, m, False, DIRECT_PIVOT_RTOL):
         K.failure_index = 0
         return ILL_CONDITIONED
     error = known_error(K, m)
     K.lost_digits = error
-    if not error < HOPELESS:
+    if not error < MAX_ERROR:
         return ILL_CONDITIONED
     left = error
     for _ in range(14):  # corrections by the balance

@@ -17,17 +17,17 @@ from mbd.kernel.stepping.restart import compose, consistent, fill_block
 
 __all__ = ["find_pace", "relax_pace"]
 
-FEW = 0.2
+MAX_SHARE = 0.2
 """Share above which an impact has too few steps: half a period has π/√share, seven [-]."""
-ENOUGH = 0.02
+TARGET_SHARE = 0.02
 """Share of the steps taken instead, 22 in half a period [-]."""
-BRIEFEST = 1e-6
+MIN_STEP_RATIO = 1e-6
 """Step over dt below which a run ends instead [-]."""
-WINDOW = 44
+WINDOW_STEPS = 44
 """Short steps, a period, after which it is asked whether the contact rests [-]."""
-RESTS = 1e-2
+REST_RATE_RATIO = 1e-2
 """Share of the gap rate at closing below which, over a window, it does [-]."""
-PATIENCE = 880
+MAX_SHORT_STEPS = 880
 """Short steps after which those of a contact that goes on vibrating become longer all the same [-]."""
 
 
@@ -42,7 +42,7 @@ def find_pace(K: Switching) -> int:
                 K.contact_step[c] = pace_of(K, c)
                 K.largest_rate[c] = 0.0
                 K.contact_steps[c] = 0.0
-                if K.contact_step[c] < BRIEFEST * K.dt:
+                if K.contact_step[c] < MIN_STEP_RATIO * K.dt:
                     K.failure_step = K.contact_step[c]
                     K.failure_index = c
                     return TOO_BRIEF
@@ -63,14 +63,14 @@ def pace_of(K: Switching, c: int) -> float:
     here = K.guards1[c]
     touches = abs(here) <= 1e6 * gap_tolerance(K, c)
     first = 0.0 if touches else acceleration_of(K, c, 0.0)
-    share = FEW
-    while h >= BRIEFEST * K.dt:
+    share = MAX_SHARE
+    while h >= MIN_STEP_RATIO * K.dt:
         change = h * abs(acceleration_of(K, c, h) - first)
         rate = K.closing_rate[c]
         outside = touches and K.guards1[c] > 0.0 and change > 0.0
         if rate * h <= gap_tolerance(K, c) or (change <= share * rate and not outside):
             return float(h)
-        share = ENOUGH
+        share = TARGET_SHARE
         h *= 0.5
     return float(h)
 
@@ -112,9 +112,9 @@ def relax_pace(K: Guards) -> None:
         if K.kind[c] == 1 and K.closed[c] == 1 and 0.0 < K.contact_step[c] < K.dt:
             K.largest_rate[c] = max(K.largest_rate[c], abs(K.guards0[K.at_gap_rate + c]))
             K.contact_steps[c] += 1.0
-            if K.contact_steps[c] % WINDOW == 0.0:
-                rests = K.largest_rate[c] < RESTS * K.closing_rate[c]
-                if rests or K.contact_steps[c] >= PATIENCE:
+            if K.contact_steps[c] % WINDOW_STEPS == 0.0:
+                rests = K.largest_rate[c] < REST_RATE_RATIO * K.closing_rate[c]
+                if rests or K.contact_steps[c] >= MAX_SHORT_STEPS:
                     K.contact_step[c] = min(2.0 * K.contact_step[c], K.dt)
                     K.restart_due = 2
                 K.largest_rate[c] = 0.0

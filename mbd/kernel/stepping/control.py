@@ -35,27 +35,27 @@ from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["controlled_step", "first_step", "smallest_step"]
 
-LEAST = 1e-10
+MIN_STEP_RATIO = 1e-10
 """Shortest step over the longest [-]."""
-SAFETY = 0.9
+SAFETY_FACTOR = 0.9
 """Part of the step that would just be allowed [-]."""
-FALL = 0.2
+MIN_FACTOR = 0.2
 """Least factor from one step to the next try [-]."""
-UNCHANGED = 1.25
+MAX_UNCHANGED_GROWTH = 1.25
 """Growth below which a scheme that remembers its step keeps it [-]."""
-AGAIN = 0.8
+RETRY_FACTOR = 0.8
 """Factor below which a step is taken again [-]."""
-NEIGHBOURS = 4.0
+POSITION_ULPS = 4.0
 """Error of positions, over the distance between neighbouring numbers, that is round-off [-]."""
-CANCELLED = 64.0
+INCREMENT_ULPS = 64.0
 """The same for what a step adds to them: stages and estimates are sums in which large terms cancel [-]."""
-SIZED = 0.1
+MAX_STATE_ERROR = 0.1
 """Error of a first-order state, over its size, up to which an explicit step tells that size [-]."""
 
 
 def smallest_step(K: State) -> float:
     """Below it the clock does not move, or a run would never end: a motion that turns ever faster."""
-    return float(max(64.0 * EPS * max(abs(K.time), K.longest), LEAST * K.longest))
+    return float(max(64.0 * EPS * max(abs(K.time), K.longest), MIN_STEP_RATIO * K.longest))
 
 
 def error_ratio(K: SingularSteps, h: float) -> float:
@@ -67,7 +67,7 @@ def error_ratio(K: SingularSteps, h: float) -> float:
         far = max(far, abs(K.q1[i]))
     for i in range(n_v):
         fast = max(fast, abs(K.y1[i]))
-    floor = EPS * (NEIGHBOURS * far + CANCELLED * h * fast)
+    floor = EPS * (POSITION_ULPS * far + INCREMENT_ULPS * h * fast)
     if K.singular_size == 1 and K.n_active > 0:
         floor += noise_share(K, h) * h * fast
     largest = 0.0
@@ -80,21 +80,21 @@ def error_ratio(K: SingularSteps, h: float) -> float:
     for i in range(n_v, K.n):
         size = max(largest_state(K, i), h * max(abs(K.rate[i]), abs(K.rate1[i])))
         if size > 0.0:
-            ratio = max(ratio, abs(K.error[n_v + i]) / size / (K.allowed * h + CANCELLED * EPS))
+            ratio = max(ratio, abs(K.error[n_v + i]) / size / (K.allowed * h + INCREMENT_ULPS * EPS))
     return ratio if ratio < 1e300 else 1e300
 
 
 def largest_state(K: SingularSteps, i: int) -> float:
     """The largest size of the first-order state y_i in the run, this candidate among it.
 
-    What an explicit scheme made of it in a step that is not taken counts if its estimate is right to `SIZED`: the step
-    may have been far too long. If none counted, a state that grows from zero by a broken power of time would stay as
-    inaccurate, relative to its own size, however short the steps become.
+    What an explicit scheme made of it in a step that is not taken counts if its estimate is right to `MAX_STATE_ERROR`:
+    the step may have been far too long. If none counted, a state that grows from zero by a broken power of
+    time would stay as inaccurate, relative to its own size, however short the steps become.
     """
     z = i - K.n_v
     K.largest[z] = max(K.largest[z], abs(K.y[i]))
     size = max(K.largest[z], abs(K.y1[i]))
-    if K.explicit == 0 or abs(K.error[K.n_v + i]) <= SIZED * abs(K.y1[i]):
+    if K.explicit == 0 or abs(K.error[K.n_v + i]) <= MAX_STATE_ERROR * abs(K.y1[i]):
         K.largest[z] = size
     return float(size)
 
@@ -103,8 +103,8 @@ def growth(K: SchemeAbilities, ratio: float) -> float:
     """Factor from this step to the next."""
     factor = float(K.most_growth)
     if ratio > 0.0:
-        factor = min(max(SAFETY * ratio ** (-1.0 / K.error_order), FALL), factor)
-    if K.explicit == 0 and AGAIN <= factor <= UNCHANGED:
+        factor = min(max(SAFETY_FACTOR * ratio ** (-1.0 / K.error_order), MIN_FACTOR), factor)
+    if K.explicit == 0 and RETRY_FACTOR <= factor <= MAX_UNCHANGED_GROWTH:
         return 1.0
     return factor
 
@@ -130,7 +130,7 @@ def controlled_step(K: Kernel, h: float) -> int:
             scheme_error(K, h)
             ratio = error_ratio(K, h)
             factor = growth(K, ratio)
-            if factor >= AGAIN:
+            if factor >= RETRY_FACTOR:
                 K.local_error = ratio * K.allowed * h
                 K.step_taken = h
                 following = h * factor

@@ -4,7 +4,7 @@ With the change D of (v, z) that the previous accelerations did not predict, and
 
 ``ζ = h D·M (a(y₁) − a(y₁ − D)) / D·M D``.
 
-A force that depends on time has ζ = 0, a stiff spring or damper ζ < 0, ``v̇ = c v`` has ζ = c h: more than `GROWTH`
+A force that depends on time has ζ = 0, a stiff spring or damper ζ < 0, ``v̇ = c v`` has ζ = c h: more than `MAX_GROWTH`
 grows by more than e in a step, which no scheme of order 2 follows. Explicit schemes follow a stiff spring or damper up
 to their bound of stability only.
 """
@@ -21,9 +21,9 @@ from mbd.kernel.stepping.scales import still_energy
 
 __all__ = ["is_unstable", "leave_rows_alone", "note_unforeseen", "outgrows"]
 
-GROWTH = 0.8
+MAX_GROWTH = 0.8
 """ζ in a whole step that the trapezoidal rule still follows; less where the error of a scheme is larger [-]."""
-TRAPEZOID = 1.0 / 12.0
+TRAPEZOID_ERROR = 1.0 / 12.0
 """Constant of its error, in h³ times the rate of accelerations [-]."""
 
 
@@ -40,7 +40,7 @@ def note_unforeseen(K: Kernel, h: float, t1: float, at_y: int, at_D: int) -> boo
 
 
 def outgrows(K: Switching, h: float, t1: float, stretch: float, at_y: int, at_D: int) -> bool:
-    """Whether the change that was not predicted feeds itself by more than `GROWTH`; `note_unforeseen` has found it."""
+    """Whether the change that was not predicted feeds itself by over `MAX_GROWTH`; `note_unforeseen` has found it."""
     n = K.n
     part = 1.0
     while part >= 1.0 / 4096.0:  # least part of D that is tried where accelerations are not finite at its other end
@@ -91,9 +91,9 @@ def leave_rows_alone(K: Switching, at_D: int) -> None:
 
 
 def resolved_growth(K: SchemeAbilities) -> float:
-    """`GROWTH`, less where the error of the scheme is larger than that of the trapezoidal rule."""
+    """`MAX_GROWTH`, less where the error of the scheme is larger than that of the trapezoidal rule."""
     error = abs(K.error_constant)
-    return GROWTH * TRAPEZOID / error if error > TRAPEZOID else GROWTH
+    return MAX_GROWTH * TRAPEZOID_ERROR / error if error > TRAPEZOID_ERROR else MAX_GROWTH
 
 
 def growth_between(K: Switching, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mbd.kernel.codes import AT_POSE, CHATTER, CROSS, JUMPED, PAUSE, PULL, STICK
 from mbd.kernel.contact.cone_steps import (
-    SHORTER,
-    TURNS_AWAY,
+    ONSET_STEP_RATIO,
+    SLIDES_ON,
     come_to_zero,
     shorter_turn,
     slides_at_first,
@@ -34,9 +34,9 @@ from mbd.kernel.stepping.step_retry import is_shortened, tried_step
 from mbd.kernel.stepping.trial_step import try_step
 from mbd.kernel.tangent_rules import follow_candidate, follow_event, follows_rows
 
-__all__ = ["MAX_SHORTER", "end_timer", "judge_step"]
+__all__ = ["MAX_SHORTENINGS", "end_timer", "judge_step"]
 
-MAX_SHORTER = 5
+MAX_SHORTENINGS = 5
 """Tries of shorter steps as sliding begins or ends [-]."""
 
 
@@ -119,7 +119,7 @@ def passes_events(K: Kernel, h: float) -> bool:
 def find_event(K: Kernel, h: float, t1: float) -> int:
     """−1 with the candidate at the first event of the step, which K.fired tells; 0 without one; else a failure.
 
-    `TURNS_AWAY`: the step is to be taken again, shorter, with fewer directions that are held.
+    `SLIDES_ON`: the step is to be taken again, shorter, with fewer directions that are held.
     """
     clear_rejected_events(K)
     if not judge(K, h):
@@ -132,9 +132,9 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
         if status != 0:
             return status
     if K.event_kind < 0:
-        return TURNS_AWAY if K.strategy == 0 and slides_on(K) else 0
+        return SLIDES_ON if K.strategy == 0 and slides_on(K) else 0
     if K.n_cones > 0 and K.strategy == 0 and K.event_kind != STICK and slides_until_event(K):
-        return TURNS_AWAY
+        return SLIDES_ON
     if K.strategy == 1 and (striking_contact(K) >= 0 or closes_below_surface(K)):  # the contact comes first
         return try_step(K, h, t1)
     return AT_POSE if refuses(K, K.event_after) else -1
@@ -196,7 +196,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         t1 = K.time + h
         status = tried_part(K, h, t1)
         if is_shortened(K, status):
-            h *= SHORTER
+            h *= ONSET_STEP_RATIO
             status = tried_step(K, h, K.time + h)
             if K.step_taken != h:
                 h = K.step_taken
@@ -206,18 +206,18 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
     event = 0
     if parts != 0 or not (quiet or looked):  # a shorter step is one of its own: what was looked at is interpolated
         ahead = parts != 0 and K.strategy == 0 and slides_on(K)  # these parts end before what slides comes to rest
-        event = TURNS_AWAY if ahead else find_event(K, h, t1)
-        for _ in range(K.n_cones + MAX_SHORTER):
-            if event == TURNS_AWAY:  # each time one more direction is held no longer
+        event = SLIDES_ON if ahead else find_event(K, h, t1)
+        for _ in range(K.n_cones + MAX_SHORTENINGS):
+            if event == SLIDES_ON:  # each time one more direction is held no longer
                 h = shorter_turn(K, h)
             elif is_shortened(K, event):  # no step ends where an event was looked for: it is nearer than it seems
                 if K.stabilized == 0 and K.n_active > 0 and restart_on_spurious_reaction(K):
                     return -1
-                h *= SHORTER
+                h *= ONSET_STEP_RATIO
             else:
                 break
             status = tried_step(K, h, K.time + h)
-            if K.strategy == 0 and is_shortened(K, status) and slides_at_first(K, SHORTER * h):
+            if K.strategy == 0 and is_shortened(K, status) and slides_at_first(K, ONSET_STEP_RATIO * h):
                 event = status
                 continue
             if status != 0:
@@ -227,7 +227,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
             t1 = K.time + h
             within = True
             cut = False
-            event = TURNS_AWAY if K.strategy == 0 and slides_on(K) else find_event(K, h, t1)
+            event = SLIDES_ON if K.strategy == 0 and slides_on(K) else find_event(K, h, t1)
         if event < 0:
             status = follow_event(K)
             if status != 0:

@@ -14,18 +14,26 @@ from mbd.kernel.algebra.ordered import order_at, solve_kkt
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Equations, Motion
 
-__all__ = ["LOSS", "excuses_much", "find_imbalance", "has_settled", "is_uneven", "polish_rates", "polish_with_rows"]
+__all__ = [
+    "CORRECTED_PIVOT_RTOL",
+    "excuses_much",
+    "find_imbalance",
+    "has_settled",
+    "is_uneven",
+    "polish_rates",
+    "polish_with_rows",
+]
 
-LOSS = 1e-4
+CORRECTED_PIVOT_RTOL = 1e-4
 """Part of a diagonal entry that is left as its pivot below which rates are corrected [-]."""
-GREAT_LOSS = 1e-8
+REPEATED_PIVOT_RTOL = 1e-8
 """The same below which they are corrected until corrections are small [-]."""
-SMALL_CORRECTION = 1e-9
+CORRECTION_RTOL = 1e-9
 """Correction over the largest rate, both as they are, after which none follows [-]."""
 
-SETTLED = 1e-8
+RESIDUAL_CORRECTION_RTOL = 1e-8
 """Part of the largest rate that a correction of residuals that pass may change without another look [-]."""
-EXCUSED = 1e6
+MAX_FORCE_RATIO = 1e6
 """Terms of forces over inertia forces and multipliers above which corrections are looked at as well [-]."""
 
 
@@ -40,7 +48,7 @@ def has_settled(moved: float, last: float, enough: float) -> bool:
         where there was none
     enough : what is small beside the error of the step [-]
     """
-    return moved <= max(SETTLED, enough) or (last > 0.0 and moved > 0.5 * last)
+    return moved <= max(RESIDUAL_CORRECTION_RTOL, enough) or (last > 0.0 and moved > 0.5 * last)
 
 
 def excuses_much(K: Motion) -> bool:
@@ -58,7 +66,7 @@ def excuses_much(K: Motion) -> bool:
             inertia += abs(K.acc[i * K.n + j] * K.rate[j])
         force = max(force, inertia)
         largest = max(largest, K.scale[i])
-    return largest > EXCUSED * force
+    return largest > MAX_FORCE_RATIO * force
 
 
 def is_uneven(K: Equations, m: int) -> bool:
@@ -82,7 +90,7 @@ def is_uneven(K: Equations, m: int) -> bool:
             if K.unit[i] == unit and entry > 0.0:
                 big = max(big, entry)
                 least = min(least, 1.0 / K.kkt[i * n + i] if definite else entry)
-        if least < LOSS * big:
+        if least < CORRECTED_PIVOT_RTOL * big:
             return True
     return False
 
@@ -94,7 +102,7 @@ def polish_rates(K: Balance, kept: float) -> None:
     """
     n = K.n
     before = 1e300
-    for _ in range(8 if kept < GREAT_LOSS else 1):
+    for _ in range(8 if kept < REPEATED_PIVOT_RTOL else 1):
         find_imbalance(K)
         for i in range(n):
             K.rhs[i] = -K.out[i]
@@ -105,7 +113,7 @@ def polish_rates(K: Balance, kept: float) -> None:
             K.jump[i] += K.rhs[i]
             change = max(change, abs(K.rhs[i]))
             size = max(size, abs(K.jump[i]))
-        if change < SMALL_CORRECTION * size or change > 0.5 * before:
+        if change < CORRECTION_RTOL * size or change > 0.5 * before:
             break
         before = change
 

@@ -15,26 +15,26 @@ from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Guards, Switching
 from mbd.kernel.stepping.free_rates import NOT_CLEAR, rates_in_block
-from mbd.kernel.stepping.mass_ratios import LOSS
+from mbd.kernel.stepping.mass_ratios import CORRECTED_PIVOT_RTOL
 from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.stepping.scales import still_energy
 
 __all__ = ["peaks_within"]
 
-RISEN = 1.5
+MIN_RISE = 1.5
 """Accelerations within a step over those at its ends below which there is nothing to be found [-]."""
-BEYOND = 100.0
+MAX_RISE = 100.0
 """Accelerations within a step over those at its ends that no scheme can have seen [-]."""
-NEXT_TO_END = 1.0 / 256.0
+END_SHARE = 1.0 / 256.0
 """Part of a step at the end of larger accelerations, over which they are looked at for a rise [-]."""
-STEEP = 16.0
+MIN_SQUARED_RISE = 16.0
 """Relative rise of squares of accelerations over a step, were it to go on, above which a pole may be near [-]."""
 NOT_FOUND = -1.0
 """Of accelerations that cannot be found."""
 
 
 def peaks_within(K: Switching, h: float, at_y: int) -> bool:
-    """Whether accelerations within the step are `BEYOND` those at its ends, and decide on the motion if they last.
+    """Whether accelerations within the step are `MAX_RISE` those at its ends, and decide on the motion if they last.
 
     The new state is in K.inside, its velocities from `at_y` on; K.q1, K.y1 and the block are overwritten.
     """
@@ -45,9 +45,11 @@ def peaks_within(K: Switching, h: float, at_y: int) -> bool:
     if first == NOT_FOUND or last == NOT_FOUND:
         return False
     ends = max(first, last)
-    close = pull_at(K, h, NEXT_TO_END if first >= last else 1.0 - NEXT_TO_END, at_y)
-    rises = close > (1.0 + NEXT_TO_END * STEEP) * ends  # a pole next to that end, which halves of the way would miss
-    if K.n_rows == 0 and K.n_frictions == 0 and not rises and 0.0 < K.stage_pull < RISEN * RISEN * ends:
+    close = pull_at(K, h, END_SHARE if first >= last else 1.0 - END_SHARE, at_y)
+    rises = (
+        close > (1.0 + END_SHARE * MIN_SQUARED_RISE) * ends
+    )  # a pole next to that end, which halves of the way would miss
+    if K.n_rows == 0 and K.n_frictions == 0 and not rises and 0.0 < K.stage_pull < MIN_RISE * MIN_RISE * ends:
         return False
     a0 = first
     a2 = NOT_FOUND
@@ -60,10 +62,10 @@ def peaks_within(K: Switching, h: float, at_y: int) -> bool:
         if a1 == NOT_FOUND or a2 == NOT_FOUND or a3 == NOT_FOUND:
             return False
         most = max(max(a1, a2), max(a3, max(a0, a4)))
-        if most > BEYOND * BEYOND * ends:
+        if most > MAX_RISE * MAX_RISE * ends:
             return h * h * most > max(motion_at(K, at_y), 2.0 * still_energy(K))
-        # halvings after which the largest accelerations must be beyond those at the ends by `RISEN` to go on
-        if halving >= 3 and not rises and most < RISEN * RISEN * ends:
+        # halvings after which the largest accelerations must be beyond those at the ends by `MIN_RISE` to go on
+        if halving >= 3 and not rises and most < MIN_RISE * MIN_RISE * ends:
             return False
         if most == a0 or most == a1:  # the part around the largest: two of the four intervals
             a4 = a2
@@ -126,7 +128,7 @@ def pull_without_rows(K: Balance, t: float) -> float:
         finite += abs(K.jump[i])
     if not finite < 1e300:
         return NOT_FOUND
-    if solve_definite(K.acc, n, K.jump, K.spare) < LOSS:
+    if solve_definite(K.acc, n, K.jump, K.spare) < CORRECTED_PIVOT_RTOL:
         return NOT_FOUND
     total = 0.0
     for i in range(K.n_v):

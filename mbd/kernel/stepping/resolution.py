@@ -16,7 +16,7 @@ from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import GAINED, LEAPT, NOT_FINITE, OUTGROWN, UNSTABLE
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.records import Equations, Guards, Kernel, State, Steps, Switching
-from mbd.kernel.schemes.iteration import BENT, BYSTANDER, LOOK_TWICE, is_small
+from mbd.kernel.schemes.iteration import MAX_CURVATURE, MAX_UNCHECKED_ERROR, MIN_RATE_SHARE, is_small
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.charts import whole_step
 from mbd.kernel.stepping.growth import is_unstable, leave_rows_alone, note_unforeseen, outgrows
@@ -26,12 +26,12 @@ from mbd.kernel.stepping.scales import still_energy
 
 __all__ = ["judge_change"]
 
-COARSE = 0.2
+MAX_RATE_ERROR = 0.2
 """Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
-UNEXPLAINED = 0.5
+MAX_UNEXPLAINED_ENERGY = 0.5
 """Part of the kinetic energy at the end of a step that may be neither old nor work of forces [-]."""
-LEAST_GAIN = 0.085
-"""Energy of the change of velocities over the kinetic one below which less than `UNEXPLAINED` is new, (1 − √½)² [-]."""
+MIN_CHANGE_ENERGY = 0.085
+"""Energy of the change of velocities over the kinetic one below which less than half of it is new, (1 − √½)² [-]."""
 
 
 def judge_change(K: Kernel, h: float, t1: float) -> int:
@@ -43,9 +43,9 @@ def judge_change(K: Kernel, h: float, t1: float) -> int:
     if K.estimates == 0 and changes_little(K, h, stretch):
         return 0
     worst = largest_share(K, h, stretch)
-    if (worst <= LOOK_TWICE and not bends(K, h)) or K.near_singular > 0 or sharing(K):
+    if (worst <= MAX_UNCHECKED_ERROR and not bends(K, h)) or K.near_singular > 0 or sharing(K):
         return 0
-    if worst > LOOK_TWICE:  # then stages have seen nothing that counts
+    if worst > MAX_UNCHECKED_ERROR:  # then stages have seen nothing that counts
         K.stage_pull = 0.0
     return look_closer(K, h, t1, stretch, worst > K.look_twice)
 
@@ -74,7 +74,7 @@ def bends(K: Equations, h: float) -> bool:
             most = abs(K.rate1[i] - K.rate[i])
             who = i
         fastest = max(fastest, abs(K.y1[i]))
-    if h * most > BENT * max(K.rest_speed, fastest):
+    if h * most > MAX_CURVATURE * max(K.rest_speed, fastest):
         K.failure_index = who
         return True
     return False
@@ -87,7 +87,7 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     at_y = carry(K.q1, K.inside, 0, K.n_q, True)
     at_D = carry(K.y1, K.inside, at_y, K.n, True)
     status = 0
-    coarse = rough_enough and rough > COARSE
+    coarse = rough_enough and rough > MAX_RATE_ERROR
     # friction in a plane is stiff where it turns at a slow γ, for an instant only
     stiff = K.explicit == 1 and K.n_cones == 0 and (coarse or may_amplify(K, h))
     known = (rough_enough or stiff) and note_unforeseen(K, h, t1, at_y, at_D)
@@ -104,7 +104,7 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     if status == 0 and rough_enough and K.strategy == 0:
         if K.estimates == 0:
             rough = uncertainty(K, h, t1, at_D)
-        if rough > COARSE:
+        if rough > MAX_RATE_ERROR:
             note_coarse(K, t1, rough)
     if K.n_dropped > 0:
         evaluate(K, t1, K.q1, K.y1)
@@ -161,7 +161,7 @@ def share_of_rates(K: Guards, at_D: int) -> float:
     fastest = 0.0
     for i in range(K.n_v):
         fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
-    floor = max(K.rest_speed, BYSTANDER * fastest)
+    floor = max(K.rest_speed, MIN_RATE_SHARE * fastest)
     worst = 0.0
     for i in range(K.n):
         worst = max(worst, abs(K.inside[at_D + i]) / max(floor, max(abs(K.y[i]), abs(K.y1[i]))))
@@ -187,7 +187,7 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
     fastest = 0.0
     for i in range(K.n_v):
         fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
-    floor = max(K.rest_speed, BYSTANDER * fastest)
+    floor = max(K.rest_speed, MIN_RATE_SHARE * fastest)
     cube = stretch * stretch * stretch
     twelfth = h / 12.0
     worst = 0.0
@@ -203,7 +203,7 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
         if share > worst:
             worst = share
             who = i
-    if worst * cube > LOOK_TWICE:
+    if worst * cube > MAX_UNCHECKED_ERROR:
         K.failure_index = who
         K.failure_size = worst
     return worst * cube
@@ -259,7 +259,7 @@ def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:
             if node == 4:
                 new = energy
         most = max(most, work)
-    if not (new > max(1.1 * old, still_energy(K)) and new - old - most > UNEXPLAINED * new):
+    if not (new > max(1.1 * old, still_energy(K)) and new - old - most > MAX_UNEXPLAINED_ENERGY * new):
         return False
     if K.n_active == 0:
         return True
@@ -270,4 +270,4 @@ def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:
     for i in range(K.n_v):
         for j in range(K.n_v):
             free += 0.5 * K.inside[at_D + i] * K.acc[i * K.n + j] * K.inside[at_D + j]
-    return free > LEAST_GAIN * new
+    return free > MIN_CHANGE_ENERGY * new

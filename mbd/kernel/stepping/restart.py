@@ -30,13 +30,13 @@ __all__ = [
     "retain_scales", "row_speed", "share_loads", "stepping_rows", "take_consistent",
 ]  # fmt: skip
 
-FAR_ABOVE = 100.0
+MAX_MAGNITUDE_RATIO = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
-ROW_GROWTH = 16.0
+MAX_ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
-SETTLED_LOADS = 1e-6
+LOAD_RTOL = 1e-6
 """Relative change of the last of these above which there are no such multipliers: friction locks the motion [-]."""
-MAX_LOADS = 30
+MAX_LOAD_ITERATIONS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
 
@@ -151,7 +151,7 @@ def raise_scales(K: Equations, rows: bool) -> None:
         if i < K.n:
             K.scale[i] = max(K.scale[i] if K.scale[i] < 1e300 else 0.0, K.work[i])
         elif rows:
-            K.scale[i] = max(min(K.scale[i], ROW_GROWTH * K.work[i]), K.work[i])
+            K.scale[i] = max(min(K.scale[i], MAX_ROW_GROWTH * K.work[i]), K.work[i])
         else:
             K.scale[i] = K.work[i]
     weigh(K)
@@ -179,7 +179,7 @@ def restore_scales(K: Model) -> None:
 def retain_scales(K: Model) -> None:
     """Go on with raised magnitudes, those of a candidate; K.scales_raised where they are far above what was known."""
     for i in range(K.n):
-        if K.scale[i] > FAR_ABOVE * K.known[i]:
+        if K.scale[i] > MAX_MAGNITUDE_RATIO * K.known[i]:
             K.scales_raised = 1
 
 
@@ -193,7 +193,7 @@ def lower_to_step(K: Equations) -> bool:
     measure(K)
     lowered = False
     for i in range(K.n + 2 * K.n_rows):
-        bound = FAR_ABOVE * K.scale[i] if i < K.n else K.known[i]
+        bound = MAX_MAGNITUDE_RATIO * K.scale[i] if i < K.n else K.known[i]
         lowered = lowered or bound < K.known[i]
         K.scale[i] = min(bound, K.known[i])
     weigh(K)
@@ -209,7 +209,7 @@ def lower_scales(K: DependentRows) -> None:
     measure_accepted(K)
     K.scales_raised = 0
     for i in range(K.n):
-        floor = K.known[i] / FAR_ABOVE
+        floor = K.known[i] / MAX_MAGNITUDE_RATIO
         if floor > K.scale[i]:
             K.scale[i] = floor
             K.scales_raised = 1
@@ -274,7 +274,7 @@ def consistent(K: Balance, t: float, q: Reals, y: Reals) -> int:
     status = solve_rows(K, m, False)
     if K.loaded > 0 or together:  # R follows multipliers: of degree one, so that to solve again is Newton's method
         change = 0.0
-        for _ in range(MAX_LOADS):
+        for _ in range(MAX_LOAD_ITERATIONS):
             if status != 0:
                 break
             change = evaluate_loaded(K, K.impulse)
@@ -285,8 +285,8 @@ def consistent(K: Balance, t: float, q: Reals, y: Reals) -> int:
                 find_shares(K)
             load_accelerations(K)
             status = solve_rows(K, m, False)
-        if status == 0 and change > SETTLED_LOADS:
-            K.failure_size = change / SETTLED_LOADS
+        if status == 0 and change > LOAD_RTOL:
+            K.failure_size = change / LOAD_RTOL
             return NOT_CONVERGED
     if K.n_dropped > 0 and status == 0:
         minimum_norm_multipliers(K, K.impulse)
@@ -312,7 +312,7 @@ def minimum_norm_multipliers(K: Balance, lam: Reals) -> None:
 
     Frictions that hold together share by their limits, which follow their loads: they are found by turns.
     """
-    for turn in range(MAX_LOADS):
+    for turn in range(MAX_LOAD_ITERATIONS):
         change = evaluate_loaded(K, lam)
         if turn == 0:
             find_dependence(K, stepping_rows(K))

@@ -24,13 +24,13 @@ from mbd.kernel.codes import ACCELERATIONS, SCALES
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Motion
 
-__all__ = ["ROUGH", "add_force_floors", "note_extent", "size_of", "still_energy", "still_speed"]
+__all__ = ["FORCE_ULPS", "add_force_floors", "note_extent", "size_of", "still_energy", "still_speed"]
 
-STILL = 1e-12
+REST_RTOL = 1e-12
 """Way in a step over the size of a coordinate below which the coordinate is at rest [-]."""
-LONG = 1000.0
+HORIZON_STEPS = 1000.0
 """Steps in which the least force that counts would move a coordinate by its own size [-]."""
-ROUGH = 4096.0
+FORCE_ULPS = 4096.0
 """Round-off of forces, in units of the last place of their floors: that of many terms, and of elimination [-]."""
 
 
@@ -67,7 +67,7 @@ def size_of(K: Motion, i: int) -> float:
 
 def still_speed(K: Motion, i: int) -> float:
     """Speed of coordinate i at which it is at rest [m/s, rad/s]."""
-    return STILL * size_of(K, i) / K.dt
+    return REST_RTOL * size_of(K, i) / K.dt
 
 
 def still_energy(K: Motion) -> float:
@@ -84,8 +84,8 @@ def add_force_floors(K: Motion, part: float) -> None:
     """Raise K.scale of forces to a part of their floors; K.acc is overwritten by that at the state in the block.
 
     The block is at an iterate, which may be thrown far away: floors are those of the accepted velocities and of the
-    scales in K.known, as `note_scales` leaves them. With a part of `ROUGH` ε over a tolerance, a residual of round-off
-    passes at that tolerance.
+    scales in K.known, as `note_scales` leaves them. With a part of `FORCE_ULPS` ε over a tolerance, a residual of
+    round-off passes at that tolerance.
     """
     call(K, ACCELERATIONS, K.acc)
     note_way(K)
@@ -102,7 +102,7 @@ def add_force_floors(K: Motion, part: float) -> None:
             force = max(force, K.known[i])
         else:
             torque = max(torque, K.known[i])
-    slowly = 1.0 / (LONG * K.dt * LONG * K.dt)
+    slowly = 1.0 / (HORIZON_STEPS * K.dt * HORIZON_STEPS * K.dt)
     for i in range(K.n_v):
         size = size_of(K, i)
         mass = abs(K.acc[i * n + i])

@@ -16,7 +16,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact.nonsmooth_cones import hold_all
 from mbd.kernel.records import Balance, Guards, Kernel, SchemeAbilities, State
-from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONGER, SECOND, SHORTER, WHOLE, may_pair
+from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONG_PART, SECOND, SHORT_PART, STEP_RTOL, may_pair
 from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
 from mbd.kernel.stepping.control import controlled_step
 from mbd.kernel.stepping.resolution import judge_change
@@ -25,11 +25,11 @@ from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["is_shortened", "part_end", "step_end", "tried_step"]
 
-SHORTEST = 0.1
+MIN_RETRY_SHARE = 0.1
 """Part of a step below which a failing step is not shortened any further [-]."""
-SHORTEST_TURN = 1e-3
+MIN_TURNING_SHARE = 1e-3
 """The same of a step that is too long for how friction in a plane turns with a slow γ [-]."""
-SHORTENING = 0.6180339887498949
+RETRY_FACTOR = 0.6180339887498949
 """Golden ratio: what is left of a step whose Newton iteration failed, for the next try [-].
 
 No power of it is a simple fraction, so that tries do not meet a configuration that repeats with the grid again.
@@ -59,7 +59,7 @@ def judged_step(K: Kernel, h: float, t1: float) -> int:
 def step_end(K: State) -> float:
     """Where the next step of the grid ends; the second of a pair has its own size."""
     if K.paired_step == SECOND:
-        return float(K.time + LONGER * K.step)
+        return float(K.time + LONG_PART * K.step)
     return float(K.grid_start + (K.grid_steps + 1) * K.step)
 
 
@@ -94,8 +94,8 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     else:
         status = judged_step(K, h, t1)
     if status == TOO_NEAR and may_pair(K, h):
-        if K.time + (SHORTER + LONGER) * step < K.until - WHOLE * step:
-            h = SHORTER * step
+        if K.time + (SHORT_PART + LONG_PART) * step < K.until - STEP_RTOL * step:
+            h = SHORT_PART * step
             full = h
             K.paired_step = FIRST
             status = judged_step(K, h, K.time + h)
@@ -104,8 +104,8 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     if K.n_cones > 0 and K.strategy == 1 and (is_shortened(K, status) or is_rough(status)) and hold_all(K):
         status = judged_step(K, h, K.time + h)
     K.too_near = 1 if status == TOO_NEAR else 0
-    while h > SHORTEST * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
-        h *= SHORTENING
+    while h > MIN_RETRY_SHARE * full and (is_shortened(K, status) or (status == NOT_FINITE and strays(K, h))):
+        h *= RETRY_FACTOR
         status = judged_step(K, h, K.time + h)
     if K.n_cones > 0 and is_rough(status) and K.strategy == 0:
         status = step_while_turning(K, h)
@@ -126,15 +126,15 @@ def step_while_turning(K: Kernel, h: float) -> int:
 
     What it would do in a whole step of dt says nothing: soon γ is another, or nothing slides.
     """
-    shortest = SHORTEST_TURN * h
+    shortest = MIN_TURNING_SHARE * h
     status = OUTGROWN
     if h > 0.999 * K.step:
-        h *= SHORTENING
+        h *= RETRY_FACTOR
     while is_rough(status) and h > shortest:
         K.step_taken = h
         K.turning_step = h
         status = judged_step(K, h, K.time + h)
-        h *= SHORTENING
+        h *= RETRY_FACTOR
     K.turning_step = 0.0
     return status
 
@@ -146,7 +146,7 @@ def step_past_singularity(K: Kernel, unit: float) -> int:
     """
     h = singular_step_size(K, unit, K.longest_over)
     if h > unit:
-        if K.time + h > K.until - WHOLE * unit:
+        if K.time + h > K.until - STEP_RTOL * unit:
             if K.until >= K.end:
                 return LAST
             h = singular_step_size(K, unit, 1.0)

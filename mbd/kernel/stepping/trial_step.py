@@ -8,7 +8,7 @@ from mbd.kernel.codes import (
     NOT_CONVERGED,
     NOT_FINITE,
 )
-from mbd.kernel.contact.cones import HELD, leads_group, sliding_force, speed_of
+from mbd.kernel.contact.cones import HOLD_DIRECTION, leads_group, sliding_force, speed_of
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
     Balance,
@@ -29,15 +29,15 @@ from mbd.kernel.stepping.restart import (
 
 __all__ = ["try_step", "turns"]
 
-SETTLED = 1e-9
+RATE_RTOL = 1e-9
 """Change of these rates, over the largest, at which they are what leads there [-]."""
-BLURRED = 256.0 * EPS
+SLIP_RTOL = 256.0 * EPS
 """Part of the terms of γ below which it is round-off [-]."""
-MOST_BLUR = 1e-6
+MAX_FORCE_ERROR = 1e-6
 """Part of the forces that a step may miss for it at most [-]."""
-LEAP = 1e-2
+MAX_ROW_RATE = 1e-2
 """Rate of a row at the end of a brief step, over the sum of its terms, above which it is another row [-]."""
-DEPARTED = 1e-8
+MAX_ROW_DRIFT = 1e-8
 """Part of its terms that a row which was left out may be off in a step; less restarts the scheme with other rows."""
 
 
@@ -90,14 +90,14 @@ def blur_of(K: Guards) -> float:
     """
     largest = 0.0
     for f in range(K.n_frictions):
-        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD:
+        if leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HOLD_DIRECTION:
             size = 0.0
             for g in range(f, f + K.group_size[f]):
                 size = max(size, K.scale[K.n + K.n_rows + K.friction_row[g]])
             least = 4.0 * K.hold[f] if K.hold[f] > 0.0 else 0.0
             speed = speed_of(K, f, K.guards0, K.at_slip) + least
-            largest = max(largest, BLURRED * size / (speed + EPS * size))
-    return min(largest, MOST_BLUR)
+            largest = max(largest, SLIP_RTOL * size / (speed + EPS * size))
+    return min(largest, MAX_FORCE_ERROR)
 
 
 def share_multipliers(K: Balance, t1: float) -> int:
@@ -158,7 +158,7 @@ def turns(K: Frictions) -> bool:
     found = False
     if K.n_cones > 0:
         for f in range(K.n_frictions):
-            found = found or (leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HELD)
+            found = found or (leads_group(K, f) and K.slip[f] != 0.0 and K.hold[f] != HOLD_DIRECTION)
     return found
 
 
@@ -169,7 +169,7 @@ def settled(K: Balance) -> bool:
     for i in range(K.n):
         change = max(change, abs(K.jump[i] - K.rate1[i]))
         largest = max(largest, abs(K.jump[i]))
-    return change <= SETTLED * largest
+    return change <= RATE_RTOL * largest
 
 
 def rows_turn_around(K: Motion) -> bool:
@@ -183,7 +183,7 @@ def rows_turn_around(K: Motion) -> bool:
         size = 0.0
         for j in range(K.n):
             size += abs(K.acc[K.acc_B + row * K.n + j] * K.y1[j])
-        found = found or abs(K.acc[K.acc_rate + row]) > LEAP * size + K.rest_speed
+        found = found or abs(K.acc[K.acc_rate + row]) > MAX_ROW_RATE * size + K.rest_speed
     return found
 
 
@@ -191,6 +191,10 @@ def departs(K: DependentRows) -> bool:
     """Whether a row that was left out is far from holding at the candidate, at which K.acc is: another branch."""
     o_h = K.acc_h
     for k in range(K.n_rows):
-        if K.dropped[k] == 1 and K.row_level[k] == 0 and abs(K.acc[o_h + k]) > DEPARTED * max(K.scale[K.n + k], 1e-3):
+        if (
+            K.dropped[k] == 1
+            and K.row_level[k] == 0
+            and abs(K.acc[o_h + k]) > MAX_ROW_DRIFT * max(K.scale[K.n + k], 1e-3)
+        ):
             return True
     return False

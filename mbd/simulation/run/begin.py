@@ -13,7 +13,7 @@ from mbd.assembly.machines import first_anchors, store_first
 from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture
 from mbd.errors import ModelError
-from mbd.kernel.stepping.begin_run import BELOW
+from mbd.kernel.stepping.begin_run import MAX_START_DEPTH
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of_end
 from mbd.simulation.run.parameters import residuals_now, violations_now
@@ -119,7 +119,7 @@ def _touch(run: RunData, start: State, guards: Vector) -> list[str]:
         held = [row for row in run.manager.contacts[c].rows if run.mechanism.equations.rows[row].friction < 0]
         still = all(abs(rates[row]) <= 1e-9 for row in held)
         v.touched[c] = int(ready and v.kind[c] == 0 and close and slow and still)
-        if ready and v.closed[c] == 0 and guards[c] < -BELOW:
+        if ready and v.closed[c] == 0 and guards[c] < -MAX_START_DEPTH:
             contact = run.manager.contacts[c]
             inside.append(
                 f"{contact.name!r} starts {-guards[c]:.6g} {contact.unit} inside its surface; assemble the start "

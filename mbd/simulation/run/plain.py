@@ -18,8 +18,8 @@ from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.memory import start_step
-from mbd.kernel.stepping.mass_ratios import LOSS
-from mbd.kernel.stepping.restart import MAX_LOADS, fill_block, refresh_scales, take_consistent
+from mbd.kernel.stepping.mass_ratios import CORRECTED_PIVOT_RTOL
+from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, fill_block, refresh_scales, take_consistent
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.run.user_calls import call_user
 from mbd.state import Mode, State
@@ -175,7 +175,9 @@ class MechanismSystem(System):
         """Multipliers of the rows `given_rows` into the block; (n, m) what those of `rows` bring along through them."""
         lam, kept, dependent = self.mechanism.layout.lam, list(rows), list(given_rows)
         places = [lam + k for k in dependent]
-        for _ in range(MAX_LOADS):  # frictions that hold together share by their limits, which follow the loads
+        for _ in range(
+            MAX_LOAD_ITERATIONS
+        ):  # frictions that hold together share by their limits, which follow the loads
             terms = self.mechanism.terms_of(block, self.parameters)
             part = shares(self.mechanism.equations.rows, terms, kept, dependent)
             before, block[places] = block[places], part @ block[[lam + k for k in kept]]
@@ -188,7 +190,9 @@ class MechanismSystem(System):
         rows, penalties = self.active(mode)
         n, m, picked, given_rows = self.mechanism.layout.n, len(rows), list(rows), list(self._given_rows(mode))
         lam = np.zeros(self.mechanism.layout.n_rows)
-        for _ in range(MAX_LOADS):  # friction follows multipliers: of degree one, so that this is Newton's method
+        for _ in range(
+            MAX_LOAD_ITERATIONS
+        ):  # friction follows multipliers: of degree one, so that this is Newton's method
             terms = self.mechanism.acceleration_terms(
                 t, q, y, self.parameters, self.anchors, penalties, slips=self.slips, lam=lam
             )
@@ -204,7 +208,7 @@ class MechanismSystem(System):
                 lam[given_rows] = part @ solved[n:]
             if not self.slip.any() or change <= 1e-13 * np.max(np.abs(lam)):
                 break
-        if not self.slip.any() and not any(self.dropped) and _least_pivot(terms.M) < LOSS:
+        if not self.slip.any() and not any(self.dropped) and _least_pivot(terms.M) < CORRECTED_PIVOT_RTOL:
             block = self._block(Point(t, q, np.zeros(self.n_v), y, solved[:n], solved[n:]), rows, penalties)
             out = np.zeros(n + (2 if self.stabilized else 1) * m)
             self._code(rows, penalties, ()).residual(block, self.parameters, out)

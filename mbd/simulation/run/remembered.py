@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbd.kernel import codes
-from mbd.kernel.contact.cones import HELD, ONSET
+from mbd.kernel.contact.cones import HOLD_AT_ONSET, HOLD_DIRECTION
 from mbd.kernel.records import TABLE, Kernel
 from mbd.simulation.run.data import RunData
 from mbd.state import Memory, Mode, are_names
@@ -124,7 +124,7 @@ def _judged(kept: Kernel, memory: Memory, run: RunData) -> str:
     for name, (least, most) in FLAGS.items():
         if not _within(getattr(kept, name), least, most):
             return f"{name!r} is none of {least} … {most}"
-    if not np.all((kept.was == codes.UNKNOWN) | ((kept.was >= -1) & (kept.was <= 2))):
+    if not np.all((kept.was == codes.NOT_KNOWN_YET) | ((kept.was >= -1) & (kept.was <= 2))):
         return "'was' is no state of a friction"
     for name in ("slip", "side", "lean"):
         signs = getattr(kept, name)
@@ -134,7 +134,7 @@ def _judged(kept: Kernel, memory: Memory, run: RunData) -> str:
                 return f"{name!r} is no direction"
         if not np.all(np.isin(signs, (-1.0, 0.0, 1.0))):
             return f"{name!r} is no sign"
-    if not np.all(np.isin(kept.hold, (0.0, ONSET, HELD))):
+    if not np.all(np.isin(kept.hold, (0.0, HOLD_AT_ONSET, HOLD_DIRECTION))):
         return "'hold' is nothing that frictions do"
     for name, (least, most) in _of_state(run.kernel).items():
         value = getattr(kept, name)

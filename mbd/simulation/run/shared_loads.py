@@ -9,7 +9,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import AccelerationTerms
 from mbd.equations.equations import Row
-from mbd.kernel.algebra.redundancy import LEAST_SHARE
+from mbd.kernel.algebra.redundancy import MIN_LIMIT_SHARE
 
 __all__ = ["shares"]
 
@@ -34,4 +34,4 @@ def _weight(row: Row, limits: Vector) -> float:
     largest = float(np.max(limits, initial=0.0))
     if row.friction < 0 or largest == 0.0:
         return 1.0
-    return float(max(limits[row.friction] / largest, LEAST_SHARE))
+    return float(max(limits[row.friction] / largest, MIN_LIMIT_SHARE))

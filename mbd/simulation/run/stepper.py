@@ -200,7 +200,7 @@ class Stepper:
         v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         v.step = v.dt
         v.sinking[:] = np.inf
-        v.was[:] = codes.UNKNOWN
+        v.was[:] = codes.NOT_KNOWN_YET
         fill_coefficients(v, self.own)
         v.unit = unit_blocks(self.mechanism).copy()
         for number, (_, turning) in enumerate(self.mechanism.turning, 1):

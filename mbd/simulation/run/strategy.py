@@ -6,7 +6,7 @@ import numpy as np
 
 from mbd.kernel import codes
 from mbd.kernel.contact.active_set import ActiveSetManager
-from mbd.kernel.events.crowding import SEVERAL, crowd
+from mbd.kernel.events.crowding import MIN_CONTACTS, crowd
 from mbd.simulation.run.data import RunData
 
 __all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated"]
@@ -44,7 +44,7 @@ def may_go_on_unlocated(run: RunData, status: int) -> bool:
     if run.limit is not None or not v.auto or v.fallback or status <= codes.NOT_FINITE:
         return False
     crowded = crowd(v) > MAX_EXCESS_IMPACTS
-    several = np.count_nonzero(v.closed[: v.n_contacts]) >= SEVERAL  # a single one has no other to be told from
+    several = np.count_nonzero(v.closed[: v.n_contacts]) >= MIN_CONTACTS  # a single one has no other to be told from
     return bool(crowded or (status in ENDLESS and several))
 
 
