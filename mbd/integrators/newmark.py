@@ -48,8 +48,9 @@ class Newmark(NewmarkFamily):
         good = is_number(beta) and is_number(gamma)
         if not good or not 0.5 <= gamma <= MAX_COEFFICIENT or not 0.0 < beta <= MAX_COEFFICIENT:
             raise CapabilityError(
-                f"Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, "
-                f"neither above {MAX_COEFFICIENT:g}, not beta={shown(beta)}, gamma={shown(gamma)}; Newmark(0.25, 0.5) is the trapezoidal rule"
+                "Newmark needs gamma ≥ 1/2 (below it every step is unstable) and beta > 0, "
+                f"neither above {MAX_COEFFICIENT:g}, not beta={shown(beta)}, gamma={shown(gamma)}; "
+                "Newmark(0.25, 0.5) is the trapezoidal rule"
             )
         super().__init__(formulation, start, tolerance, beta=float(beta), gamma=float(gamma))
 

@@ -157,6 +157,7 @@ def constraints(found: Faults, bodies: Bodies) -> None:
             off = np.sum(v * (R @ np.asarray(word.normal)), axis=1)
             found.small("row on velocities holds", word.name, off, HELD * (size + np.linalg.norm(v, axis=1)))
         elif isinstance(word, mbd.Nonholonomic):
+            assert callable(word.row)
             values = [named(given, bodies) for _, given in word.arguments]
             bias = value_of(word.bias, (("t", "t"),), bodies, word.name, "bias")
             scale = sum(np.abs(value) for value in values)

@@ -188,6 +188,7 @@ def loss_force(loss: Any, rate: Array, owner: str, parameters: Any) -> Any:
     if isinstance(loss, mbd.Tabulated):
         return _tabulated(loss, rate)
     if isinstance(loss, mbd.Dissipation):
+        assert callable(loss.function)
         return np.imag(loss.function(rate + 1j * TINY)) / TINY
     raise NotImplementedError(f"losses of kind {type(loss).__name__}")
 

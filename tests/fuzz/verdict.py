@@ -309,9 +309,9 @@ def _schemes(made: Scene, run: mbd.Trajectory) -> list[str]:
 
 def _left_open(made: Scene, run: mbd.Trajectory) -> float:
     """What accelerations change within a step of dt, or the error that a note tells, at the end of a run [m, rad]."""
-    open_ = made.options["dt"] ** 2 * float(np.max(np.ptp(run.record.a, axis=0), initial=0.0))
+    open_ = float(made.options["dt"]) ** 2 * float(np.max(np.ptp(run.record.a, axis=0), initial=0.0))
     if any("estimated errors of velocities add up" in str(note) for note in run.stats["notes"]):
-        open_ = max(open_, float(run.stats["local_errors"]) * made.options["until"])
+        open_ = max(open_, float(run.stats["local_errors"] * made.options["until"]))
     return open_
 
 

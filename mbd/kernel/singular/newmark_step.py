@@ -1,7 +1,7 @@
 """The Newmark family next to a singular configuration: a few steps of the stabilized form taken as index 3.
 
-Within `MAX_STEPS_AWAY` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are projected
-onto the rows and the scheme starts again, but for the average that it carries. `mbd.kernel.singular` says why.
+Within `MAX_STEPS_AWAY` steps of it h alone is held, with ∂h/∂x = B = H − (c_K/c_C) ∂ḣ/∂x; then the velocities are
+projected onto the rows and the scheme starts again, but for the average that it carries. See `mbd.kernel.singular`.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from mbd.kernel.codes import (
     TOO_SMALL,
 )
 from mbd.kernel.hooks import scheme_error
-from mbd.kernel.records import Balance, Kernel, SchemeAbilities, SingularSteps, State
+from mbd.kernel.records import Balance, Kernel, SchemeAbilities, SingularSteps, State, Steps
 from mbd.kernel.singular.step_size import is_too_noisy, noise_share, singular_step_size
 from mbd.kernel.stepping.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.stepping.trial_step import try_step
@@ -84,7 +84,7 @@ def error_ratio(K: SingularSteps, h: float) -> float:
     return ratio if ratio < 1e300 else 1e300
 
 
-def largest_state(K: SingularSteps, i: int) -> float:
+def largest_state(K: Steps, i: int) -> float:
     """The largest size of the first-order state y_i in the run, this candidate among it.
 
     What an explicit scheme made of it in a step that is not taken counts if its estimate is right to `MAX_STATE_ERROR`:
