@@ -99,7 +99,8 @@ class Run(RunData):
         if self.stop and not problem and not message.startswith("ended"):
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
             if isinstance(self.settings["until"], str) and self.limit is None:
-                problem = f"{message}, in {MAX_WAIT} steps; if it may not happen, give the latest time as well: "
+                asked = f"in {MAX_WAIT} steps" if self.settings.get("dt") else "up to which a run with tol= waits"
+                problem = f"{message}, {asked}; if it may not happen, give the latest time as well: "
                 problem += f"until=({self.stop!r}, {self.end / 100.0:g})"
         if not problem:
             problem = fed or self._reversed() or overturned(self) or self._in_words(self._guarded(self._last_show)[0])

@@ -343,5 +343,7 @@ def test_a_run_that_waits_for_an_event_in_vain_has_failed():
         mbd.SimulationError, match=r"^'high' did not happen before t = 1000 s, in 1000000 steps; .*until="
     ):
         mbd.simulate(model, start, store=10_000, **settings)
+    waited = mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-2, until="high", on_failure="return")
+    assert "before t = 1000 s, up to which a run with tol= waits; " in waited.message
     found = mbd.batch(model, [start, mbd.assemble(model, {"slide.displacement": 2.0})], **settings)
     assert list(found.outcome) == ["no event", "event"] and list(found.success) == [False, True]

@@ -178,7 +178,7 @@ def conclude_step(K: Kernel, h: float, t1: float) -> int:
 def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, iteration: int) -> float:
     """A residual that falls no more, over its tolerance with sizes of forces as they are here; 1 if it is round-off.
 
-    −status where the iteration is to end.
+    −status where the iteration is to end, and K.failure_size is what is left over what was asked for.
     """
     note_scales(K)
     raise_scales(K, True)
@@ -186,19 +186,24 @@ def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, toleranc
         restore_scales(K)
         return -float(NOT_CONVERGED)
     error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
+    left = 0.0
     if error > 1.0:
         if residual_size(K, o_r, m, 0.0, 0.0, 256.0 * EPS, K.stabilized) <= roughly(K):
-            if residual_size(K, o_r, 0, c_C, c_K, K.tolerance, K.stabilized) > 1.0:  # rows at round-off hold
+            left = residual_size(K, o_r, 0, c_C, c_K, K.tolerance, K.stabilized)  # rows at round-off hold
+            if left > 1.0:
                 error = -float(TOO_TIGHT)
             else:
                 K.n_stagnations += 1
                 error = 1.0
         elif iteration >= 6 and K.exact == 0:
             if residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
+                left = residual_size(K, o_r, m, c_C, c_K, K.tolerance, K.stabilized)
                 error = -float(STAGNATED)
         if (error > 1.0 or error == -float(STAGNATED)) and is_below_floors(K, o_r, m, K.stabilized):
             K.n_stagnations += 1
             error = 1.0
+        elif error < 0.0:
+            K.failure_size = left
     if 0.0 <= error <= 1.0:
         retain_scales(K)
     else:

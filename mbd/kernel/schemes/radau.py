@@ -288,7 +288,7 @@ def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
 def judge_stagnation(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck: bool) -> int:
     """What residuals that fall no more mean: 0 round-off, NOT_CONVERGED go on, else the end of the iteration.
 
-    K.failure_size < 0 where multipliers run away.
+    K.failure_size < 0 where multipliers run away, and what is left over what was asked for at such an end.
     """
     note_scales(K)
     status = judge_raised(K, h, t1, m, tolerance, stuck)
@@ -310,13 +310,17 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
             return NOT_CONVERGED
     rough = evaluate_stages(K, h, t1, m, 256.0 * EPS, 0.0, 0.0, False)
     if rough <= roughly(K):
-        if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:
+        left = evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False)
+        if left > 1.0:
+            K.failure_size = left
             return TOO_TIGHT
         K.n_stagnations += 1
         return 0
     status = NOT_CONVERGED
-    if stuck and evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) > 1.0:  # else they do for what was asked
-        if evaluate_stages(K, h, t1, m, 1e5 * EPS, 0.0, 0.0, False) <= 1e3:
+    left = 0.0
+    if stuck:
+        left = evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False)  # at most 1: they do for what was asked
+        if left > 1.0 and evaluate_stages(K, h, t1, m, 1e5 * EPS, 0.0, 0.0, False) <= 1e3:
             status = STAGNATED
     if status == NOT_CONVERGED and evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) <= 1.0:
         return 0
@@ -326,6 +330,8 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
             if evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False) <= 1.0:
                 K.n_stagnations += 1
                 return 0
+    if status == STAGNATED:
+        K.failure_size = left
     return status
 
 

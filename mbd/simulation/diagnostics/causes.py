@@ -94,6 +94,17 @@ class Words:
         return remainder(self.stepper)
 
     @property
+    def stagnated(self) -> str:
+        """What residual a step has come down to, and what round-off allows where that is more than was asked for."""
+        left, asked = self.left, float(self.v.tolerance)
+        size = self.residual * asked if self.residual > 1.0 else left.residual  # of all stages and rows
+        if left.attainable < asked:
+            what = f"stagnated: residual {size:.3g} of forces or rows, where {asked:.3g} was asked for"
+        else:
+            what = f"stagnated at round-off: residual {size:.3g}, attainable {left.attainable:.3g} of the forces"
+        return what + self.closed + self.worst
+
+    @property
     def passing(self) -> str:
         """What passes singular configurations where a scheme did not."""
         return (
@@ -268,13 +279,12 @@ class Words:
         )
 
 
-_STAGNATED = ": residual {x.left.residual:.3g}, attainable {x.left.attainable:.3g} of the forces{x.closed}{x.worst}"
 CAUSES = (
     Cause((codes.NOT_FINITE,), "{x.not_finite}{x.closed}", "nothing after the last accepted step is kept"),
     # Newton iterations that do not come to their end
-    Cause((codes.STAGNATED, codes.TOO_TIGHT), "stagnated" + _STAGNATED + "{x.rushing}", when=lambda x: x.rushing),
+    Cause((codes.STAGNATED, codes.TOO_TIGHT), "{x.stagnated}{x.rushing}", when=lambda x: x.rushing),
     Cause(
-        (codes.STAGNATED, codes.TOO_TIGHT), "stagnated at round-off" + _STAGNATED,
+        (codes.STAGNATED, codes.TOO_TIGHT), "{x.stagnated}",
         "use a larger tolerance= of the integrator or a larger dt",
     ),
     Cause(
