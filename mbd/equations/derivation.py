@@ -257,6 +257,15 @@ class TreeGeometry:
         paths = [len(body.path) for body in self.scope.bodies.values() if body.parent is not None]
         return sum(paths) / max(1, len(paths))
 
+    @cached_property
+    def largest_tree(self) -> int:
+        """Coordinates of the largest tree, as bodies that fixed ones alone connect are apart."""
+        trees: dict[int, set[int]] = {}
+        for body in self.scope.bodies.values():
+            if body.path:
+                trees.setdefault(body.path[0], set()).update(body.path)
+        return max(map(len, trees.values()), default=0)
+
     def balance_with(
         self,
         values: Sequence[Node],

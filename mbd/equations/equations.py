@@ -356,10 +356,14 @@ class Geometry(Protocol):
     """What a derivation knows of its own expressions: shorter ways to derivatives that the tape could take alone.
 
     depth : how many coordinates move a body, on average
+    largest_tree : coordinates of the largest tree, as bodies that fixed ones alone connect are apart
     """
 
     @property
     def depth(self) -> float: ...
+
+    @property
+    def largest_tree(self) -> int: ...
 
     def balance_with(
         self,

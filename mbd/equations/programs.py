@@ -80,7 +80,7 @@ class Correction:
 MAX_UNKNOWNS = 20
 """Unknowns above which a system is not eliminated on the tape."""
 MIN_COORDINATES = 24
-"""Coordinates from which on a tree is eliminated from its tips."""
+"""Coordinates of one tree from which on it is eliminated from its tips: matrices of small ones have few entries."""
 
 
 def correction(
@@ -126,10 +126,14 @@ def correction(
 
 def _from_the_tips(equations: Equations, penalties: Sequence[int], sliding: Sequence[int]) -> Correction | None:
     """The same of a large tree without rows, eliminated from its tips; None where its tangent is no sum over joints."""
+    known = equations.geometry
+    if known is None or known.largest_tree < MIN_COORDINATES:
+        return None
+    found = known.eliminated(*_forces(equations, (), [(c, equations.tape.one) for c in penalties], sliding))
+    if found is None:
+        return None
     r = balance_with(equations, (), penalties, sliding)
-    forces = _forces(equations, (), [(c, equations.tape.one) for c in penalties], sliding)
-    found = None if equations.geometry is None else equations.geometry.eliminated(*forces)
-    return None if found is None else _kept(found, r, found.solve([-force for force in r]), len(r))
+    return _kept(found, r, found.solve([-force for force in r]), len(r))
 
 
 def _kept(found: Eliminated, tail: list[Node], solved: Sequence[Node], size: int) -> Correction:
