@@ -271,11 +271,14 @@ def malformed(state: State) -> list[str]:
 
 def _is_vector(value: Any) -> bool:
     """Whether a value is an array, list or tuple (n,) of real numbers."""
-    if not isinstance(value, np.ndarray | list | tuple):
-        return False
-    try:
-        array = np.asarray(value)
-    except ValueError:  # lists of different lengths
+    if isinstance(value, np.ndarray):
+        array = value
+    elif isinstance(value, list | tuple):
+        try:
+            array = np.asarray(value)
+        except ValueError:  # lists of different lengths
+            return False
+    else:
         return False
     return array.ndim == 1 and (array.dtype.kind in "fiu" or array.size == 0)
 

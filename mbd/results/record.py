@@ -195,6 +195,12 @@ class Record:
         for name in ("time", "q", "v", "z", "a", "s", "lam", "closed", "phase", "parameters"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
+    def concluded(self, **verdict: Any) -> Record:
+        """The same rows, which have been judged already, with other words: success, message, stats."""
+        found = object.__new__(type(self))
+        vars(found).update(vars(self), **verdict)
+        return found
+
     def rows(self, anchors: Matrix) -> Rows:
         """The stored states, with the values that closed contacts hold."""
         return Rows(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
+from mbd.kernel.records import TABLE
 from mbd.results.trajectory import Trajectory
 from mbd.simulation.diagnostics.notes import notes_of
 from mbd.simulation.run.data import RunData
@@ -14,12 +14,15 @@ from mbd.state import State
 
 __all__ = ["trajectory_of"]
 
-COUNTS = (
-    "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
-    "locations", "stagnations", "singular_steps", "shortened", "energetic_impacts",
-    "endless", "pivoted",
-)  # fmt: skip
-"""Counts of the kernel that results tell."""
+COUNTS = {
+    name: TABLE.places[f"n_{name}"][1]
+    for name in (
+        "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
+        "locations", "stagnations", "singular_steps", "shortened", "energetic_impacts",
+        "endless", "pivoted",
+    )
+}  # fmt: skip
+"""Counts of the kernel that results tell, and their places."""
 
 
 def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Trajectory:
@@ -27,14 +30,15 @@ def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Tra
     record = ended_record(run)
     notes, doubts = notes_of(run, record)
     text = problem or "; but ".join([message, *doubts])
-    ended = replace(
-        record, success=not problem, message=text, failure=run.failure, final=final, stats=_statistics(run, notes)
+    ended = record.concluded(
+        success=not problem, message=text, failure=run.failure, final=final, stats=_statistics(run, notes)
     )
     return Trajectory(ended)
 
 
 def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
-    numbers: dict[str, Any] = {name: int(getattr(run.kernel, f"n_{name}")) for name in COUNTS}
+    counts = run.kernel.counts.tolist()
+    numbers: dict[str, Any] = {name: counts[place] for name, place in COUNTS.items()}
     if run.kernel.adaptive:
         numbers["rejected"] = int(run.kernel.n_rejected)
     if run.kernel.adaptive or (run.kernel.explicit and run.kernel.estimates):

@@ -169,12 +169,15 @@ class EnergyWatch(EnergyFindings):
         """Evaluate T and V at some rows that were not looked at yet."""
         last = run.stored - 1
         first, early = min(self._upto, last), EARLY if self._judgements == 0 else ()
-        spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
-        chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
+        if last - first < SPREAD:  # all of them
+            chosen = np.arange(first, last + 1, dtype=np.intp)
+        else:
+            spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
+            chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
         kinetic, potential = self._energies(run, chosen)
         places = run.table[chosen, 1 : 1 + run.kernel.n_q]
         way = _way(places, run.table[0, 1 : 1 + run.kernel.n_q])
-        self._seen = np.concatenate([self._seen, np.column_stack([kinetic, potential, way])])
+        self._seen = np.concatenate([self._seen, np.array([kinetic, potential, way]).T])
         self._upto, self._due, self._judgements = run.stored, 4 * max(self._due, run.stored // 4), self._judgements + 1
 
     def _lifted(self, run: RunData) -> float:
@@ -230,11 +233,11 @@ class EnergyWatch(EnergyFindings):
     def _is_suspicious(self, run: RunData) -> bool:
         """Whether only the ledger can tell that the energies seen are right."""
         kinetic, potential, way = self._seen.T
-        if np.max(way) <= MIN_MOTION:
+        if way.max() <= MIN_MOTION:
             return False
         total = kinetic + potential
         fallen = np.maximum.accumulate(potential[0] - potential)
-        noise = EQUAL_RTOL * np.max(np.abs(self._seen[:, :2]))
+        noise = EQUAL_RTOL * np.abs(self._seen[:, :2]).max()
         owned = kinetic[0] + fallen
         rise = total - total[0]
         risen = ~(rise <= np.maximum(_telling_gain(run) * owned + noise, 2.0 * self._cleared))  # NaN is strange too
@@ -259,7 +262,7 @@ def _telling_gain(run: RunData) -> float:
 
 def _way(q: Vector, start: Vector) -> Vector:
     """The largest way of a coordinate from the start, at each row (R,) [m, rad]."""
-    return np.asarray(np.max(np.abs(q - start), axis=1, initial=0.0))
+    return np.asarray(np.abs(q - start).max(axis=1, initial=0.0))
 
 
 def _swing(values: Vector) -> Vector:

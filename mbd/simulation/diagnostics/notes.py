@@ -103,12 +103,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     if np.max(np.abs(run.start.q), initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
         notes = degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))) + notes
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
-    loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
-    slid = loaded and any(code.given_rows for code in run.stepper.modes)
-    moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MIN_MOTION for part in blocks(record.q))
-    readers = readers_of(equations, run.stepper.dependent)
-    dependent = redundancy(equations.rows, run.stepper.dependent, slid, moved, _left_singular(run), readers)
-    notes += [dependent] if dependent else singular_start(run)
+    notes += [_redundancy(run, record)] if run.stepper.dependent else singular_start(run)
     notes += [DAMAGED.format(run.damage)] if run.damage else []
     if run.start.memory is not None and not run.carried and run.boundaries.controllers:
         notes.append(RESTARTED)
@@ -149,6 +144,15 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
         doubts += blind
     slack, short = _pushing(run, columns)
     return notes + slack + short, doubts + short
+
+
+def _redundancy(run: RunData, record: Record) -> str:
+    """The note on rows that left the solve."""
+    equations, dependent = run.mechanism.equations, run.stepper.dependent
+    loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
+    slid = loaded and any(code.given_rows for code in run.stepper.modes)
+    moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MIN_MOTION for part in blocks(record.q))
+    return redundancy(equations.rows, dependent, slid, moved, _left_singular(run), readers_of(equations, dependent))
 
 
 def _doubts(run: RunData) -> list[str]:

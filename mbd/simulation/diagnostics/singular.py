@@ -171,7 +171,7 @@ def _smallest(run: RunData, ahead: float) -> tuple[float, int]:
 
 def _scaled(terms: AccelerationTerms, rows: Sequence[int]) -> Matrix:
     """Rows of B on columns scaled by √M_ii."""
-    mass = np.abs(np.diag(terms.M))
+    mass = np.abs(terms.M.diagonal())
     return np.asarray(terms.B[list(rows)] / np.sqrt(np.where(mass > 0.0, mass, 1.0)))
 
 

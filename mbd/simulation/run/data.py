@@ -247,8 +247,8 @@ class RunData:
         """The accepted state."""
         self.count_turns()
         v = self.kernel
-        names = np.array(self.manager.names)
-        armed = frozenset(str(name) for name in names[v.armed[: len(names)] == 1])
+        names = self.manager.names
+        armed = frozenset(name for name, flag in zip(names, v.armed.tolist(), strict=False) if flag == 1)
         y = v.y[: v.n].copy()
         n_v = v.n_v
         return State(

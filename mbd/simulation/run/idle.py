@@ -53,7 +53,7 @@ def _key(
     """What the arrays of a stepper and its numbers depend on, besides the mechanism; None where that cannot be told."""
     if own_scheme(integrator) is NO_SCHEME:
         return None
-    own = tuple((name, value) for name, value in sorted(options.items()) if name != "end")
+    own = tuple(item for item in options.items() if item[0] != "end")
     key = (kind, integrator, *sorted(integrator.numbers().items()), manager.trivial, dt, *own)
     try:
         hash(key)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,8 +35,9 @@ FLAGS = {
 
 
 def sealed(memory: Memory) -> Memory:
-    """The memory with its seal."""
-    return replace(memory, seal=_seal(memory))
+    """A memory that was just made, from now on with its seal."""
+    vars(memory)["seal"] = _seal(memory)
+    return memory
 
 
 def _seal(memory: Memory) -> str:

@@ -7,7 +7,6 @@ steps give the same bits, the state before any step of the call is reached again
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from mbd.errors import SimulationError
 from mbd.kernel import codes
@@ -40,7 +39,9 @@ def save(run: RunData, pending: Sequence[EventRecord] = ()) -> Savepoint:
 
 def called(run: RunData, until: float, end: float) -> None:
     """Note the call that is made from the last savepoint."""
-    run.history = [*run.history[:-1], replace(run.history[-1], call=(until, end))]
+    point = object.__new__(Savepoint)
+    vars(point).update(vars(run.history[-1]), call=(until, end))
+    run.history = [*run.history[:-1], point]
 
 
 def restore(run: RunData, point: Savepoint) -> None:

@@ -33,7 +33,7 @@ def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -
 
 def rows_of(run: RunData, table: Matrix, source: NDArray[np.intp]) -> Rows:
     """The same as states with the anchors of now, `source` being their numbers."""
-    anchors = np.tile(run.kernel.anchors[: run.kernel.n_anchors], (len(table), 1))
+    anchors = run.kernel.anchors[: run.kernel.n_anchors].reshape(1, -1).repeat(len(table), axis=0)
     return Rows(**_parts(run, table), anchors=anchors, source=source)
 
 
