@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.sensitivity.derivative import final_state_derivative
+from tests.sensitivity.differences import differences, off
 from tests.simulation.test_dry_walkers import falling_walker
 from tests.simulation.test_pushed_soles import two_pushed_feet
 
@@ -105,6 +107,41 @@ def test_an_impulse_without_collision_stops_a_slide_that_no_force_lets_go_on(mu,
     assert np.abs(stopped.impulse) == pytest.approx([abs(push), abs(pull)], rel=1e-9)
     assert stopped.energy_loss == pytest.approx(0.5 * abs(pull), rel=1e-9)
     assert np.abs(run["foot.gap"]).max() < 1e-9 and np.abs(run.energy.numerical).max() < 1e-6
+
+
+def slid_onto_rough_ground(feet):
+    """A rod, or a block on two feet, whose friction grows where it has slid for 2 cm: no force is consistent then."""
+    model = mbd.Model("slide", gravity=(0.0, -G, 0.0))
+    body = mbd.RigidBody("body", mass=MASS, inertia=INERTIA if feet == 1 else 0.15)
+    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    high, sense = (HALF * C, -1.0) if feet == 1 else (0.65, 1.0)
+    names = [f"foot{k}" for k in range(feet)]
+    for k, name in enumerate(names):
+        place = body.point(-HALF * S, -high) if feet == 1 else body.point(0.2 * (2 * k - 1), -high)
+        model.constrain(mbd.Unilateral(name, mbd.touchdown(place), friction=0.1))
+    far = mbd.measure(lambda x: sense * x - 0.02, "place.x")
+    step = mbd.Transition("smooth", "rough", when=far, direction=1)
+    rough = {f"{name}.mu": {"rough": 1.45} for name in names}
+    model.apply(mbd.Mode("floor", ("smooth", "rough"), transitions=[step], sets=rough))
+    return model, mbd.assemble(model, {"place.y": high}, {"place.x": sense}, closed=names)
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05, tolerance=1e-12), mbd.RungeKutta853()], ids=str)
+@pytest.mark.parametrize("feet", [1, 2])
+def test_derivatives_follow_an_impulse_without_collision(feet, scheme):
+    model, start = slid_onto_rough_ground(feet)
+    settings, names = {"dt": 1e-3, "until": 0.05}, ["place.x", "place.x.rate", "gravity.y", "body.mass"]
+    run = mbd.simulate(model, start, scheme, **settings)
+    assert [event.kind for event in run.events] == ["event", "stuck", *["opened"] * (feet - 1)]
+    assert run.events[1].impulse.all()
+    wanted, _ = differences(model, start, scheme, names, 1e-5, **settings)
+    assert off(np.vstack(final_state_derivative(run, names)), wanted).max() < 1e-7
+
+
+def test_derivatives_by_a_start_at_an_impulse_without_collision_are_refused():
+    model, start = thrown_rod(0.8)
+    with pytest.raises(mbd.errors.OneSidedError, match="'foot' happens as the run starts.*velocities of the first row"):
+        mbd.sensitivities(model, start, dt=1e-3, until=0.02, wrt=["place.x.rate"])
 
 
 def test_a_slide_into_the_paradox_is_stopped_there_and_the_ledger_knows():
