@@ -98,9 +98,9 @@ def tangent_run(
     """
     _require_known_steps(rows)
     if 0 in rows.events:
-        first = rows.events[0][0]
-        known = f", with closed={first.name!r}" if first.kind == "closed" else ", with the velocities of the first row"
-        raise sided(f"{first.name!r} happens as the run starts", f"start where it has happened{known}")
+        event = rows.events[0][0]
+        there = f", with closed={event.name!r}" if event.kind == "closed" else ", with the velocities of the first row"
+        raise sided(f"{event.name!r} happens as the run starts", f"start where it has happened{there}")
     charted, layout, count = Charted(programs), rows.mechanism.layout, len(start.t)
     runs, states = list[tuple[TangentRun, int]](), list[dict[str, tuple[Any, Matrix]]]()
     for first in range(0, count, DIRECTIONS):
