@@ -12,9 +12,9 @@ GROUPS = {
     "Joints and losses": "Revolute Prismatic Translation Planar Cylindrical Universal Screw Spherical Free Weld "
     "Viscous Quadratic Coulomb Stribeck Dahl LuGre AffineFriction PinFriction Tabulated Valves CompressibleDamper "
     "Dissipation",
-    "Constraints and measures": "Bilateral Unilateral Penalty PenaltyParameters penalty_parameters KnifeEdge Rolling "
-    "Nonholonomic MaxwellStop HystereticStop Event Impulse Mode Transition SampledLaw Controller When touchdown "
-    "rolling_touchdown profile_touchdown disk_touchdown sphere_touchdown Plane Ball height flexion "
+    "Constraints and measures": "Bilateral Unilateral Penalty Bristles PenaltyParameters penalty_parameters KnifeEdge "
+    "Rolling Nonholonomic MaxwellStop HystereticStop Event Impulse Mode Transition SampledLaw Controller When "
+    "touchdown rolling_touchdown profile_touchdown disk_touchdown sphere_touchdown Plane Ball height flexion "
     "extension cone twist distance separation measure",
     "Forces": "Spring SpringLeg Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Rotor Muscle ViaPoint "
     "PolynomialPath WrappingSphere WrappingCylinder Applied Potential Samples mass_matrix bias_forces",
