@@ -131,9 +131,9 @@ def page(found: list[Growth]) -> str:
         "![Time of a step over the number of bodies](pictures/growth.png)",
         "",
         "`python -m benchmarks growth` writes this page. Steps of trees go from body to body and grow linearly:",
-        "explicit ones, and implicit ones from 24 coordinates on where no row and no force on a body acts; elsewhere",
-        "a matrix is factored. Contacts that share no body are solved separately, and large sparse matrices are",
-        "eliminated in a fixed order.",
+        "explicit ones, and implicit ones from trees of 24 coordinates on where no row and no force on a body acts;",
+        "elsewhere a matrix is factored. Contacts that share no body are solved separately, and large sparse matrices",
+        "are eliminated in a fixed order.",
         "",
     ]
     for name in SCENES:

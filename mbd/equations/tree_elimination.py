@@ -37,13 +37,14 @@ Inertia = Callable[[Moving], Sequence[Wrench]]
 class Branch:
     """A joint eliminated, with all beyond it.
 
-    parent : place among the branches, −1 of the ground; first : number of its first rate
+    parent : place among the branches, −1 of the ground; first : number of its first rate; width : parts of its load
     along, motions : T and τ; loads : ρ; passed : X (nothing passes to the ground)
     upper, beside : U and S, eliminated; inverse : of its pivots; lower : L of S; given : Z by pivots
     """
 
     parent: int
     first: int
+    width: int
     along: Matrix
     motions: Matrix
     loads: Matrix
@@ -78,7 +79,7 @@ class TreeFactors:
     def solve(self, right: Sequence[Node]) -> list[Node]:
         """y from b."""
         b, tape = list(right), self.sound.tape
-        sums = [[tape.zero] * len(branch.loads[0]) for branch in self.branches]
+        sums = [[tape.zero] * branch.width for branch in self.branches]
         for branch, load in zip(reversed(self.branches), reversed(sums), strict=True):
             size = len(branch.inverse)
             for k in range(size):
@@ -117,8 +118,9 @@ class TreeFactors:
 
         branches = tuple(
             Branch(
-                each.parent, each.first, lines(each.along), lines(each.motions), lines(each.loads), lines(each.passed),
-                lines(each.upper), lines(each.beside), lines([each.inverse])[0], lines(each.lower), lines(each.given),
+                each.parent, each.first, each.width, lines(each.along), lines(each.motions), lines(each.loads),
+                lines(each.passed), lines(each.upper), lines(each.beside), lines([each.inverse])[0],
+                lines(each.lower), lines(each.given),
             )
             for each in self.branches
         )  # fmt: skip
@@ -270,7 +272,7 @@ class _Elimination:
         made = _product(tape, rho, _product(tape, self.before[k], tau))
         if above >= 0:
             self.before[above] = _sum(self.before[above], P)
-        branch = Branch(above, first, T, tau, rho, X, U, S)
+        branch = Branch(above, first, width, T, tau, rho, X, U, S)
         branch.inverse, branch.lower = [tape.zero] * size, [[tape.zero] * size for _ in range(size)]
         branch.given = [[tape.zero] * size for _ in Z]
         for j in reversed(range(size)):

@@ -64,6 +64,17 @@ def test_so_it_does_with_joints_of_every_kind(seed, bodies, spatial):
     np.testing.assert_allclose(y, known, rtol=0.0, atol=1e-13 * np.linalg.cond(matrix) * np.abs(known).max())
 
 
+def test_welded_bodies_pass_on_what_acts_beyond_them():
+    model, before = mbd.Model("welded"), None
+    for k in range(6):
+        rod = mbd.Link(f"rod {k}", length=1.0, **mbd.rod(mass=1.0, length=1.0).link)
+        joint = mbd.Weld if k in (0, 2, 3, 5) else mbd.Revolute
+        model.connect(joint(f"joint {k}", before.end if before else model.ground.origin, rod.start))
+        before = rod
+    y, known, matrix, _ = both(model, 1)
+    np.testing.assert_allclose(y, known, rtol=0.0, atol=1e-13 * np.linalg.cond(matrix) * np.abs(known).max())
+
+
 def test_pivots_of_a_long_chain_are_sound():
     model, before = mbd.Model("long chain"), None
     for k in range(200):
