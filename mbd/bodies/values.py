@@ -114,7 +114,9 @@ def number(value: Any, what: str) -> float:
 
 def _meant(value: Any) -> str:
     """The number that a text or a list of one was to be."""
-    one = value[0] if isinstance(value, list | tuple | np.ndarray) and np.shape(value) == (1,) else value
+    listed = isinstance(value, list | tuple) and len(value) == 1
+    alone = listed or (isinstance(value, np.ndarray) and value.shape == (1,))
+    one = value[0] if alone else value
     if isinstance(one, str) or (one is not value and is_number(one)):
         try:
             return f"; give the number itself, {float(one):g}"
