@@ -317,8 +317,8 @@ class ReturnMap:
             return {}
         out = np.zeros(3 * len(self.feet))
         y = np.concatenate([state.v, state.z])
-        closed = np.flatnonzero(self.manager.flags(state.mode.closed))
-        block = self.mechanism.block(0.0, state.q, y, state.anchors, closed.tolist())
+        closed = [number for number, name in enumerate(self.manager.names) if name in state.mode]
+        block = self.mechanism.block(0.0, state.q, y, state.anchors, closed)
         self._where(block, self.vector(values), out)
         return dict(zip(self.feet, out.reshape(-1, 3), strict=True))
 

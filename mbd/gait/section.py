@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import field, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,7 +186,8 @@ class Chart:
         """
         section, base = self.section, self.state
         compose = section.mechanism.equations.configuration.compose
-        parts = np.split(np.asarray(c, dtype=float), np.cumsum(self.counts)[:-1])
+        c, ends = np.asarray(c, dtype=float), [0, *accumulate(self.counts)]
+        parts = [c[first:last] for first, last in pairwise(ends)]
         anchors = np.array(base.anchors, dtype=float)
         if section.held:
             anchors[list(section.held)] += parts[3]
@@ -202,11 +204,13 @@ class Chart:
         z = base.z + parts[2]
         v = base.v + self.rates @ parts[1]
         rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
+        along = B @ self.off_rates
         for _ in range(2 if not section.speeds else CORRECTIONS):  # ḣ is linear in v, what an event watches may not be
-            change = self.off_rates @ np.linalg.lstsq(B @ self.off_rates, rate, rcond=None)[0]
+            change = self.off_rates @ np.linalg.lstsq(along, rate, rcond=None)[0]
             v, rate = v - change, rate - B @ change
             if section.speeds:
                 rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
+                along = B @ self.off_rates
         anchors = section.anchored(q, np.concatenate([v, z]), parameters, anchors)
         return replace(
             base, time=0.0, q=q, v=v, z=z, anchors=anchors, mode=section.mode, armed=section.armed, memory=None,

@@ -26,6 +26,8 @@ def angles(mechanism: Mechanism) -> list[int]:
 
 def unwound(mechanism: Mechanism, parameters: Vector, moved: Vector) -> Vector:
     """Differences of configurations (…, n_v) without whole turns that change nothing."""
+    if np.abs(moved).max(initial=0.0) <= np.pi:
+        return moved
     turned = [k for k in angles(mechanism) if np.max(np.abs(moved[..., k]), initial=0.0) > np.pi]
     turned = [k for k in turned if whole_turn_changes_nothing(mechanism, parameters, k)]
     if not turned:

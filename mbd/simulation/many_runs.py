@@ -70,13 +70,12 @@ class Ends:
         """The end of the k-th run as a state."""
         v, row = run.kernel, self.row[k]
         at_v = 1 + v.n_q
-        names = np.array(run.manager.names)
         closed = row[at_v + 2 * v.n + v.n_rows :][: v.n_contacts]
         return State(
             float(self.time[k]), row[1:at_v].copy(), row[at_v : at_v + v.n_v].copy(),
             row[at_v + v.n_v : at_v + v.n].copy(), run.manager.mode(closed.astype(np.int64)),
-            frozenset(str(name) for name in names[self.armed[k] == 1]), self.anchors[k].copy(), run.start.names,
-            run.start.velocity_names, {}, dict(parameters),
+            frozenset(name for name, side in zip(run.manager.names, self.armed[k].tolist(), strict=True) if side == 1),
+            self.anchors[k].copy(), run.start.names, run.start.velocity_names, {}, dict(parameters),
         )  # fmt: skip
 
 
