@@ -12,7 +12,7 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.passed import Passed
-from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.programs import Programs, State
 from mbd.sensitivity.run_data import RunRows, refused
 
 __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
@@ -75,7 +75,10 @@ def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]
     instants = {name: instant_of(name, found) for name in of}
     instants["time"] = float(rows.run.time[-1]), found.motion.tangent.t
     wanted = _at_rows(rows, found, [name for name in of if instants[name] is None])
-    results = [instants[name] or _result(rows, programs, found, rates, name, wanted[name]) for name in of]
+    at = found.motion.at(found.mode, rates.rate, rates.lam)
+    at.lam, at.anchors = rates.lam, _with_turns(rows, programs, at.anchors)
+    tangent = found.motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
+    results = [instants[name] or _result(programs, at, tangent, name, wanted[name]) for name in of]
     values, lines = [value for value, _ in results], [line for _, line in results]
     size = len(found.motion.tangent.t)
     return Lines(tuple(of), np.array(values), np.array(lines).reshape(len(values), size))
@@ -95,16 +98,12 @@ def _at_rows(rows: RunRows, found: Passed, names: Sequence[str]) -> dict[str, Ve
     return dict(zip(names, rows.run.columns.at_rows(single), strict=True))
 
 
-def _result(
-    rows: RunRows, programs: Programs, found: Passed, rates: Rates, name: str, wanted: Vector
-) -> tuple[float, Vector]:  # fmt: skip
-    """A named result at the end, which has these values at the rows of the run."""
-    at = found.motion.at(found.mode, rates.rate, rates.lam)
-    at.lam, at.anchors = rates.lam, _with_turns(rows, programs, at.anchors)
+def _result(programs: Programs, at: State, tangent: Matrix, name: str, wanted: Vector) -> tuple[float, Vector]:
+    """A named result at the end and its derivatives, along `tangent`; it has the values `wanted` at the rows."""
     value, slopes = programs.result(name, at)
     if not abs(value - wanted[-1]) <= RESULT_RTOL * max(1.0, float(np.max(np.abs(wanted)))):
         raise refused(f"{name!r} is {wanted[-1]:.9g} at its end, which the pass does not find again ({value:.9g})")
-    return value, slopes @ found.motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
+    return value, slopes @ tangent
 
 
 def _with_turns(rows: RunRows, programs: Programs, anchors: Vector) -> Vector:
