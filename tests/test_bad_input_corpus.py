@@ -106,6 +106,7 @@ EXAMPLES: dict[str, Any] = {
     "travel": 0.01,
     "branch_stiffness": 1.0,
     "branch_damping": 1.0,
+    "damping": 1.0,
     "static": 0.6,
     "stiffness": 1.0,
     "subject": ANGLE,
