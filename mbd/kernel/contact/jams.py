@@ -16,13 +16,13 @@ from mbd.kernel.stepping.restart import row_speed
 
 __all__ = ["stop_slide"]
 
-APPROACH = 0.1
+FIRST_APPROACH_RATIO = 0.1
 """Approach speed by which the impact is told from no impact at first, over the speed of the slide [-]."""
-SLOWER = 0.1
+APPROACH_REDUCTION = 0.1
 """The approach that follows, over the one before, until there is none [-]."""
-SLOWER_TURNS = 4
+MAX_REDUCTIONS = 4
 """Approaches before there is none [-]."""
-GAIN = 1e-12
+ENERGY_GAIN_RTOL = 1e-12
 """Energy that impulses add, relative to its terms, above which they are none [-]."""
 
 
@@ -41,8 +41,8 @@ def stop_slide(K: Switching, c: int) -> int:
             slide += abs(row_speed(K, k))
     # the branches of a slow approach, then the impulses that these give without it
     status = 0
-    approach = APPROACH
-    for turn in range(SLOWER_TURNS + 1):
+    approach = FIRST_APPROACH_RATIO
+    for turn in range(MAX_REDUCTIONS + 1):
         start_over(K)
         for k in range(K.n_rows):
             K.bias[k] = row_speed(K, k)
@@ -50,9 +50,9 @@ def stop_slide(K: Switching, c: int) -> int:
                 K.bias[k] -= approach * slide
         if status == 0:
             status = solve_impact(K)
-        approach *= SLOWER if turn + 1 < SLOWER_TURNS else 0.0
+        approach *= APPROACH_REDUCTION if turn + 1 < MAX_REDUCTIONS else 0.0
     stopped = stopped_friction(K)
-    if status != 0 or stopped < 0 or energy_gain(K) > GAIN:
+    if status != 0 or stopped < 0 or energy_gain(K) > ENERGY_GAIN_RTOL:
         K.failure_index = c
         return NO_FORCE
     # energy, velocities, and who parts
