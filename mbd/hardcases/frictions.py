@@ -177,7 +177,8 @@ def jamming(id: str, scheme: Any) -> Outcome:
                               abs(found / wanted - 1.0), 1e-9))  # fmt: skip
     for much in (mu, 1.001 * critical):
         run = slide(id, much, -1.0, scheme)
-        is_stopped = run.events[0].kind == "stuck" and run.events[0].impulse[0] > 0.0 if run.events else False
+        first = run.events[0] if run.events else None
+        is_stopped = first is not None and first.kind == "stuck" and bool(np.any(np.asarray(first.impulse)[:1] > 0.0))
         figures.append(
             Figure(f"μ = {much:.4g}, a slide without a force that no impulse stops [-]", float(not is_stopped), 0.0)
         )

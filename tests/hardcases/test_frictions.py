@@ -29,7 +29,7 @@ def test_every_case_holds(case, scheme):
     [
         (0, {"Coulomb": lambda torque, known=mbd.Coulomb: known(1.001 * torque)}, "order"),
         (1, {"PinFriction": lambda mu, radius, known=mbd.PinFriction: known(1.002 * mu, radius)}, "order"),
-        (2, {"numbers": lambda id, known=frictions.numbers: known(id) | {"mu": 1.2}}, "not told"),
+        (2, {"numbers": lambda id, known=frictions.numbers: known(id) | {"mu": 1.2}}, "no impulse stops"),
     ],
 )
 def test_a_judge_notices_another_law(number, wrong, noticed, monkeypatch):
