@@ -104,9 +104,8 @@ def forgotten(monkeypatch):
         monkeypatch.setattr(sweep_runs, store, type(getattr(sweep_runs, store))())
 
 
-def test_workers_derive_a_model_once_and_compile_nothing(monkeypatch):
+def test_workers_derive_a_model_once_and_compile_nothing():
     """The model is compiled here before; further sweeps of other settings find what the worker made of it."""
-    monkeypatch.setattr(mechanisms, "_KNOWN", type(mechanisms._KNOWN)())  # what the cache has lost is made again
     model, kept = ball(restitution=0.5), {"process": process, "derived": derived, "compiled": compiled}
     swept(model, {"ball.mass": [2.0]}, until=0.6)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=count) as pool:
