@@ -26,8 +26,10 @@ __all__ = ["MAX_BYTES", "ObjectCache", "default_cache", "key_of"]
 
 MAX_BYTES = 256 * 2**20
 """Bytes above which the entries that were used longest ago are removed (a model takes 10 to 200 kB)."""
-MAX_AGE = 3600.0
-"""Age of the note of its last use below which an entry keeps it, and that of a draft that may still be written [s]."""
+MAX_NOTE_AGE = 60.0
+"""Age of the note of its last use below which an entry keeps it [s]."""
+MAX_DRAFT_AGE = 3600.0
+"""Age below which a draft may still be written [s]."""
 
 _DIGEST = 32
 _SUFFIX, _DRAFT, _LASTING = ".object", ".draft", "kernel-"
@@ -81,7 +83,7 @@ class ObjectCache:
             data = content[_DIGEST:]
             if not data or _sealed(key, data) != content[:_DIGEST]:
                 return None
-            if time.time() - path.stat().st_mtime > MAX_AGE:
+            if time.time() - path.stat().st_mtime > MAX_NOTE_AGE:
                 os.utime(path)  # it was used
         except OSError:
             return None
@@ -140,7 +142,7 @@ class ObjectCache:
         now = time.time()
         for path, status in self._entries(self.directory):
             if path.name.endswith(_DRAFT):
-                if now - status.st_mtime > MAX_AGE:
+                if now - status.st_mtime > MAX_DRAFT_AGE:
                     with contextlib.suppress(OSError):
                         path.unlink()
                 continue
