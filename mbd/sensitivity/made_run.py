@@ -77,7 +77,7 @@ class MadeRun(TangentRun):
         return RunRows(Trajectory(record_of(self, self.table[:1])))
 
     def complete(self) -> tuple[Trajectory, str]:
-        """The same; who goes on from the end has no use for derivatives."""
+        """The same state; a run that continues from the end needs no derivatives."""
         run, problem = super().complete()
         final = run.record.final
         if final is None or final.memory is None:

@@ -89,7 +89,7 @@ def test_of_a_walker_by_every_scheme(scheme, until):
 
 @pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
 def test_a_run_that_carries_derivatives_is_the_run_itself(scheme):
-    """Rows, events and what goes on from the end are those of the run without derivatives, to the bit."""
+    """Rows, events and the state at the end are those of the run without derivatives, to the bit."""
     model = mbd.Model("stick")
     rod = mbd.Link("rod", mass=1.2, length=0.9, center=0.4, inertia=0.1)
     model.connect(mbd.Planar("free", model.ground.origin, rod.start))

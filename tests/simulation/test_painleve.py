@@ -177,7 +177,7 @@ def sliding_block(seed, space):
 
 @pytest.mark.parametrize("space", [False, True])
 def test_blocks_that_slide_on_several_feet_stop_on_the_foremost(space):
-    """Nothing sinks in, energy falls by what is told, and schemes agree on impulses."""
+    """Nothing penetrates, energy falls by the reported loss, and schemes agree on impulses."""
     stops = 0
     for seed in range(6):
         model, start = sliding_block(seed, space)

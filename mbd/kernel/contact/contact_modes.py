@@ -79,7 +79,7 @@ def resolve_contact_modes(K: Switching) -> int:
 
 
 def choose_modes(K: Switching) -> int:
-    """Who pushes, sticks and slides at the velocities of now, as `find_branches` tells."""
+    """The active contacts and sticking frictions at the present velocities, by `find_branches`."""
     if K.n_cones > 0:
         hold_directions(K)
     find_slips(K)

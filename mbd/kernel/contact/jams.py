@@ -17,7 +17,7 @@ from mbd.kernel.stepping.restart import row_speed
 __all__ = ["stop_slide"]
 
 FIRST_APPROACH_RATIO = 0.1
-"""Approach speed by which the impact is told from no impact at first, over the speed of the slide [-]."""
+"""Approach speed of the first regularized impact, over the speed of the slide [-]."""
 APPROACH_REDUCTION = 0.1
 """The approach that follows, over the one before, until there is none [-]."""
 MAX_REDUCTIONS = 4

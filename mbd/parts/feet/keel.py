@@ -34,7 +34,7 @@ def keel_foot(
     right to 0.5 % up to a slope of about 60°.
 
     A rigid heel beside a light blade may strike such that no forces let both points push; a run ends there and says
-    so. With a `Penalty` at the heel, a cushion, it goes on.
+    so. With a `Penalty` at the heel, a cushion, the walk continues.
 
     The blade's bending is the joint '<name> keel', the contacts are '<name> heel' and '<name> toe'.
 
