@@ -13,7 +13,10 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
 
-__all__ = ["at_blocks", "blocks_of"]
+__all__ = ["at_blocks", "at_inputs"]
+
+CHUNK = 128
+"""Rows of inputs that are laid out at once, so that they stay in the processor's cache."""
 
 LOOP = """\
 define void @mbd.each_row(ptr %function, i64 %rows, ptr %block, i64 %block_step, ptr %parameters, i64 %parameter_step,
@@ -56,18 +59,19 @@ def _loop() -> Any:
     return _PROTOTYPE(load_object(code, "mbd.each_row"))
 
 
-def at_blocks(function: Function, blocks: Matrix, parameters: Vector | Matrix) -> Matrix:
+def at_blocks(function: Function, blocks: Matrix, parameters: Vector | Matrix, out: Matrix | None = None) -> Matrix:
     """The outputs of a function at every row of inputs (R, size).
 
     Parameters
     ----------
     blocks : (R, layout.size), see `mbd.compile.layout`
     parameters : one vector for all rows, or (R, n_p)
+    out : where they go, zeros
     """
     blocks = np.ascontiguousarray(blocks, dtype=float)
     parameters = np.ascontiguousarray(parameters, dtype=float)
     rows, several = len(blocks), parameters.ndim == 2
-    out = np.zeros((rows, function.size))
+    out = np.zeros((rows, function.size)) if out is None else out
     if not function.address:
         for k in range(rows):
             function(blocks[k], parameters[k] if several else parameters, out[k])
@@ -81,12 +85,16 @@ def at_blocks(function: Function, blocks: Matrix, parameters: Vector | Matrix) -
     return out
 
 
-def blocks_of(layout: Layout, inputs: Mapping[str, Any]) -> Matrix:
-    """Blocks of inputs from arrays by kind: {'t': (R,), 'q': (R, n_q), …}; kinds that are absent are zero."""
+def at_inputs(function: Function, layout: Layout, inputs: Mapping[str, Any], parameters: Vector | Matrix) -> Matrix:
+    """The same from arrays by kind: {'t': (R,), 'q': (R, n_q), …}; kinds that are absent are zero."""
     rows = len(inputs["t"])
-    blocks = np.zeros((rows, layout.size))
-    for kind, values in inputs.items():
-        columns = np.asarray(values, dtype=float).reshape(rows, -1)
-        place = layout.place(kind, 0)
-        blocks[:, place : place + columns.shape[1]] = columns
-    return blocks
+    columns = {layout.place(kind, 0): np.asarray(values).reshape(rows, -1) for kind, values in inputs.items()}
+    columns = {place: values for place, values in columns.items() if values.shape[1]}
+    blocks, out = np.zeros((min(rows, CHUNK), layout.size)), np.zeros((rows, function.size))
+    for first in range(0, rows, CHUNK):
+        part = slice(first, min(first + CHUNK, rows))
+        count = part.stop - first
+        for place, values in columns.items():
+            blocks[:count, place : place + values.shape[1]] = values[part]
+        at_blocks(function, blocks[:count], parameters[part] if parameters.ndim == 2 else parameters, out[part])
+    return out

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Function
-from mbd.compile.many import at_blocks, blocks_of
+from mbd.compile.many import at_inputs
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
@@ -58,7 +58,7 @@ class _Rows:
 
     def at(self, time: Vector, q: Matrix, v: Matrix) -> tuple[Matrix, Matrix, Matrix, NDArray[np.float64]]:
         inputs = {"t": time, "q": q, "v": v, "anchor": np.tile(self.anchors, (len(time), 1))}
-        out = at_blocks(self.function, blocks_of(self.mechanism.layout, inputs), self.parameters)
+        out = at_inputs(self.function, self.mechanism.layout, inputs, self.parameters)
         m = len(self.held)
         h, rate, bias = (out[:, k * m : (k + 1) * m] for k in range(3))
         return np.where(self.held, 0.0, h), rate, bias, out[:, 3 * m :].reshape(len(out), m, -1)

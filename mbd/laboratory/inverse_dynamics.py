@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.point_mass import PointMass
 from mbd.bodies.values import named_number_faults, names_of
-from mbd.compile.many import at_blocks, blocks_of
+from mbd.compile.many import at_inputs
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
@@ -39,8 +39,6 @@ from mbd.topology.plan import plan
 
 __all__ = ["inverse_dynamics"]
 
-CHUNK = 256
-"""Frames whose inputs are laid out at once, so that they stay in the processor's cache."""
 MAX_LOADS, SETTLED = 60, 1e-13
 """How often forces in pins and their friction are solved for in a loop, and the change at which that ends [-]."""
 
@@ -139,13 +137,14 @@ def dynamics_of(
 ) -> InverseDynamics:
     """The balance of a motion whose parameters are known at each frame."""
     equations = mechanism.equations
-    driven = _driven(model, equations, joints)
+    owners = mechanism.kept(_joints, lambda: _joints(model, equations))
+    driven = _driven(model, owners, equations.n_v, joints)
     record = record_of(mechanism, motion, parameters)
     columns = ModelColumns(record, equations)
     g, R = _forces(mechanism, columns.all_inputs(columns.rows), parameters)
-    found = balanced(g, R, driven)
+    friction, notes = np.zeros(g.shape), list[str]()  # which nothing fills where no pin rubs
+    found = balanced(g.copy() if pins else g, R, driven)
     run = _moved(record, equations, found)
-    friction, notes = np.zeros_like(g), list[str]()
     for _ in range(MAX_LOADS if pins else 0):
         # what pins rub follows from the forces in them, which in loops follow from what they rub
         last = friction
@@ -165,9 +164,7 @@ def dynamics_of(
     doubt(*noisy, of=model)
     remarks = [*motion.notes, *noisy, *notes]
     remarks += _notes(equations, found.free, found.shared, driven, motion, bool(plates))
-    return InverseDynamics(
-        run, _joints(model, equations), driven, found.effort, found.residual, tuple(remarks), plates, friction
-    )
+    return InverseDynamics(run, owners, driven, found.effort, found.residual, tuple(remarks), plates, friction)
 
 
 def _moved(record: Record, equations: Equations, found: Balanced) -> Trajectory:
@@ -190,12 +187,7 @@ def _forces(
         functions.add({"inverse_dynamics": _program(equations)})
         return functions["inverse_dynamics"]
 
-    function, count = mechanism.kept(_program, made), len(inputs["t"])
-    out = np.zeros((count, function.size))
-    for first in range(0, count, CHUNK):
-        part = slice(first, first + CHUNK)
-        blocks = blocks_of(mechanism.layout, {kind: values[part] for kind, values in inputs.items()})
-        out[part] = at_blocks(function, blocks, parameters[part] if parameters.ndim == 2 else parameters)
+    out = at_inputs(mechanism.kept(_program, made), mechanism.layout, inputs, parameters)
     return out[:, :n_v], out[:, n_v:].reshape(len(out), m, n_v).transpose(0, 2, 1)
 
 
@@ -243,10 +235,11 @@ def _joints(model: Any, equations: Equations) -> list[tuple[Joint | None, str, t
     return found
 
 
-def _driven(model: Any, equations: Equations, joints: Sequence[str] | None) -> NDArray[np.bool_]:
+def _driven(
+    model: Any, known: Sequence[tuple[Joint | None, str, tuple[int, ...]]], n_v: int, joints: Sequence[str] | None
+) -> NDArray[np.bool_]:
     """Which velocities belong to driven joints."""
-    known = _joints(model, equations)
-    driven = np.zeros(equations.n_v, dtype=bool)
+    driven = np.zeros(n_v, dtype=bool)
     if joints is None:
         for joint, _, places in known:
             driven[list(places)] = not _floats(model, joint)

@@ -15,7 +15,7 @@ from mbd.equations.equations import Equations
 from mbd.forces.smoothing import smoothed
 from mbd.laboratory.motion import derivatives
 from mbd.laboratory.nearest_posture import Postures, Problem
-from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
+from mbd.laboratory.quaternion_rates import make_continuous, quaternion_rates
 from mbd.results.record import Record
 from mbd.results.trajectory import Trajectory
 
@@ -156,7 +156,7 @@ def _rates(equations: Equations, time: Vector, q: Matrix, cutoff: float | None) 
     q = q.copy()
     for joint, first, _ in whole.charts:
         own = slice(first + joint.adding, first + joint.adding + 4)
-        q[:, own] = continuous(q[:, own].T, f"{joint.name}.orientation").T
+        make_continuous(q[:, own].T, f"{joint.name}.orientation")
     if cutoff is not None:
         q = np.column_stack([smoothed(tuple(time), tuple(column), cutoff, False) for column in q.T])
         for joint, first, _ in whole.charts:

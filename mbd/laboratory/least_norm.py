@@ -39,12 +39,14 @@ def balanced(g: Matrix, R: NDArray[np.float64], driven: NDArray[np.bool_]) -> Ba
 
     Parameters
     ----------
-    g : (R, n) ``M v̇ + f`` with all known forces
+    g : (R, n) ``M v̇ + f`` with all known forces; without rows its memory becomes that of τ
     R : (R, n, m) ∂r/∂λ of the rows that always act
     driven : (n,) coordinates with a force or moment τ
     """
-    effort, residual = np.where(driven, g, 0.0), np.where(driven, 0.0, g)
     count, m = len(g), R.shape[2]
+    effort, residual = g.copy() if m else g, np.zeros(g.shape)
+    residual[:, ~driven] = g[:, ~driven]
+    effort[:, ~driven] = 0.0
     if not m or not count:
         return Balanced(effort, np.zeros((count, m)), residual)
     upper, lower = R[:, ~driven, :], R[:, driven, :]

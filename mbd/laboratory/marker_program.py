@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Frame
 from mbd.compile.backend import Function
-from mbd.compile.many import at_blocks, blocks_of
+from mbd.compile.many import at_inputs
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
@@ -79,7 +79,7 @@ class MarkerProgram:
     def at_all(self, time: Vector, q: Matrix, parameters: Vector) -> tuple[Matrix, NDArray[np.float64]]:
         """y (R, size) and its derivatives (R, size, n_v) at many states."""
         layout = self.mechanism.layout
-        out = at_blocks(self.function, blocks_of(layout, {"t": time, "q": q}), parameters)
+        out = at_inputs(self.function, layout, {"t": time, "q": q}, parameters)
         J = np.zeros((len(time), self.size, layout.n_v))
         J[:, self.lines, self.columns] = out[:, self.size :]
         return out[:, : self.size], J

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.linalg.lapack import dpttrf, dpttrs
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.assemble import assemble
@@ -21,7 +22,7 @@ from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.forces.samples import Samples, in_degrees
 from mbd.laboratory.closed_loops import close_loops, refuse_open_loops
-from mbd.laboratory.quaternion_rates import continuous, quaternion_rates
+from mbd.laboratory.quaternion_rates import make_continuous, quaternion_rates
 from mbd.laboratory.recording import Recording
 from mbd.notes import doubt
 from mbd.results.record import Record
@@ -29,6 +30,8 @@ from mbd.results.trajectory import Trajectory
 
 __all__ = ["Motion", "derivatives", "motion_of", "parameters_of", "record_of"]
 
+GROUP = 8
+"""Columns that are differentiated at once, so that they stay in the processor's cache; two orientations."""
 MAX_FRAME_INTERVAL = 2.0
 """Time between frames above which it may be in milliseconds [s]."""
 
@@ -124,10 +127,11 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
     if isinstance(given, Recording):
         given, unused = _of_recording(equations, given)
     time = _times(given)
-    columns = _columns(equations, given, time)
+    columns = _columns(mechanism.kept(_Names, lambda: _Names(equations)), given, time)
     count, n_q, n_v = len(time), equations.n_q, equations.n_v
-    q, v, a = np.zeros((n_q, count)), np.zeros((n_v, count)), np.zeros((n_v, count))  # row by row, turned at the end
-    differentiated = False
+    # row by row, as they are given; one table, since the system hands out memory of several slowly
+    table = np.zeros((n_q + 2 * n_v, count))
+    q, v, a = np.split(table, (n_q, n_q + n_v))
     names = [c.name for c in equations.coordinates]
     missing = [name for name in names if name not in columns]
     whole = equations.configuration
@@ -137,66 +141,93 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
             f"{f', and {len(missing) - 1} more' if missing[1:] else ''}; give values of all of them at the times"
             f"{'; the recording has ' + _few(unused) if unused else ''}"
         )
-    turned: set[int] = set()
-    spinning: list[tuple[int, slice]] = []
-    charts = {names[first_q + joint.adding + k] for joint, first_q, _ in whole.charts for k in range(4)}
-    plain = [n for n in names if n in columns and n not in charts and columns[n].rate is None]
-    # one spline through all that has no rates, orientations among them
-    values = {name: columns[name].value for name in plain}
+    turned, spinning = set[int](), list[tuple[int, slice]]()
+    waiting: list[tuple[Vector, Vector | None, Vector | None]] = []
     for joint, first_q, first_v in whole.charts:
         at = first_q + joint.adding
         parts = names[at : at + 4]
         if any(part in missing for part in parts):
             raise ModelError(f"motion: the orientation {parts[0].removesuffix('.w')!r} is missing or incomplete")
         turned |= set(range(at, at + 4))
-        unit = continuous(np.array([columns[part].value for part in parts]), parts[0].removesuffix(".w"))
-        q[at : at + 4] = unit
+        for place, part in enumerate(parts, at):
+            q[place] = columns[part].value
         own = slice(first_v + joint.adding, first_v + joint.adding + 3)
         spins = [columns[name] for name in equations.velocity_names[own] if name in columns]
-        if len(spins) == 3:
-            v[own] = [spin.value for spin in spins]
-            a[own] = [derivatives(time, s.value)[0] if s.acceleration is None else s.acceleration for s in spins]
-            differentiated |= any(spin.acceleration is None for spin in spins)
-        else:
-            values |= dict(zip(parts, unit, strict=True))
+        if len(spins) < 3:
             spinning.append((at, own))
-    slopes = dict(zip(values, zip(*_slopes(time, list(values.values())), strict=True), strict=True))
-    for at, own in spinning:
-        first, second = (np.array([slopes[part][order] for part in names[at : at + 4]]) for order in (0, 1))
-        v[own], a[own] = quaternion_rates(q[at : at + 4], first, second)
-        differentiated = True
+        for k, spin in enumerate(spins if len(spins) == 3 else (), own.start):
+            v[k] = spin.value
+            if spin.acceleration is None:
+                waiting.append((v[k], a[k], None))
+            else:
+                a[k] = spin.acceleration
     places = {int(place): k for k, place in enumerate(whole.places) if place >= 0}
     for place, name in enumerate(names):
         if place in turned or name in missing:
             continue
         column, k = columns[name], places[place]
         q[place] = column.value
-        rate, acceleration = column.rate, column.acceleration
-        if rate is None:
-            rate, second = slopes[name]
-        elif acceleration is None:
-            second = derivatives(time, rate)[0]
-        if acceleration is None:
-            acceleration, differentiated = second, True
-        v[k], a[k] = rate, acceleration
-    doubt(*_in_degrees(equations, columns), *_in_milliseconds(time), of=model)
+        if column.rate is not None:
+            v[k] = column.rate
+        if column.acceleration is not None:
+            a[k] = column.acceleration
+        if column.rate is None:
+            waiting.append((q[place], v[k], a[k] if column.acceleration is None else None))
+        elif column.acceleration is None:
+            waiting.append((v[k], a[k], None))
+    if not math.isfinite(table.sum()):
+        _require_finite(given, time)
+    for joint, first_q, _ in whole.charts:
+        at = first_q + joint.adding
+        make_continuous(q[at : at + 4], names[at].removesuffix(".w"))
+    _differentiate(time, q, v, a, waiting, spinning)
+    doubt(*_in_degrees(equations, q), *_in_milliseconds(time), of=model)
     remarks = (f"channels that are no coordinates are not used: {_few(unused)}",) if unused else ()
-    q, v, a = (np.ascontiguousarray(table.T) for table in (q, v, a))
-    motion = Motion(time, q, v, a, None, remarks, differentiated)
+    motion = Motion(time, q.T, v.T, a.T, None, remarks, bool(spinning or waiting))
     return motion if not missing else _closed(model, mechanism, motion, missing, changed)
 
 
-def _in_degrees(equations: Equations, columns: Mapping[str, _Column]) -> list[str]:
+def _differentiate(
+    time: Vector,
+    q: Matrix,
+    v: Matrix,
+    a: Matrix,
+    waiting: Sequence[tuple[Vector, Vector | None, Vector | None]],
+    spinning: Sequence[tuple[int, slice]],
+) -> None:
+    """Derivatives of splines, where they are missing.
+
+    Parameters
+    ----------
+    waiting : (values, where their first derivatives go, and the second ones)
+    spinning : (first place of a quaternion in q, places of its angular velocity in v)
+    """
+    spline = _Spline(time) if waiting or spinning else None
+    if spline is None:
+        return
+    for start in range(0, len(waiting), GROUP):
+        group = waiting[start : start + GROUP]
+        found = zip(*spline.slopes(np.array([row for row, _, _ in group])), strict=True)
+        for (_, *targets), derived in zip(group, found, strict=True):
+            for target, values in zip(targets, derived, strict=True):
+                if target is not None:
+                    target[:] = values
+    for start in range(0, len(spinning), GROUP // 4):
+        pair = spinning[start : start + GROUP // 4]
+        first, second = spline.slopes(np.concatenate([q[at : at + 4] for at, _ in pair]))
+        for k, (at, own) in enumerate(pair):
+            part = slice(4 * k, 4 * k + 4)
+            v[own], a[own] = quaternion_rates(q[at : at + 4], first[part], second[part])
+
+
+def _in_degrees(equations: Equations, q: Matrix) -> list[str]:
     """Sentences on angles that swing to and fro by more than a turn, as those of a joint do in degrees."""
-    angles = [c.name for c in equations.coordinates if c.unit == "rad" and c.name in columns]
-    if not angles:
-        return []
-    wide = np.flatnonzero(np.ptp([columns[name].value for name in angles], axis=1) > math.tau)
+    wide = np.flatnonzero(q.max(axis=1) - q.min(axis=1) > math.tau)
     return [
-        f"motion: {angles[k]!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; "
+        f"motion: {name!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; "
         "angles are in radians: numpy.radians(…) converts degrees, a file says 'knee.angle [deg]'"
-        for k in wide
-        if (swing := in_degrees(columns[angles[k]].value))
+        for name, unit, values in ((equations.coordinates[k].name, equations.coordinates[k].unit, q[k]) for k in wide)
+        if unit == "rad" and (swing := in_degrees(values))
     ]
 
 
@@ -217,29 +248,51 @@ def _times(given: Mapping[str, Any]) -> Vector:
     return time
 
 
-def _columns(equations: Equations, given: Mapping[str, Any], time: Vector) -> dict[str, _Column]:
+class _Names:
+    """What names of given columns mean, each looked up once."""
+
+    def __init__(self, equations: Equations) -> None:
+        spins = [name for name in equations.velocity_names if not name.endswith(".rate")]
+        self.names = [*(c.name for c in equations.coordinates), *spins]
+        self.known = {spelling: (name, "") for spelling, name in _spellings(self.names).items()}
+        ends = "rate", "acceleration"
+        self.known |= {
+            full: (name, end)
+            for spelling, (name, _) in list(self.known.items())
+            for end in ends
+            if (full := f"{spelling}.{end}") not in self.known
+        }
+        self._found: dict[str, list[tuple[str, str]]] = {}
+
+    def of(self, key: str) -> list[tuple[str, str]]:
+        """Coordinates or velocities by name, of a vector or an orientation several, with '', 'rate', 'acceleration'."""
+        found = self._found.get(key)
+        if found is None:
+            plain, known = "_".join(key.split()), self.known
+            several = next(
+                ([f"{plain}{end}" for end in ends] for ends in ((".w", ".x", ".y", ".z"), (".x", ".y", ".z"))
+                 if all(known.get(f"{plain}{end}", ("", "-"))[1] == "" for end in ends)), [plain],
+            )  # fmt: skip
+            if not all(part in known for part in several):
+                raise UnknownNameError(f"motion: {nearest(key, self.names, 'coordinate', 'The model has')}")
+            found = self._found[key] = [known[part] for part in several]
+        return found
+
+
+def _columns(names: _Names, given: Mapping[str, Any], time: Vector) -> dict[str, _Column]:
     """Values by the names of coordinates and of velocities that are no rates."""
-    names = [c.name for c in equations.coordinates]
-    spins = [name for name in equations.velocity_names if not name.endswith(".rate")]
-    known = _spellings([*names, *spins])
-    rates = {f"{spelling}{end}": name for spelling, name in known.items() for end in (".rate", ".acceleration")}
     found: dict[str, _Column] = {}
     later: list[tuple[str, str, Vector]] = []
     for key, value in given.items():
         if key == "time":
             continue
-        plain = "_".join(str(key).split())
-        parts = next(
-            ([f"{plain}{end}" for end in ends] for ends in ((".w", ".x", ".y", ".z"), (".x", ".y", ".z"))
-             if all(f"{plain}{end}" in known for end in ends)), [plain],
-        )  # fmt: skip
-        if not all(part in known or part in rates for part in parts):
-            raise UnknownNameError(f"motion: {nearest(str(key), [*names, *spins], 'coordinate', 'The model has')}")
-        for part, column in zip(parts, _values(key, value, time, len(parts)), strict=True):
-            if part in known:
-                found[known[part]] = column
+        parts = names.of(str(key))
+        columns = _values(key, value, time, len(parts))
+        for (name, level), column in zip(parts, columns, strict=True):
+            if level:
+                later.append((name, level, column.value))
             else:
-                later.append((rates[part], part.rpartition(".")[2], column.value))
+                found[name] = column
     for name, level, values in later:
         if name not in found:
             raise ModelError(f"motion: the {level} of {name!r} is given without its value; give both")
@@ -277,6 +330,8 @@ def _spellings(names: list[str]) -> dict[str, str]:
 
 def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
     """One column for each component, checked."""
+    if type(value) is np.ndarray and value.dtype == float and width == 1 and value.shape == time.shape:
+        return [_Column(value)]
     if isinstance(value, Samples):
         parts = value.components
         if len(parts) != width:
@@ -289,34 +344,96 @@ def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
     shape = (len(time),) if width == 1 else (len(time), width)
     if table.shape != shape:
         raise ModelError(f"motion: the values of {key!r} must have the shape {shape}, got {table.shape}")
-    if not np.isfinite(np.sum(table)):
-        wrong = np.flatnonzero(~np.isfinite(table.reshape(len(time), -1)).all(axis=1))
-        if not len(wrong):
-            raise ModelError(f"motion: the values of {key!r} are too large, up to {np.abs(table).max():.3g}")
-        raise ModelError(
-            f"motion: {key!r} has a gap at t = {time[wrong[0]]:.6g} s ({len(wrong)} of {len(time)} frames); fill it, "
-            "or leave these frames out"
-        )
     return [_Column(column) for column in table.reshape(len(time), -1).T]
+
+
+def _require_finite(given: Mapping[str, Any], time: Vector) -> None:
+    """Raise a `ModelError` for the first gap in columns that are given."""
+    for key, value in given.items():
+        if key == "time" or isinstance(value, Samples):
+            continue
+        table = np.asarray(value, dtype=float)
+        wrong = np.flatnonzero(~np.isfinite(table.reshape(len(time), -1)).all(axis=1))
+        if len(wrong):
+            raise ModelError(
+                f"motion: {key!r} has a gap at t = {time[wrong[0]]:.6g} s ({len(wrong)} of {len(time)} frames); fill "
+                "it, or leave these frames out"
+            )
+        if not np.isfinite(np.sum(table)):
+            raise ModelError(f"motion: the values of {key!r} are too large, up to {np.abs(table).max():.3g}")
 
 
 def _of_samples(signal: Samples, time: Vector, order: int) -> Vector:
     return np.asarray(signal(time, order), dtype=float)
 
 
-def _slopes(time: Vector, columns: list[Vector]) -> tuple[Matrix, Matrix]:
-    """First and second derivatives of several columns, a row each."""
-    first, second = derivatives(time, np.array(columns).reshape(len(columns), len(time)).T)
-    return np.ascontiguousarray(first.T), np.ascontiguousarray(second.T)
-
-
 def derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:
-    """First and second derivative of the spline through values at their times; zero of a single frame."""
-    if len(time) == 1:
-        return np.zeros_like(values), np.zeros_like(values)
-    curve = CubicSpline(time, values)
-    ends = curve(time[-1:], 1), curve(time[-1:], 2)
-    return np.concatenate([curve.c[2], ends[0]]), np.concatenate([2.0 * curve.c[1], ends[1]])
+    """First and second derivative of the spline through values (R, n) at their times; zero of a single frame."""
+    spline = _Spline(time)
+    first, second = np.empty((2, values.shape[1], len(time)))
+    for start in range(0, values.shape[1], GROUP):
+        part = slice(start, start + GROUP)
+        first[part], second[part] = spline.slopes(values[:, part].T)
+    return first.T, second.T
+
+
+class _Spline:
+    """Derivatives at the knots of not-a-knot cubic splines, of a few columns at a time in memory that is used again.
+
+    Continuity of the second derivative, ``c₀ s₀ + 2 (c₀ + c₁) s₁ + c₁ s₂ = 3 (c₀ m₀ + c₁ m₁)`` with slopes m of the
+    chords and c one over their widths, is symmetric and positive definite, with the ends, ``s₀ = e − f s₁``, inserted.
+    """
+
+    def __init__(self, time: Vector) -> None:
+        self.time = time
+        if len(time) < 4:  # a line or a parabola
+            return
+        h = self.h = np.diff(time)
+        c = self.c = 1.0 / h
+        diagonal = 2.0 * (c[:-1] + c[1:])
+        for k, other in (0, 1), (-1, -2):
+            diagonal[k] -= (h[k] + h[other]) * c[k] * c[other]
+        *self.factors, _ = dpttrf(diagonal, c[1:-1])
+        count = len(time)
+        self.chord, self.bend, self.right, self.first, self.second = (
+            np.empty((GROUP, count - less)) for less in (1, 1, 2, 0, 0)
+        )
+
+    def slopes(self, rows: Matrix) -> tuple[Matrix, Matrix]:
+        """First and second derivatives (n, R) of up to `GROUP` rows; the next call overwrites them."""
+        if len(self.time) < 4:
+            zero = np.zeros(rows.shape)
+            curve = CubicSpline(self.time, rows.T) if len(self.time) > 1 and len(rows) else None
+            return (zero, zero) if curve is None else (curve(self.time, 1).T, curve(self.time, 2).T)
+        h, c = self.h, self.c
+        n = len(rows)
+        chord, bend, right, first, second = (
+            each[:n] for each in (self.chord, self.bend, self.right, self.first, self.second)
+        )
+        np.subtract(rows[:, 1:], rows[:, :-1], out=chord)
+        chord *= c
+        np.multiply(chord, 3.0 * c, out=bend)
+        np.add(bend[:, 1:], bend[:, :-1], out=right)
+        ends = []
+        for k, other in (0, 1), (-1, -2):
+            width = h[k] + h[other]
+            e = (h[k] + 2.0 * width) * h[other] * chord[:, k] + h[k] ** 2 * chord[:, other]
+            e /= width * h[other]
+            right[:, k] -= e * c[k]
+            ends.append((e, width * c[other]))
+        first[:, 1:-1] = dpttrs(*self.factors, right.T, overwrite_b=True)[0].T
+        for (e, f), k, inner in zip(ends, (0, -1), (1, -2), strict=True):
+            first[:, k] = e - f * first[:, inner]
+        # s'' = 2 c (3 m - 2 s - s of the next knot), of the last knot from its left
+        twice = 2.0 * c
+        second[:, -1] = (4.0 * first[:, -1] + 2.0 * first[:, -2] - 6.0 * chord[:, -1]) * c[-1]
+        inside = second[:, :-1]
+        np.multiply(first[:, :-1], -2.0, out=inside)
+        inside -= first[:, 1:]
+        inside *= twice
+        bend *= 2.0
+        inside += bend
+        return first, second
 
 
 # loops --------------------------------------------------------------------------------------------------------------
@@ -349,7 +466,7 @@ def _closed(
 def parameters_of(mechanism: Mechanism, motion: Motion, changed: Mapping[str, float], model: Any) -> Vector | Matrix:
     """The parameters at the frames: those of the run, if it is one of the very same equations, with changes."""
     run = motion.run
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    values = mechanism.parameters(changed, getattr(model, "parameters", {}) if changed else {})
     if run is None or run.record.equations is not mechanism.equations:
         return values
     own = run.record.parameters_at(np.arange(len(run.time), dtype=np.intp))

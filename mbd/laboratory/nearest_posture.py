@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.compile.many import at_blocks, blocks_of
+from mbd.compile.many import at_inputs
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equal import RANK_RTOL
@@ -220,7 +220,7 @@ class _Step:
             return np.asarray(q + x)
         layout, function = self.mechanism.layout, self.mechanism.common["compose"]
         if q.ndim == 2:
-            return at_blocks(function, blocks_of(layout, {"t": np.zeros(len(q)), "q": q, "x": x}), self.parameters)
+            return at_inputs(function, layout, {"t": np.zeros(len(q)), "q": q, "x": x}, self.parameters)
         block, out = np.zeros(layout.size), np.zeros(layout.n_q)
         block[layout.q : layout.x], block[layout.x : layout.v] = q, x
         function(block, self.parameters, out)

@@ -7,30 +7,30 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.errors import ModelError
 
-__all__ = ["continuous", "quaternion_rates"]
+__all__ = ["make_continuous", "quaternion_rates"]
 
 UNIT_LENGTH_ATOL = 1e-3
 """How far from 1 the length of a given quaternion may be before it is refused [-]."""
 
 
-def continuous(quaternions: Matrix, what: str) -> Matrix:
-    """Quaternions (4, R) of length 1 with signs that do not jump from frame to frame; q and −q are one orientation.
+def make_continuous(quaternions: Matrix, what: str) -> None:
+    """Scale quaternions (4, R) in place to length 1 without signs that jump: q and −q are one orientation.
 
-    >>> continuous(np.array([[0.6, -0.6], [0.8, -0.8], [0.0, 0.0], [0.0, 0.0]]), "trunk.orientation")[:2].tolist()
+    >>> q = np.array([[0.6, -0.6], [0.8, -0.8], [0.0, 0.0], [0.0, 0.0]])
+    >>> make_continuous(q, "trunk.orientation")
+    >>> q[:2].tolist()
     [[0.6, 0.6], [0.8, 0.8]]
     """
     sizes = np.sqrt(np.einsum("ij,ij->j", quaternions, quaternions))
-    wrong = np.flatnonzero(np.abs(sizes - 1.0) > UNIT_LENGTH_ATOL)
-    if len(wrong):
+    if not abs(sizes.max() - 1.0) <= UNIT_LENGTH_ATOL >= abs(sizes.min() - 1.0):
+        wrong = int(np.argmax(np.abs(sizes - 1.0) > UNIT_LENGTH_ATOL))
         raise ModelError(
-            f"{what!r} must be unit quaternions (w, x, y, z); that of frame {wrong[0]} has the length "
-            f"{sizes[wrong[0]]:.6g}"
+            f"{what!r} must be unit quaternions (w, x, y, z); that of frame {wrong} has the length {sizes[wrong]:.6g}"
         )
-    unit: Matrix = quaternions / sizes
-    jumps = np.einsum("ij,ij->j", unit[:, 1:], unit[:, :-1]) < 0.0
-    if jumps.any():
-        unit[:, 1:] *= np.cumprod(np.where(jumps, -1.0, 1.0))
-    return unit
+    quaternions /= sizes
+    along = np.einsum("ij,ij->j", quaternions[:, 1:], quaternions[:, :-1])
+    if along.min(initial=0.0) < 0.0:
+        quaternions[:, 1:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))
 
 
 def quaternion_rates(q: Matrix, rate: Matrix, acceleration: Matrix) -> tuple[Matrix, Matrix]:

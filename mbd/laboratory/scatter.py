@@ -23,6 +23,8 @@ MIN_RATIO = 0.6
 """Scatter by fifth over that by fourth differences above which it is noise: 1 of noise, ω h of a smooth signal [-]."""
 MIN_SHARE = 0.05
 """Scatter of a moment over its range above which it is reported [-]."""
+DEVIATION_OF_MEDIAN = 1.482602218505602
+"""Standard deviation of a normal distribution over its median deviation [-]."""
 SPLINE_NOISE_GAIN = 6.0
 """Standard deviation of h² s̈ at the knots of a cubic spline through white noise of deviation 1 [-]."""
 DIFFERENCES = {4: SPLINE_NOISE_GAIN * 13.676571703571772, 5: SPLINE_NOISE_GAIN * 26.64328436439567}
@@ -50,16 +52,24 @@ def scatter_of(time: Vector, coordinates: Matrix, moments: Matrix) -> list[Scatt
     widths = np.diff(time)
     if len(time) < FEWEST or np.ptp(widths) > SPACING_RTOL * widths.mean():
         return [None] * count
-    fourth, fifth = (_deviation(moments, order) * SPLINE_NOISE_GAIN / DIFFERENCES[order] for order in (4, 5))
-    noisy = (fifth >= MIN_RATIO * fourth) & (fourth >= MIN_SHARE * np.ptp(moments, axis=0)) & (fourth != 0.0)
-    own = _deviation(coordinates[:, noisy], 4) / np.sqrt(comb(8, 4))
-    found = iter(zip(fourth[noisy], own, strict=True))
+    differences, ranges = np.diff(moments.T, 4), np.ptp(moments, axis=0)
+    gain, noisy = SPLINE_NOISE_GAIN / DIFFERENCES[4], np.zeros(count, dtype=bool)
+    # a median is at most twice the mean: what is smooth by that needs none
+    doubtful = 2.0 * DEVIATION_OF_MEDIAN * gain * np.abs(differences).mean(axis=1) >= MIN_SHARE * ranges
+    if not doubtful.any():
+        return [None] * count
+    differences = differences[doubtful]
+    fourth = gain * _deviation(differences)
+    fifth = SPLINE_NOISE_GAIN / DIFFERENCES[5] * _deviation(np.diff(differences))
+    found_noisy = (fifth >= MIN_RATIO * fourth) & (fourth >= MIN_SHARE * ranges[doubtful]) & (fourth != 0.0)
+    noisy[doubtful] = found_noisy
+    own = _deviation(np.diff(coordinates[:, noisy].T, 4)) / np.sqrt(comb(8, 4))
+    found = iter(zip(fourth[found_noisy], own, strict=True))
     return [Scatter(*map(float, next(found))) if each else None for each in noisy]
 
 
-def _deviation(values: Matrix, order: int) -> Vector:
-    # standard deviation of a normal distribution over its median deviation
-    return np.asarray(1.482602218505602 * np.median(np.abs(np.diff(values.T, order)), axis=1))
+def _deviation(differences: Matrix) -> Vector:
+    return np.asarray(DEVIATION_OF_MEDIAN * np.median(np.abs(differences), axis=1))
 
 
 def noise_remarks(equations: Equations, motion: Motion, effort: Matrix, driven: NDArray[np.bool_]) -> list[str]:

@@ -8,8 +8,10 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import mbd
+from mbd.laboratory.motion import derivatives
 from tests.laboratory.newton_euler import inertia_of, inverse, rotation
 
 
@@ -353,6 +355,22 @@ def test_velocities_are_those_of_the_spline_through_the_values():
     by_curve = mbd.inverse_dynamics(model, {"time": t, "pin": signal})
     inside = slice(0, -1)  # the curve is constant behind its end
     assert by_values["pin.moment"][inside] == pytest.approx(by_curve["pin.moment"][inside], abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9, 40])
+def test_derivatives_are_those_of_the_not_a_knot_spline(count):
+    """Of more columns than are taken at once, at uneven times, against scipy's; times stretched by 1e-3 to 1e3."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        stretch = 10.0 ** rng.uniform(-3.0, 3.0)
+        time = stretch * np.cumsum(rng.uniform(0.2, 2.0, size=count))
+        values = rng.normal(size=(count, 19))
+        if count == 1:
+            assert not np.any(derivatives(time, values))
+            continue
+        for order, found in enumerate(derivatives(time, values), 1):
+            expected = CubicSpline(time, values)(time, order)
+            assert found == pytest.approx(expected, rel=1e-10, abs=1e-11 * np.abs(expected).max(initial=1e-9))
 
 
 def test_a_turning_top_keeps_the_rates_of_its_orientation():
