@@ -107,7 +107,8 @@ def _not_finite(start: State, equations: Equations) -> list[str]:
     names = [coordinate.name for coordinate in equations.coordinates]
     parts = ((start.q, names), (start.v, equations.velocity_names), (start.z, [s.name for s in equations.states]))
     values = [(name, value) for part, known in parts for name, value in zip(known, part, strict=True)]
-    values += [(f"anchor {k} of its contacts", value) for k, value in enumerate(start.anchors)]
+    held = {a: f"{m.name}.{field}" for m in equations.machines for a, field in zip(m.anchors, m.fields, strict=True)}
+    values += [(held.get(k, f"anchor {k} of its contacts"), value) for k, value in enumerate(start.anchors)]
     return [
         f"the start has {name!r} = {value}; give a finite number" for name, value in values if not np.isfinite(value)
     ]

@@ -11,7 +11,7 @@ from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node, Scalar
 from mbd.tape.selection import by_state
 
-__all__ = ["ByMode", "by_mode_of", "number_by_mode", "parameter_by_mode", "parameters_by_mode"]
+__all__ = ["ByMode", "by_mode_of", "number_by_mode", "parameter_by_mode", "parameters_by_mode", "require_use"]
 
 
 class Modes(Protocol):
@@ -76,6 +76,12 @@ def by_mode_of(value: Any, by: Any, what: str, each: Callable[[Any, str], Any]) 
     if not value or not all(isinstance(state, str) for state in value):
         raise ModelError(f"{what} by {by!r} maps names of states to quantities, got {value!r}")
     return ByMode(by, tuple((state, each(part, f"{what} in {state!r}")) for state, part in value.items()))
+
+
+def require_use(by: Any, what: str, *values: Any) -> None:
+    """Raise a `ModelError` where a mode is named and none of the quantities is given by its states."""
+    if by is not None and not any(isinstance(value, ByMode) for value in values):
+        raise ModelError(f"{what} has by={by!r}, but nothing by state: give {{state: value}}, or leave out by=")
 
 
 def number_by_mode(value: Any, by: Any, what: str) -> Any:

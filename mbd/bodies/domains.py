@@ -85,6 +85,10 @@ class Parameterized:
         """Domains of its parameters by full name, of those that have one."""
         return {}
 
+    def stands_for(self) -> dict[str, str]:
+        """Parameters that take the place of others: {'knee loss.coefficient.stance': 'knee loss.coefficient'}."""
+        return {}
+
     @property
     def known_as(self) -> str:
         """What messages call it: "body 'rod'"."""
@@ -132,10 +136,16 @@ class ParameterCheck:
         self._values, self._whole, self._decisive = dict(values), whole, frozenset(decisive)
         self._owner: dict[str, Parameterized] = {}
         self._names: dict[int, list[str]] = {}
+        self._stands_for: dict[str, str] = {}
         for word in words:
+            self._stands_for |= word.stands_for()
             for name in word.parameters():
                 if self._owner.setdefault(name, word) is word:
                     self._names.setdefault(id(word), []).append(name)
+
+    def stand_in_faults(self) -> list[str]:
+        """What is wrong with the model's own values of parameters that take the place of others."""
+        return self.faults({name: self._values[name] for name in self._stands_for if name in self._values})
 
     @property
     def units(self) -> dict[str, str]:
@@ -154,6 +164,11 @@ class ParameterCheck:
         for number, word in owners.items():
             own = {name: changed.get(name, self._values.get(name, 0.0)) for name in self._names[number]}
             found += word.value_faults(own)
+        for name in names:
+            other = self._stands_for.get(name, "")
+            if word_of := self._owner.get(other):
+                there = {each: self._values[each] for each in self._names[id(word_of)]} | {other: changed[name]}
+                found += [f"{name!r}: {fault}" for fault in word_of.value_faults(there)]
         if not self._decisive.isdisjoint(names):
             found += self._whole({**self._values, **changed})
         return list(dict.fromkeys(found))

@@ -106,6 +106,10 @@ class Machine(Constraint):
         """Parameters of other words that it sets: {'knee loss.coefficient': {'stance': 5.0}}."""
         return {}
 
+    def stands_for(self) -> dict[str, str]:
+        """The parameters of each state, and those in whose place they are."""
+        return {f"{name}.{state}": name for name, values in self.parameters_by_state().items() for state in values}
+
     def held_parameters(self) -> Mapping[str, int]:
         """Parameters of other words that are among the numbers that it holds, with the number of the field."""
         return {}

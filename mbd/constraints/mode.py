@@ -38,7 +38,8 @@ class Transition:
         quantity, a function of named quantities, an expression. One that is beyond zero already as the state is
         entered has to go back first
     after : time in the state after which it happens [s], > 0; a number is the parameter '<name of the mode>.<source>
-        to <target>.after', a text the name of a parameter or quantity, whose value as time passes counts
+        to <target>.after', a text the name of a parameter or quantity, whose value as time passes
+        counts. A remembered time that is not positive is due at once
     only_while : it happens only while this holds at its instant: a contact is closed ('right foot'), another mode is
         in a state ('other: stance'), or a measure is positive. Where it does not hold, the instant has passed: a timer
         begins again as the state is entered again

@@ -15,7 +15,7 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
-from mbd.tape.functions import cos, sin, sqrt
+from mbd.tape.functions import cos, sin, sqrt, where
 
 __all__ = ["SpringLeg"]
 
@@ -29,7 +29,8 @@ class SpringLeg(Constraint):
     In flight the leg has its rest length l and the angle α to the ground, with the foot at ``x + l cos α`` ahead of the
     hip. It touches down as ``y = l sin α`` falls through zero, its foot stays there, and it pushes with ``k (l − r)``
     along the line of length r from foot to hip until that is zero. There is no impact, and no energy is lost. Where
-    the next apex is not above ``l sin α`` there is no place for the leg: a runner stumbles, which ends with an error.
+    the next apex is not above ``l sin α`` there is no place for the leg: a runner stumbles. As its hip comes
+    down to the ground the run ends with an error.
 
     R. Blickhan, The spring-mass model for running and hopping, J. Biomech. 22 (1989) 1217; A. Seyfarth, H. Geyer, M.
     Günther & R. Blickhan, A movement criterion for running, J. Biomech. 35 (2002) 649.
@@ -73,6 +74,14 @@ class SpringLeg(Constraint):
         """'penalty': it pushes by a force while its foot is on the ground."""
         return "penalty"
 
+    @property
+    def undefined(self) -> str:
+        """What it means that the hip is below the ground."""
+        return (
+            "its hip has come down to the ground, where the leg finds no place: it has fallen; to end such a run "
+            "before, give an mbd.Event on a height, with terminal=True"
+        )
+
     def mentions(self) -> list[Mention]:
         """Its hip."""
         return [self.hip]
@@ -104,9 +113,10 @@ class SpringLeg(Constraint):
         (foot,) = hold([x + length * cos(angle)])
         r = sqrt((x - foot) * (x - foot) + y * y)
         tension = k * (length - r) / r
+        above = where(y > 0.0, y, sqrt(y))  # no number below the ground
         swung = (x + length * cos(angle), y - length * sin(angle), 0.0)
         return Law(
-            contact=Closing(y - length * sin(angle), opens_on="pull"), push=tension * y,
+            contact=Closing(above - length * sin(angle), opens_on="pull"), push=tension * y,
             elastic=0.5 * k * (length - r) * (length - r),
             drags=[Drag(motion.velocity[0], tension * (x - foot), "thrust")], foot=((foot, 0.0, 0.0), swung),
         )  # fmt: skip

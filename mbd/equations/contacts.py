@@ -282,8 +282,7 @@ def _foot(law: Law, scope: DerivationScope, number: int) -> tuple[Node, ...]:
 
 def _undefined(word: Constraint) -> str:
     """What it means where its gap is no number."""
-    measure = getattr(word, "measure", None)
-    return measure.undefined if isinstance(measure, Measure) else ""
+    return str(getattr(getattr(word, "measure", word), "undefined", ""))
 
 
 def _guard(scope: DerivationScope, event: Event) -> Guard:

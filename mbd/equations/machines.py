@@ -109,6 +109,7 @@ def machine_guards(
                 tuple(places),
             ),
         ))  # fmt: skip
+    faults += _never(guards, len(events), [change.on for _, change in changes]) if not faults else []
     for m, word in enumerate(words):
         own = held[word.name]
         for k, node in stored[m].items():
@@ -128,6 +129,26 @@ def machine_guards(
     if faults:
         raise ModelError(list(dict.fromkeys(faults)))
     return machines, guards
+
+
+def _never(guards: Sequence[Guard], first: int, causes: Sequence[str]) -> list[str]:
+    """Changes, of guards from number `first` on, that wait for each other alone, or for what nothing causes."""
+    waiting = {number: guard.transition.causes for number, guard in enumerate(guards, first) if guard.transition}
+    happen = set[int]()
+    while True:
+        more = {
+            number for number, each in waiting.items()
+            if number not in happen and any(kind != "taken" or other in happen for kind, other in each)
+        }  # fmt: skip
+        if not more:
+            break
+        happen |= more
+    return [
+        f"'{guards[number - first].name}' never happens: it waits for {causes[number - first]!r}, which "
+        "nothing else causes; give one of them another cause"
+        for number in waiting
+        if number not in happen
+    ]
 
 
 class _Causes:

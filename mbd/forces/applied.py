@@ -8,7 +8,7 @@ from typing import Any
 
 from mbd.bodies.algebra import rotate
 from mbd.bodies.base import Frame
-from mbd.bodies.by_mode import by_mode_of
+from mbd.bodies.by_mode import by_mode_of, require_use
 from mbd.bodies.point_mass import PointMass
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
@@ -72,6 +72,7 @@ class Applied(Force):
             put(self, "force", by_mode_of(self.force, self.by, f"force of '{self.name}'", triple_of))
         if self.torque is not None:
             put(self, "torque", by_mode_of(self.torque, self.by, f"torque of '{self.name}'", _torque_of))
+        require_use(self.by, f"Applied '{self.name}'", self.force, self.torque)
         put(self, "arguments", arguments_of(self.arguments, f"Applied '{self.name}'"))
         if self.axes is not None:
             what = f"axes of Applied '{self.name}'"

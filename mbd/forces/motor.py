@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from mbd.bodies.by_mode import by_mode_of
+from mbd.bodies.by_mode import by_mode_of, require_use
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
@@ -64,6 +64,7 @@ class Motor(Force):
             )
         effort = by_mode_of(self.effort, self.by, f"{self.field} of '{self.name}'", quantity_of)
         object.__setattr__(self, self.field, effort)
+        require_use(self.by, f"Motor '{self.name}'", effort)
         object.__setattr__(self, "arguments", arguments_of(self.arguments, f"Motor '{self.name}'"))
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
-from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode, require_use
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.given import NumberByMode
 from mbd.bodies.scope import Scope
@@ -46,6 +46,7 @@ class Spring(Force):
         frame_of(self.b, f"second end of Spring '{self.name}'")
         object.__setattr__(self, "stiffness", number_by_mode(self.stiffness, self.by, f"stiffness of '{self.name}'"))
         object.__setattr__(self, "length", number_by_mode(self.length, self.by, f"length of '{self.name}'"))
+        require_use(self.by, f"Spring '{self.name}'", self.stiffness, self.length)
 
     @property
     def kind(self) -> str:

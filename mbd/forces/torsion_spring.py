@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode, require_use
 from mbd.bodies.given import NumberByMode
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of
@@ -40,6 +40,7 @@ class TorsionSpring(Force):
         joint_of(self.joint, f"joint of TorsionSpring '{self.name}'")
         object.__setattr__(self, "stiffness", number_by_mode(self.stiffness, self.by, f"stiffness of '{self.name}'"))
         object.__setattr__(self, "rest", number_by_mode(self.rest, self.by, f"rest of '{self.name}'"))
+        require_use(self.by, f"TorsionSpring '{self.name}'", self.stiffness, self.rest)
 
     @property
     def kind(self) -> str:

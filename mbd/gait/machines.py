@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations import programs
-from mbd.equations.equations import Equations, Machine
+from mbd.equations.equations import Equations, Guard, Machine, Transition
 from mbd.joints.reflected import exchanged
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
@@ -33,6 +33,8 @@ __all__ = [
 ]
 
 Numbers = NDArray[np.intp]
+OWN = "its measure or timer"
+"""What causes a transition with when= or after=, in words."""
 
 
 def state_anchors(equations: Equations) -> list[int]:
@@ -153,7 +155,7 @@ def image_faults(equations: Equations, sides: tuple[str, str]) -> list[str]:
             faults.append(f"mirror={sides}: mode {machine.name!r} has no partner {name!r}")
             continue
         faults += _pair_faults(machine, partners[name], sides)
-    return faults
+    return faults or _cause_faults(equations, sides)
 
 
 def _pair_faults(one: Machine, other: Machine, sides: tuple[str, str]) -> list[str]:
@@ -164,3 +166,56 @@ def _pair_faults(one: Machine, other: Machine, sides: tuple[str, str]) -> list[s
         for name in own
         if exchanged(name, sides) not in others
     ]
+
+
+def _cause_faults(equations: Equations, sides: tuple[str, str]) -> list[str]:
+    """Transitions whose mirror image is none: on the other side something else causes them.
+
+    Those of events that happen with something else count where they change something.
+    """
+    guards = [guard for guard in equations.guards if guard.transition is not None]
+    used = {number for guard in guards for number in _transition(guard).causes}
+    own, faults = {_wiring(equations, guard) for guard in guards}, list[str]()
+    for e, guard in enumerate(equations.guards):
+        if guard.transition is None:
+            continue
+        alone = len(equations.machines[guard.transition.machine].states) == 1 and ("taken", e) not in used
+        if alone and guard.reset is None and not guard.terminal and not guard.transition.stored:
+            continue
+        machine, source, target, causes, needed = _wiring(equations, guard)
+        names = [exchanged(name, sides) for name in (machine, source, target)]
+        others = frozenset(exchanged(name, sides) for name in causes)
+        if (*names, others, exchanged(needed, sides)) not in own:
+            mine = f"{guard.name!r} on {_listed(causes)}" + (f" while {needed!r} is closed" if needed else "")
+            faults.append(f"mirror={sides}: {mine} has no partner on {_listed(others)}")
+    return faults
+
+
+def _listed(causes: frozenset[str]) -> str:
+    return " or ".join(cause if cause == OWN else repr(cause) for cause in sorted(causes))
+
+
+def _transition(guard: Guard) -> Transition:
+    assert guard.transition is not None
+    return guard.transition
+
+
+def _wiring(equations: Equations, guard: Guard) -> tuple[str, str, str, frozenset[str], str]:
+    """Of a transition its machine, the states that it leaves and enters, its causes, and the contact that it needs."""
+    taken = _transition(guard)
+    machine = equations.machines[taken.machine]
+    contacts, guards = equations.contacts, equations.guards
+    causes = set[str]()
+    for kind, number in taken.causes:
+        if kind in ("closed", "opened"):
+            causes.add(contacts[number].name + (" opened" if kind == "opened" else ""))
+        elif guards[number] is guard:
+            causes.add(OWN)
+        elif kind == "taken":
+            other = _transition(guards[number])
+            states = equations.machines[other.machine].states
+            causes.add(f"{equations.machines[other.machine].name}: {states[other.source]} to {states[other.target]}")
+        else:
+            causes.add(guards[number].name)
+    needed = contacts[taken.contact].name if taken.contact >= 0 else ""
+    return machine.name, machine.states[taken.source], machine.states[taken.target], frozenset(causes), needed

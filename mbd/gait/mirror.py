@@ -6,7 +6,7 @@ z, y and x under which the mechanism is its own mirror image (`mbd.gait.alike`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-from mbd.equations.equations import Equations
+from mbd.equations.equations import Contact, Equations
 from mbd.errors import ModelError
 from mbd.gait.machines import image_faults, images
 from mbd.gait.reflection import Reflection
@@ -110,7 +110,7 @@ def mirror_of(equations: Equations, sides: Any, section: str = "") -> Mirror:
             sided += other != name
             if other not in names:
                 faults.append(f"mirror={(one, two)}: {kind} {name!r} has no partner {other!r}")
-    faults += image_faults(equations, (one, two))
+    faults += image_faults(equations, (one, two)) or _rule_faults(equations, (one, two))
     if not sided:
         faults.append(f"mirror={(one, two)}: no coordinate or contact has one of these words in its name")
     if faults:
@@ -118,6 +118,24 @@ def mirror_of(equations: Equations, sides: Any, section: str = "") -> Mirror:
     q, v, z = (_places(lists[kind], (one, two)) for kind in ("coordinate", "velocity", "state"))
     anchors, states = _anchor_places(equations, lists["contact"], (one, two))
     return Mirror((one, two), q, v, z, anchors, section=section, states=states)
+
+
+def _rule_faults(equations: Equations, sides: tuple[str, str]) -> list[str]:
+    """Contacts that open and close by other rules than their partners."""
+
+    def rules(contact: Contact, image: Callable[[str], str]) -> tuple[Any, ...]:
+        needed = image(contact.only_while) if isinstance(contact.only_while, str) else ""
+        opened = frozenset((image(name), late) for name, late in contact.when)
+        return contact.kind, contact.opens_on, opened, frozenset(map(image, contact.released_in)), needed
+
+    found = {contact.name: rules(contact, lambda name: name) for contact in equations.contacts}
+    images = {contact.name: rules(contact, lambda name: exchanged(name, sides)) for contact in equations.contacts}
+    pairs = [(name, exchanged(name, sides)) for name in found]
+    return [
+        f"mirror={sides}: release= or only_while= of {name!r} and {other!r} are not each other's image"
+        for name, other in pairs
+        if name <= other and other in found and images[name] != found[other]
+    ]
 
 
 def _places(names: Sequence[str], sides: tuple[str, str]) -> Numbers:

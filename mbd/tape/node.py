@@ -108,6 +108,11 @@ class Node:
     def __eq__(self, other: object) -> bool:
         if self is not other and isinstance(other, Node | int | float):
             raise TraceError("'==' on a traced value is not recorded; write mbd.where(abs(a - b) < tolerance, x, y)")
+        if isinstance(other, str):
+            raise TraceError(
+                f"a traced value is compared with the text {other!r}, which no number equals; laws know the state of "
+                "a mode by its number from 0: give a law for each state, {state: law} with by=, or compare that number"
+            )
         return self is other
 
     def __bool__(self) -> NoReturn:

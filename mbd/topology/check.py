@@ -337,13 +337,14 @@ def machine_faults(model: Description) -> list[str]:
                 )
         for name in (*word.parameters_by_state(), *word.held_parameters()):
             if name not in parameters:
-                found.append(f"'{word.name}' sets {name!r}: " + nearest(name, parameters, "parameter", "There are"))
+                known = parameters.keys() - word.stands_for().keys()
+                found.append(f"'{word.name}' sets {name!r}: " + nearest(name, known, "parameter", "There are"))
             elif name in geometry:
                 found.append(
                     f"'{word.name}' sets {name!r}, which bodies are made of; only parameters of forces, losses, "
                     "contacts and measures change at instants"
                 )
-    return found
+    return found or (parameter_check(model).stand_in_faults() if model.machines else [])
 
 
 def choice_faults(model: Description) -> list[str]:

@@ -381,6 +381,15 @@ def mode(*transitions: mbd.Transition, **more: Any) -> mbd.Mode:
 
 
 @pytest.mark.parametrize(("words", "message"), [
+    ([lambda j: mode(sets={"loss.coefficient": {"b": -0.5}}), lambda j: mbd.Damper(
+        "loss", mbd.Model("n").ground.origin, j.child, mbd.Viscous(0.1))], "'loss.coefficient.b': .* is negative"),
+    ([lambda j: mode(sets={"drive.u": {"b": 2.0}}), lambda j: mbd.Motor("drive", j, force=1.0, by="m")],
+     "'drive' has by='m', but nothing by state"),
+    ([lambda j: mode(T("a", "b", on="n: d"), T("b", "a", after=1.0)), lambda j: mbd.Mode(
+        "n", ("c", "d"), transitions=[T("c", "d", on="m: b"), T("d", "c", after=1.0)])], "'m: a to b' never happens"),
+    ([lambda j: mode(T("a", "b", on="n: c")), lambda j: mbd.Mode(
+        "n", ("c", "d"), transitions=[T("c", "d", after=1.0)])], "waits for 'n: c', which nothing else causes"),
+    ([lambda j: mode(), lambda j: mbd.Event("e", on="f"), lambda j: mbd.Event("f", on="e")], "'e' never happens"),
     ([lambda j: mode(T("a", "b", on="foor"))], "on: no contact, event or mode named 'foor'"),
     ([lambda j: mode(T("a", "b", after=1.0, only_while="m: c"))], "only_while: no contact or state named 'm: c'"),
     ([lambda j: mode(T("a", "b", when="rail.displcement"))], "no quantity named 'rail.displcement'"),
@@ -406,3 +415,26 @@ def test_bad_names_of_modes_are_errors_at_build(words: Any, message: str) -> Non
 
     with pytest.raises(ModelError, match=message):
         built()
+
+
+@pytest.mark.parametrize("wait", [-0.4, 0.0, 0.05])
+def test_a_remembered_time_that_is_not_positive_is_due_at_once(wait: float) -> None:
+    """States that last 0.3 s and the remembered time, by turns."""
+    model = mbd.Model("slider")
+    body = mbd.PointMass("body", mass=1.0)
+    model.connect(mbd.Prismatic("rail", model.ground.origin, body.origin))
+    stored = mbd.measure(lambda x, wait: wait + 0.0 * x, "rail.displacement", "m.wait")
+    changes = [T("a", "b", after=0.3), T("b", "a", after="m.stored")]
+    model.apply(mbd.Mode("m", ("a", "b"), transitions=changes, remembers={"stored": stored}, numbers={"wait": wait}))
+    run = mbd.simulate(model, mbd.assemble(model), mbd.HHT(), dt=0.01, until=1.0)
+    lasts = [0.3, max(wait, 0.0)] * 3
+    assert [event.time for event in run.events] == pytest.approx(np.cumsum(lasts)[: len(run.events)], abs=1e-14)
+    assert len(run.events) == (5 if wait > 0.0 else 6)
+
+
+def test_a_law_that_compares_the_number_of_a_state_with_its_name_is_an_error() -> None:
+    model = knee()
+    hinge = next(joint for joint in model.joints if joint.name == "knee")
+    model.apply(mbd.Motor("other", hinge, lambda s: mbd.where(s == "pull", 1.0, 0.0), arguments=["phase"]))
+    with pytest.raises(mbd.TraceError, match="compared with the text 'pull', which no number equals"):
+        mbd.assemble(model)

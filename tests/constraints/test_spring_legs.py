@@ -91,3 +91,13 @@ def test_numbers_without_a_meaning_are_refused_by_name(field, value, told):
     given = {"stiffness": 1e4, "length": 1.0, "touchdown_angle": 1.2} | {field: value}
     with pytest.raises(mbd.ModelError, match=rf"SpringLeg 'leg': {field}.*{told}"):
         mbd.SpringLeg("leg", mbd.PointMass("body", 1.0).origin, **given)
+
+
+def test_a_runner_who_falls_ends_by_name_as_the_hip_comes_down_to_the_ground():
+    model, body = mbd.Model("runner"), mbd.PointMass("body", MASS)
+    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model.constrain(mbd.SpringLeg("leg", body.origin, STIFFNESS, LENGTH, math.radians(68.0)))
+    slow = mbd.assemble(model, {"place.y": 1.0}, {"place.x": 0.3, "place.y": 0.0})
+    with pytest.raises(mbd.SimulationError, match="'leg' is not finite: its hip has come down to the ground") as caught:
+        mbd.simulate(model, slow, mbd.RungeKutta853(), dt=0.01, until=2.0)
+    assert 0.0 <= caught.value.run["place.y"][-1] < 0.1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -147,3 +148,62 @@ def test_a_parameter_of_one_side_is_refused_and_one_of_both_sides_is_taken(kind:
         if kind != "out of reach":
             assert step.faults({**step.values, name: 1.01 * value}), name
         assert not step.faults({**step.values, name: 1.01 * value, partner: 1.01 * value}), name
+
+
+def counting(on_left: str, on_right: str) -> Words:
+    """Each side's hip is held in the odd state of a mode; feet that strike make it odd and even."""
+
+    def words(side: str, other: str, parts: dict[str, Any]) -> list[Any]:
+        name = f"{side} count"
+        changes = [mbd.Transition("even", "odd", on=on_left), mbd.Transition("odd", "even", on=on_right)]
+        if side == "right":
+            changes = [mbd.Transition("odd", "even", on=on_left), mbd.Transition("even", "odd", on=on_right)]
+        held = mbd.Motor(f"{side} hold", parts["joint"], torque={"odd": lambda q: -2.0 * q}, by=name,
+                         arguments=[f"{side} hip.angle"])  # fmt: skip
+        return [mbd.Mode(name, ("even", "odd"), start="even" if side == "left" else "odd", transitions=changes), held]
+
+    return words
+
+
+def shared(side: str, other: str, parts: dict[str, Any]) -> list[Any]:
+    """One mode for both sides, whose states do not tell a side though its causes do."""
+    changes = [mbd.Transition("even", "odd", on="right foot"), mbd.Transition("odd", "even", on="left foot")]
+    held = mbd.Motor(f"{side} hold", parts["joint"], torque={"odd": lambda q: -2.0 * q}, by="count",
+                     arguments=[f"{side} hip.angle"])  # fmt: skip
+    return [held, *([mbd.Mode("count", ("even", "odd"), transitions=changes)] if side == "left" else [])]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        counting("left foot", "right foot"), counting("right foot", "left foot"),
+        counting("left foot opened", "right foot opened"),
+    ],
+)  # fmt: skip
+def test_a_mirrored_gait_whose_modes_are_images_repeats_its_step(words: Words) -> None:
+    model, start = walker(words)
+    gait = mbd.limit_cycle(model, start, section="right foot", mirror=MIRROR)
+    strikes = [0.0, *(event.time for event in gait.walk(4).events if event.kind == "closed")]
+    steps = [late - early for early, late in pairwise(strikes)]
+    assert steps == pytest.approx([gait.period] * 4, abs=1e-8)
+
+
+@pytest.mark.parametrize("words", [counting("left foot opened", "right foot"), shared])
+def test_a_mirror_names_the_transition_whose_image_has_another_cause(words: Words) -> None:
+    model, start = walker(words)
+    with pytest.raises(
+        mbd.ModelError, match="count: odd to even' on 'left foot(| opened)' has no partner on 'right foot"
+    ):
+        mbd.limit_cycle(model, start, section="right foot", mirror=MIRROR)
+
+
+def test_a_mirror_takes_no_event_or_release_rule_of_one_side() -> None:
+    model, start = walker(nothing)
+    model.constrain(mbd.Event("kick", on="right foot", reset={"trunk.y.rate": lambda n: n["trunk.y.rate"]}))
+    with pytest.raises(mbd.ModelError, match="'kick' on 'right foot' has no partner on 'left foot'"):
+        mbd.limit_cycle(model, start, section="right foot", mirror=MIRROR)
+    other = model.without("kick", "left foot")
+    foot = mbd.touchdown(model.bodies["left leg"].end)
+    other.constrain(mbd.Unilateral("left foot", foot, release=mbd.When("right foot", may_pull=False)))
+    with pytest.raises(mbd.ModelError, match="release= or only_while= of 'left foot' and 'right foot'"):
+        mbd.limit_cycle(other, start, section="right foot", mirror=MIRROR)

@@ -220,3 +220,30 @@ def test_contacts_that_are_none_and_strategies_that_locate_no_strike_are_refused
     hub = model.bodies["hub"]
     model.constrain(mbd.Impulse("lost", hub.origin, direction=(0, 1), size=1.0, on="spok 1"))
     assert "spoke 1" in " ".join(model.check())
+
+
+def ball(size, order, arguments=("t",)):
+    """A ball that falls on a floor with restitution and is kicked there."""
+    model, body = mbd.Model("ball"), mbd.PointMass("ball", 1.0)
+    model.connect(mbd.Translation("flight", model.ground.origin, body.origin, axes="y"))
+    model.constrain(mbd.Unilateral("floor", mbd.height(body.origin), restitution=0.5))
+    kick = mbd.Impulse("kick", body.origin, size, "floor", direction=(0, 1), order=order, arguments=arguments)
+    model.constrain(kick)
+    return model, mbd.assemble(model, {"flight.y": 0.5})
+
+
+def test_a_contact_that_is_pressed_on_after_each_strike_ends_by_name():
+    """v ↦ e |v| − P has no end at one instant: no limit of it is taken, as of strikes alone."""
+    with pytest.raises(mbd.SimulationError, match="'kick' pushed.*let the impulse act with order='before' or 'with'"):
+        mbd.simulate(*ball(-1.0, "after"), mbd.RungeKutta853(), dt=0.01, until=0.6)
+    for order in "before", "with":
+        run = mbd.simulate(*ball(-1.0, order), mbd.RungeKutta853(), dt=0.01, until=0.4)
+        speed = np.sqrt(9.81) + 1.0  # restitution acts on the velocity with the impulse
+        instant = np.sqrt(1.0 / 9.81)
+        assert run["flight.y.rate"][-1] == pytest.approx(0.5 * speed - 9.81 * (0.4 - instant), abs=1e-12)
+
+
+def test_an_impulse_without_a_number_is_named():
+    model, start = ball(lambda y: mbd.sqrt(y - 1.0), "before", ["flight.y"])
+    with pytest.raises(mbd.SimulationError, match="size of impulse 'kick' is not finite"):
+        mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.6)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import field
 
-from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode
+from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode, require_use
 from mbd.bodies.given import NumberByMode
 from mbd.bodies.scope import Scope
 from mbd.dataclass import dataclass
@@ -30,6 +30,7 @@ class Viscous(DissipationFunction):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficient", number_by_mode(self.coefficient, self.by, "coefficient of Viscous"))
+        require_use(self.by, "Viscous", self.coefficient)
 
     def fields(self) -> dict[str, float]:
         """`coefficient`."""

@@ -13,7 +13,7 @@ from mbd.kernel.contact.impact import impact
 from mbd.kernel.records import Contacts, Switching
 from mbd.kernel.stepping.restart import evaluate
 
-__all__ = ["AFTER", "BEFORE", "BESIDE", "push"]
+__all__ = ["AFTER", "BEFORE", "BESIDE", "presses", "push"]
 
 BEFORE, BESIDE, AFTER = 0, 1, 2
 """Orders of impulses, as `mbd.constraints.impulse.ORDERS` has them."""
@@ -22,6 +22,14 @@ BEFORE, BESIDE, AFTER = 0, 1, 2
 def is_pushed(K: Contacts, i: int, order: int) -> bool:
     """Whether impulse i acts now: its contact closes, or lies on its ground and takes part in an impact."""
     return bool(K.impulse_order[i] == order and K.closing[K.impulse_contact[i]] == 1)
+
+
+def presses(K: Switching, c: int) -> bool:
+    """Whether an impulse follows each strike of contact c, so that strikes at one instant have no limit."""
+    found = False
+    for i in range(K.n_impulses):
+        found = found or (K.impulse_contact[i] == c and K.impulse_order[i] == AFTER)
+    return found
 
 
 def push(K: Switching, order: int) -> int:

@@ -27,7 +27,7 @@ def find_due(K: Guards) -> None:
             continue
         if K.side[e] > 0.0:  # it has passed while its condition did not hold
             continue
-        due = K.time - K.guards0[K.at_user + e]
+        due = K.time - min(K.guards0[K.at_user + e], 0.0)
         if K.due_guard < 0 or due < K.due_time:
             K.due_time = due
             K.due_guard = e
@@ -135,12 +135,16 @@ def open_released(K: Switching) -> None:
 def settle_fresh(K: Switching) -> None:
     """The sides of the guards of machines that have changed, by their values after the restart: K.guards0.
 
-    That of its rate where the value is round-off; where that leads nowhere in a step, the first steps that do.
+    That of its rate where the value is round-off; where that leads nowhere in a step, the first steps that do. Timers
+    are still to come: one whose time is not positive is due at once.
     """
     for e in range(K.n_guards):
         if K.fresh[e] == 0:
             continue
         K.fresh[e] = 0
+        if K.guard_timed[e] == 1:
+            K.side[e] = -1.0
+            continue
         value = K.guards0[K.at_user + e]
         rate = K.guards0[K.at_user_rate + e]
         doubt = guard_round_off(K, e, K.time, K.q, K.y)

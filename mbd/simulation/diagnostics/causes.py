@@ -174,6 +174,12 @@ class Words:
         return "nothing in the scheme damps forces that alternate: take mbd.HHT(0.05); "
 
     @property
+    def pressing(self) -> str:
+        """What to try where impulses of the user's press contacts on after their strikes."""
+        orders = {impulse.order for impulse in self.stepper.mechanism.equations.impulses}
+        return "let the impulse act with order='before' or 'with'; " if 2 in orders else ""
+
+    @property
     def why_singular(self) -> str:
         """What makes a Newton matrix singular, and what to try: rows, the mass matrix, or the step."""
         v, system, stepper = self.v, self.stepper.system, self.stepper
@@ -260,6 +266,9 @@ class Words:
         cause = first_cause(equations, inputs, self.places)
         if cause is None and not np.isfinite(evaluate(list(equations.balance), inputs)).all():
             return "the inertia forces are not finite (velocities have run away)"
+        for impulse in equations.impulses if cause is None else ():
+            if not np.isfinite(evaluate(list(impulse.vector), inputs)).all():
+                return f"the size of impulse {impulse.name!r} is not finite; check its roots, logarithms, divisions"
         return cause or "a derivative of a force or constraint is not finite"
 
     @cached_property
@@ -394,8 +403,8 @@ CAUSES = (
     Cause((codes.CHATTER, codes.NO_IMPACT), "{x.grip}", when=lambda x: x.grip),
     Cause(
         (codes.CHATTER,), "{x.switches} at one instant: {x.last_events}; they follow each other without motion",
-        "{x.undamped}{x.sticking}give a contact a release rule, friction or a penalty law, or an event a reset that "
-        "leaves zero",
+        "{x.undamped}{x.sticking}{x.pressing}give a contact a release rule, friction or a penalty law, an event a "
+        "reset that leaves zero, or a transition another cause",
     ),
     Cause(
         (codes.NO_IMPACT,),
@@ -436,5 +445,5 @@ def cause_of(x: Words, status: int) -> str:
 
 def last_events(events: Sequence[EventRecord]) -> str:
     """The last switches, oldest first."""
-    shown = [f"{event.name!r} {'crossed' if event.kind == 'event' else event.kind}" for event in events[-6:]]
+    shown = [f"{event.name!r} {'happened' if event.kind == 'event' else event.kind}" for event in events[-6:]]
     return ", ".join(shown) or "no contact changed"

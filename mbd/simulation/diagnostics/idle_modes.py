@@ -60,6 +60,8 @@ def _reason(run: RunData, columns: ModelColumns, record: Record, guard: Guard, m
         waited = [_cause(run, kind, number) for kind, number in guard.transition.causes]
         return f"{title!r} waited for {' or '.join(dict.fromkeys(waited)) or 'what never happened'}"
     rows, values = _value(columns, guard, record)
+    if guard.is_timer and values[0] > 0.0:
+        return f"the timer of {title!r} had ended before: give a time > 0"
     if guard.is_timer:
         return f"the timer of {title!r} ended while its only_while= did not hold"
     if np.all(values > 0.0) or np.all(values < 0.0):

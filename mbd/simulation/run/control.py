@@ -109,7 +109,11 @@ def _not_reset(equations: Equations, wanted: Iterable[str], what: str) -> list[s
     for name in wanted:
         if _spelled(name, places) in places:
             continue
-        if name in equations.output_names():
+        if any(name == machine.name or name.startswith(f"{machine.name}.") for machine in equations.machines):
+            faults.append(
+                f"{what}{name!r} is held by a mode or a sampled law; let a mbd.Transition on= the event change it"
+            )
+        elif name in equations.output_names():
             faults.append(
                 f"{what}{name!r} is a result, such as what a cut joint or a place has, and cannot be set; reset the "
                 f"coordinates and rates that it follows from: {', '.join(map(repr, known[:12]))}"
