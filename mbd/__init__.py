@@ -108,6 +108,7 @@ if TYPE_CHECKING:
         TorsionSpring as TorsionSpring,
         ViaPoint as ViaPoint,
         WrappingCylinder as WrappingCylinder,
+        WrappingEllipsoid as WrappingEllipsoid,
         WrappingSphere as WrappingSphere,
         bias_forces as bias_forces,
         mass_matrix as mass_matrix,
@@ -248,7 +249,7 @@ _HOMES = {
     "mbd.errors": "AssemblyError CapabilityError GaitError MbdError MbdWarning MemoryLimitError ModelError "
     "SimulationError TraceError TrajectoryError UnknownNameError",
     "mbd.forces": "Applied Bushing DCMotor Damper Motor Muscle PolynomialPath Potential Rotor Samples Spring "
-    "TabulatedSpring TorsionSpring ViaPoint WrappingCylinder WrappingSphere bias_forces mass_matrix",
+    "TabulatedSpring TorsionSpring ViaPoint WrappingCylinder WrappingEllipsoid WrappingSphere bias_forces mass_matrix",
     "mbd.gait.basin.basin": "basin",
     "mbd.gait.basin.result": "Basin",
     "mbd.gait.branch": "Branch branch",

@@ -49,6 +49,7 @@ WORDS = {
     mbd.ViaPoint: (ROD.end,),
     mbd.WrappingSphere: (ROD.end, 0.05),
     mbd.WrappingCylinder: (ROD.end, 0.05, "z"),
+    mbd.WrappingEllipsoid: (ROD.end, (0.05, 0.04, 0.03)),
     mbd.Mode: ("phase", ("swing", "stance")),
     mbd.SampledLaw: ("PD", 0.01, {"u": lambda angle: -angle}, ("hinge.angle",)),
     mbd.Transition: ("swing", "stance", "foot"),

@@ -17,7 +17,8 @@ GROUPS = {
     "touchdown rolling_touchdown profile_touchdown disk_touchdown sphere_touchdown Plane Ball height flexion "
     "extension cone twist distance separation measure",
     "Forces": "Spring SpringLeg Damper Bushing TorsionSpring TabulatedSpring Motor DCMotor Rotor Muscle ViaPoint "
-    "PolynomialPath WrappingSphere WrappingCylinder Applied Potential Samples mass_matrix bias_forces",
+    "PolynomialPath WrappingSphere WrappingCylinder WrappingEllipsoid Applied Potential Samples mass_matrix "
+    "bias_forces",
     "Functions": "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt hypot sign "
     "maximum minimum clip mod floor where pi",
     "Starts and runs": "assemble project State simulate Trajectory load batch Batch sweep Sweep latin_hypercube sobol",

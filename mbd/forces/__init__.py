@@ -7,7 +7,7 @@ from mbd.forces.damper import Damper
 from mbd.forces.dc_motor import DCMotor
 from mbd.forces.inertia import bias_forces, mass_matrix
 from mbd.forces.motor import Motor
-from mbd.forces.muscles import Muscle, PolynomialPath, ViaPoint, WrappingCylinder, WrappingSphere
+from mbd.forces.muscles import Muscle, PolynomialPath, ViaPoint, WrappingCylinder, WrappingEllipsoid, WrappingSphere
 from mbd.forces.potential import Potential
 from mbd.forces.rotor import Rotor
 from mbd.forces.samples import Samples
@@ -18,5 +18,6 @@ from mbd.forces.torsion_spring import TorsionSpring
 __all__ = [
     "Action", "Applied", "Bushing", "DCMotor", "Damper", "Force", "Motor", "Muscle", "PolynomialPath", "Potential",
     "Rotor", "Samples", "Spring", "TabulatedSpring", "TorsionSpring", "ViaPoint", "WrappingCylinder",
+    "WrappingEllipsoid",
     "WrappingSphere", "bias_forces", "mass_matrix",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Paths around spheres and cylinders: shortest of all ways, moment arms, lifting off, sides, two surfaces, runs."""
+"""Paths around surfaces: shortest of all ways, moment arms, lifting off, sides and ends, two surfaces, runs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize, root
 
 import mbd
 from mbd.forces.muscles.wrapping import taut
@@ -146,17 +147,97 @@ def test_two_spheres_share_a_path_that_leaves_every_plane():
     guess = np.array([[0.0, -1.0, 0.0], [0.3, -1.0, 0.0], [0.2, -0.7, -0.7], [0.3, -0.7, -0.7]])
     limits = {"type": "ineq", "fun": outside}
     best = minimize(whole, np.ravel(guess), constraints=limits, options={"ftol": 1e-16, "maxiter": 500})
-    assert min(outside(best.x)) > 0.0
+    assert min(outside(best.x)) > -1e-9
     assert length(P, S, *spheres) == pytest.approx(best.fun / 10.0, abs=1e-9)
     A = places(best.x)[1][0]
     slope = [(length(P + h, S, *spheres) - length(P - h, S, *spheres)) / 2e-6 for h in 1e-6 * np.eye(3)]
     np.testing.assert_allclose(slope, (P - A) / math.dist(P, A), atol=1e-5)
 
 
-@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+def geodesic(P, S, radii):
+    """Length of the geodesic that is tangent to the lines to both points: shot from the outline seen from P."""
+    p, squares = P / radii, radii**2
+    k = (S - P) / radii
+    foot = p - (p @ k) / (k @ k) * k
+    # the outline seen from P is a circle of the unit sphere, whose points an angle from the way around tells
+    u = foot - (foot @ p) / (p @ p) * p
+    u /= np.linalg.norm(u)
+    w = np.cross(p, u) / np.linalg.norm(p)
+    away = np.linalg.norm(p)
+
+    def shot(angle, arc):
+        T = radii * (p / away**2 + math.sqrt(1.0 - away**-2) * (math.cos(angle) * u + math.sin(angle) * w))
+        start = (T - P) / np.linalg.norm(T - P)
+
+        def slope(_, y):
+            normal = y[:3] / squares
+            return np.concatenate([y[3:], -(y[3:] ** 2 / squares).sum() / (normal @ normal) * normal])
+
+        end = solve_ivp(slope, (0.0, arc), np.concatenate([T, start]), rtol=1e-10, atol=1e-12).y[:, -1]
+        return np.linalg.norm(T - P), end[:3], end[3:]
+
+    def miss(x):
+        _, place, direction = shot(x[0], x[1])
+        return place + x[2] * direction - S
+
+    guess = (0.0, 0.5 * radii.mean(), np.linalg.norm(S / radii) * radii.mean())
+    found = root(miss, guess, tol=1e-9)
+    whole = shot(found.x[0], found.x[1])[0] + found.x[1] + found.x[2]
+    return whole if found.success and found.x[1] > 0.0 and found.x[2] > 0.0 else math.nan
+
+
+def test_a_path_around_an_ellipsoid_is_hardly_longer_than_the_geodesic():
+    """Radii that differ up to 1.5 times, by less than 1e-3 of their mean; of one radius it is the sphere's."""
+    ground, rng, seen = mbd.Model("m").ground, np.random.default_rng(3), 0
+    while seen < 25:
+        radii = rng.uniform(0.8, 1.2, size=3)
+        P, S = ((direction := rng.normal(size=3)) * rng.uniform(1.2, 3.0) / np.linalg.norm(direction) for _ in range(2))
+        ours = length(P, S, mbd.WrappingEllipsoid(ground.origin, tuple(radii)))
+        assert length(S, P, mbd.WrappingEllipsoid(ground.origin, tuple(radii))) == pytest.approx(ours, rel=1e-9)
+        alike = mbd.WrappingEllipsoid(ground.origin, (radii[0],) * 3)
+        assert length(P, S, alike) == pytest.approx(
+            length(P, S, mbd.WrappingSphere(ground.origin, radii[0])), rel=1e-12
+        )
+        foot = P - (P @ (S - P)) / ((S - P) @ (S - P)) * (S - P)
+        shortest_of_all = geodesic(P, S, radii) if 0.4 < np.linalg.norm(foot) < 0.7 else math.nan
+        if math.isnan(shortest_of_all) or ours < math.dist(P, S) + 1e-6:
+            continue
+        seen += 1
+        assert shortest_of_all - 1e-7 < ours < shortest_of_all + 1e-3
+
+
+def test_the_side_of_an_ellipsoid_is_that_of_its_path():
+    """A sphere with a side beside the closed form of both ways around; away from the surface the path is straight."""
+    ground, r, high = mbd.Model("m").ground, 0.5, 0.2
+    P, S = np.array((-2.0, high, 0.0)), np.array((2.5, high, 0.0))
+    for sense in 1.0, -1.0:
+        sided = mbd.WrappingEllipsoid(ground.origin, (r, r, r), side=(0.0, sense, 0.0))
+        flat = [math.hypot(x, high) for x in (2.0, 2.5)]
+        turn = sum(math.atan2(x, sense * high) - math.acos(r / away) for x, away in zip((2.0, 2.5), flat, strict=True))
+        expected = sum(math.sqrt(away**2 - r * r) for away in flat) + r * turn
+        assert length(P, S, sided) == pytest.approx(expected, rel=1e-12)
+        beside = [point + np.array((0.0, 0.4, 0.0)) for point in (P, S)]
+        assert length(*beside, sided) == pytest.approx(math.dist(*beside), rel=1e-15)
+
+
+def test_a_path_beyond_the_ends_of_a_cylinder_is_straight():
+    ground = mbd.Model("m").ground
+    short, endless = (mbd.WrappingCylinder(ground.origin, 0.3, length=size) for size in (1.0, None))
+    for z, inside in (0.0, True), (0.45, True), (0.55, False), (-0.6, False):
+        P, S = (-1.0, 0.1, z), (0.8, 0.0, z)
+        straight = math.dist(P, S)
+        assert length(P, S, endless) > straight + 1e-3
+        assert length(P, S, short) == pytest.approx(length(P, S, endless) if inside else straight, rel=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder", "ellipsoid"])
 def test_length_and_slope_are_continuous_where_the_path_lifts_off(kind):
     ground, r = mbd.Model("m").ground, 0.3
-    surface = (mbd.WrappingSphere if kind == "sphere" else mbd.WrappingCylinder)(ground.origin, r)
+    surface = {
+        "sphere": mbd.WrappingSphere(ground.origin, r),
+        "cylinder": mbd.WrappingCylinder(ground.origin, r),
+        "ellipsoid": mbd.WrappingEllipsoid(ground.origin, (0.25, r, 0.4)),
+    }[kind]
 
     def at(height):
         return length((-1.0, height, 0.2), (0.8, 0.25, -0.1), surface)
@@ -201,6 +282,17 @@ SURFACES = {
     "sphere": lambda model, base: (mbd.WrappingSphere(base.origin, 0.025),),
     "cylinder": lambda model, base: (mbd.WrappingCylinder(base.origin.turned(0.2, (1.0, 0.0, 0.0)), 0.025),),
     "side": lambda model, base: (mbd.WrappingCylinder(base.origin, 0.025, side=(-1.0, 0.0, 0.0)),),
+    "ends": lambda model, base: (mbd.WrappingCylinder(base.origin, 0.025, side=(-1.0, 0.0, 0.0), length=0.2),),
+    "ellipsoid": lambda model, base: (
+        mbd.WrappingEllipsoid(base.origin.turned(0.4, (1.0, 2.0, 0.0)), (0.024, 0.028, 0.035)),
+    ),
+    "ellipsoid with a side": lambda model, base: (
+        mbd.WrappingEllipsoid(base.origin, (0.024, 0.026, 0.03), side=(-1.0, 0.0, 0.0)),
+    ),
+    "ellipsoid and sphere": lambda model, base: (
+        mbd.WrappingEllipsoid(model.ground.point(-0.012, 0.1, 0.0), (0.02, 0.025, 0.03)),
+        mbd.WrappingSphere(base.origin, 0.025),
+    ),
     "two": lambda model, base: (
         mbd.WrappingCylinder(model.ground.point(-0.012, 0.1, 0.0), 0.02),
         mbd.WrappingSphere(base.origin, 0.025),
@@ -274,6 +366,13 @@ def test_a_radius_is_a_parameter_and_must_be_positive():
     [
         (lambda g: mbd.WrappingSphere(g.origin, 0.0), "radius of a WrappingSphere must be positive"),
         (lambda g: mbd.WrappingCylinder(g.origin, 0.1, side=(0.0, 0.0, 1.0)), "a direction across its z axis"),
+        (lambda g: mbd.WrappingCylinder(g.origin, 0.1, length=-0.1), "length of a WrappingCylinder must be positive"),
+        (
+            lambda g: mbd.WrappingEllipsoid(g.origin, (0.1, 0.0, 0.1)),
+            "the radius along y of a WrappingEllipsoid",
+        ),
+        (lambda g: mbd.WrappingEllipsoid(g.origin, 0.1), "radii of a WrappingEllipsoid"),
+        (lambda g: mbd.WrappingEllipsoid(g.origin, (0.1,) * 3, (0, 0, 0)), "is a direction, such as"),
         (lambda g: mbd.WrappingSphere("knee", 0.1), "frame of a WrappingSphere"),
         (lambda g: mbd.Muscle("m", (g.origin, mbd.WrappingSphere(g.origin, 0.1)), 1.0, 0.1, 0.1), "between points"),
     ],

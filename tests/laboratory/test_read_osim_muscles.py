@@ -71,6 +71,43 @@ ROD = """<WrapCylinder name="rod"><xyz_body_rotation>0.1 0.2 0.3</xyz_body_rotat
 <quadrant>+x</quadrant><radius>0.025</radius><length>0.2</length></WrapCylinder>"""
 
 
+EGG = """<WrapEllipsoid name="egg"><xyz_body_rotation>0.1 0.2 0.3</xyz_body_rotation>
+<translation>0.01 -0.4 0</translation>
+<quadrant>-y</quadrant><dimensions>0.03 0.02 0.025</dimensions></WrapEllipsoid>"""
+
+
+@pytest.mark.parametrize(
+    ("surface", "expected"),
+    [
+        (EGG, ("WrappingEllipsoid", (0.03, 0.02, 0.025), (0.0, -1.0, 0.0))),
+        (SPHERE.replace("all", "+z").replace("knob", "egg"), ("WrappingEllipsoid", (0.03,) * 3, (0.0, 0.0, 1.0))),
+        (ROD.replace("rod", "egg"), ("WrappingCylinder", 0.2, (1.0, 0.0, 0.0))),
+    ],
+)
+def test_surfaces_have_their_sizes_and_sides(surface, expected, tmp_path):
+    text = with_muscle("40000", muscles("40000", wrap=around("egg", "3 4")))
+    found = mbd.read_model(written(tmp_path, with_surfaces(text, surface)))
+    (own,) = [point for point in found.muscles["vasti"].path.points if "Wrapping" in type(point).__name__]
+    sizes = own.length if expected[0] == "WrappingCylinder" else own.radii
+    assert (type(own).__name__, sizes, own.side) == expected
+    planes = any("around ellipsoids lie in planes" in line for line in found.report.approximated)
+    assert planes is (expected[0] == "WrappingEllipsoid")
+    assert any("a point within a surface" in line for line in found.report.approximated)
+
+
+def test_a_surface_bends_the_piece_of_a_path_that_is_nearest_by_joints(tmp_path):
+    """One of the shank, of which no piece at the hip may take hold, whatever its range."""
+    text = with_muscle("40000", muscles("40000", wrap=around("rod")))
+    for body in "femur", "tibia":
+        found = mbd.read_model(written(tmp_path, with_surfaces(text, ROD, body)))
+        path = found.muscles["vasti"].path.points
+        bodies = [(point.frame if hasattr(point, "frame") else point).body.name for point in path]
+        kinds = ["Wrapping" in type(point).__name__ for point in path]
+        for k in (k for k, wraps in enumerate(kinds) if wraps):
+            beside = {bodies[k - 1], bodies[k + 1]}
+            assert body in beside and beside != {body}
+
+
 @pytest.mark.parametrize("version", FORMATS)
 @pytest.mark.parametrize(("name", "surface"), [("knob", SPHERE), ("rod", ROD)])
 def test_a_path_goes_around_the_surfaces_of_bodies(version, name, surface, tmp_path):
@@ -86,7 +123,7 @@ def test_a_path_goes_around_the_surfaces_of_bodies(version, name, surface, tmp_p
     frame = femur.point(0.01, -0.4, 0.0) if name == "knob" else femur.point(0.02, -0.39, 0.0)
     for k, axis in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))):
         frame = frame.turned(0.1 * (k + 1), axis)
-    own = mbd.WrappingSphere(frame, 0.03) if name == "knob" else mbd.WrappingCylinder(frame, 0.025, side=(1, 0, 0))
+    own = mbd.WrappingSphere(frame, 0.03) if name == "knob" else mbd.WrappingCylinder(frame, 0.025, (1, 0, 0), 0.2)
     rigid = {"tendon": "rigid", "activation_time": 0.0, "deactivation_time": 0.0}
     paths = {"theirs": path, "ours": (*path[:3], own, path[4]), "straight": (*path[:3], path[4])}
     muscles_of = [mbd.Muscle(name, points, 1.0, 0.1, 0.1, **rigid) for name, points in paths.items()]
@@ -110,8 +147,9 @@ def test_surfaces_that_paths_name_must_be_there(tmp_path):
     assert not any("Wrapping" in type(point).__name__ for point in found.muscles["vasti"].path.points)
     odd = mbd.read_model(written(tmp_path, with_surfaces(text, ROD.replace("+x", "z"))))
     assert any("not on its side 'z'" in line for line in odd.report.approximated)
-    assert any("wrap beyond their lengths too: 'rod' (0.2 m)" in line for line in odd.report.approximated)
-    assert not any("no ends" in line for line in found.report.approximated)
+    egg = "<WrapEllipsoid name='rod'><dimensions>0.1 0 0.1</dimensions></WrapEllipsoid>"
+    with pytest.raises(mbd.ModelError, match="needs a radius above 0 m, got 0"):
+        mbd.read_model(written(tmp_path, with_surfaces(text, egg)))
 
 
 @pytest.mark.parametrize("version", FORMATS)
@@ -137,10 +175,17 @@ def test_a_path_has_the_length_of_its_points(version, tmp_path):
         assert state["vasti.length"] == pytest.approx(length, abs=1e-14)
 
 
+def test_a_point_that_is_on_the_path_at_one_angle_alone_is_left_out(tmp_path):
+    text = with_muscle("40000", muscles("40000")).replace("<range>-2 0.2</range>", "<range>0.1 0.1</range>")
+    found = mbd.read_model(written(tmp_path, text))
+    assert len(found.muscles["vasti"].path.points) == 3
+    assert any("point '2' of muscle 'vasti'" in line for line in found.report.left_out)
+
+
 def test_what_is_not_kept_is_said(tmp_path):
-    text = with_muscle("40000", muscles("40000", "DeGrooteFregly2016Muscle", around("egg", "1 2")))
-    found = mbd.read_model(written(tmp_path, with_surfaces(text, "<WrapEllipsoid name='egg'/>")))
-    assert any("around <WrapEllipsoid> go straight" in line for line in found.report.approximated)
+    text = with_muscle("40000", muscles("40000", "DeGrooteFregly2016Muscle", around("ring", "1 2")))
+    found = mbd.read_model(written(tmp_path, with_surfaces(text, "<WrapTorus name='ring'/>")))
+    assert any("around <WrapTorus> go straight" in line for line in found.report.approximated)
     assert found.muscles["vasti"].damping == 0.0
     assert "1 muscles" in " ".join(found.report.understood)
     off = muscles("40000", more="<appliesForce>false</appliesForce>")

@@ -8,7 +8,7 @@ from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.errors import ModelError
-from mbd.forces.muscles import Muscle, ViaPoint
+from mbd.forces.muscles import Muscle, ViaPoint, WrappingEllipsoid
 from mbd.laboratory.models.osim_elements import (
     flag_of,
     listed,
@@ -79,9 +79,17 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
         report.approximated.append(
             f"paths around {kind} go straight, so that their moment arms differ: {listed(dict.fromkeys(muscles))}"
         )
-    ends = [f"{name!r} ({size:g} m)" for name, size in surfaces.endless.items() if name in surfaces.used]
-    if ends:
-        report.approximated.append(f"cylinders have no ends, paths wrap beyond their lengths too: {', '.join(ends)}")
+    round_ones = [name for name in surfaces.used if isinstance(surfaces.known[name], WrappingEllipsoid)]
+    if round_ones:
+        report.approximated.append(
+            f"paths around ellipsoids lie in planes, longer than the shortest ones by less than a thousandth of the "
+            f"radii most of the time: {listed(sorted(round_ones))}"
+        )
+    if surfaces.used:
+        report.approximated.append(
+            "a path that begins or ends at a point within a surface goes on from the nearest point on it, not straight "
+            "with a jump"
+        )
     if others:
         report.approximated.append(f"curves of De Groote and Fregly stand for others: {listed(others)}")
     if slow:
@@ -133,6 +141,12 @@ def _points(file: OsimFile, path: Element, muscle: str) -> Iterator[Frame | ViaP
         if element.tag == "ConditionalPathPoint":
             joint, _ = _joint(file, element, text_of(element, "socket_coordinate", text_of(element, "coordinate", "-")))
             low, high = numbers_of(element, "range", 2)
+            if low == high:
+                file.report.left_out.append(
+                    f"point {plain(element.get('name'))!r} of muscle {muscle!r}, which is on the path at one value of "
+                    f"{joint.name!r} alone"
+                )
+                continue
             yield ViaPoint(place, joint, (low, high))
         elif element.tag == "PathPoint":
             yield place

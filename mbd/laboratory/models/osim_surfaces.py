@@ -8,9 +8,9 @@ from dataclasses import field
 
 import numpy as np
 
-from mbd.bodies.base import Body
+from mbd.bodies.base import Body, Frame
 from mbd.dataclass import dataclass
-from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingSphere, WrappingSurface
+from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingEllipsoid, WrappingSphere, WrappingSurface
 from mbd.laboratory.models.osim_elements import flag_of, number_of, numbers_of, objects_in, plain, text_of
 from mbd.laboratory.models.osim_file import OsimFile, framed
 from mbd.laboratory.models.osim_joints import turned
@@ -18,8 +18,11 @@ from mbd.laboratory.models.xml import Element
 
 __all__ = ["Surfaces", "surfaces_of"]
 
-SIDES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0)}
-"""Sides of a cylinder on which a path stays."""
+SIDES = {
+    "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
+}  # fmt: skip
+"""Sides of a surface on which a path stays."""
 ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -35,8 +38,6 @@ class Surfaces:
     """By kind, muscles whose path passes a surface of it straight."""
     used: set[str] = field(default_factory=set)
     """Names of those that paths pass."""
-    endless: dict[str, float] = field(default_factory=dict)
-    """Lengths of cylinders, which have no ends here, by name [m]."""
 
     def between(self, path: Element, muscle: str, bodies: Sequence[Body]) -> list[list[WrappingSurface]]:
         """Surfaces after each point of a path but the last, in the order in which the path meets them.
@@ -58,10 +59,13 @@ class Surfaces:
                 raise element.wrong(f"of muscle {muscle!r} names the surface {name!r}, which no body has")
             surface = self.known[name]
             first, last = (int(value) for value in numbers_of(element, "range", 2, (-1.0, -1.0)))
-            reach = range(max(first, 1) - 1, (last if last >= 1 else len(bodies)) - 1)
-            for k in reach:
-                # what moves with the surface does not come to touch it
-                if k < len(found) and not bodies[k] is bodies[k + 1] is surface.frame.body:
+            reach = range(max(first, 1) - 1, min(last if last >= 1 else len(bodies), len(bodies)) - 1)
+            # what moves with the surface does not come to touch it
+            moving = [k for k in reach if not bodies[k] is bodies[k + 1] is surface.frame.body]
+            # a surface bends one piece of the path: of several those that the fewest joints are between
+            apart = {k: sum(self._joints_to(surface, bodies[end]) for end in (k, k + 1)) for k in moving}
+            for k in moving:
+                if apart[k] == min(apart.values()):
                     found[k].append(surface)
                     self.used.add(name)
         for k, surfaces in enumerate(found):
@@ -69,6 +73,9 @@ class Surfaces:
                 chains = [self._chain(bodies[end]) for end in (k, k + 1)]
                 surfaces.sort(key=lambda surface: self._place(surface, *chains))
         return found
+
+    def _joints_to(self, surface: WrappingSurface, body: Body) -> int:
+        return _joints_between(self._chain(surface.frame.body), self._chain(body))
 
     def _place(self, surface: WrappingSurface, first: list[Body], last: list[Body]) -> int:
         """Joints to the first point less those to the last point."""
@@ -91,7 +98,7 @@ def _joints_between(a: list[Body], b: list[Body]) -> int:
 
 
 def surfaces_of(file: OsimFile) -> Surfaces:
-    """Spheres and cylinders of bodies and the ground; others by the kind that they are."""
+    """Spheres, cylinders and ellipsoids of bodies and the ground; others by the kind that they are."""
     found = Surfaces({}, {}, file)
     owners = [(file.body("ground"), ground) for ground in file.source.all("Ground")]
     for element in objects_in(file.source, "BodySet"):
@@ -101,7 +108,7 @@ def surfaces_of(file: OsimFile) -> Surfaces:
             name = element.get("name")
             if name in found.known or name in found.unread:
                 continue  # paths mean the first one
-            if element.tag not in ("WrapSphere", "WrapCylinder"):
+            if element.tag not in ("WrapSphere", "WrapCylinder", "WrapEllipsoid"):
                 found.unread[name] = f"<{element.tag}>"
                 continue
             if not flag_of(element, "active", True):
@@ -110,22 +117,30 @@ def surfaces_of(file: OsimFile) -> Surfaces:
             turn = turned(numbers_of(element, "xyz_body_rotation", 3, ORIGIN))
             place = np.array(numbers_of(element, "translation", 3, ORIGIN))
             frame = framed(body, f"{name} surface", place, turn)
-            radius = number_of(element, "radius")
-            if not 0.0 < radius < math.inf:
-                raise element.wrong(f"{name!r} needs a radius above 0 m, got {radius:g}")
-            side = text_of(element, "quadrant", "all").lower().lstrip("+")
-            if element.tag == "WrapSphere":
-                found.known[name] = WrappingSphere(frame, radius)
-                _report_side(file, name, "sphere", side, ("all",))
-            else:
-                found.known[name] = WrappingCylinder(frame, radius, SIDES.get(side))
-                found.endless[name] = number_of(element, "length", math.inf)
-                _report_side(file, name, "cylinder", side, ("all", *SIDES))
+            found.known[name] = _surface(found, element, frame, name)
     return found
 
 
-def _report_side(file: OsimFile, name: str, kind: str, side: str, kept: tuple[str, ...]) -> None:
-    if side not in kept:
-        file.report.approximated.append(
-            f"{kind} {name!r} is wrapped around on the shorter side, not on its side {side!r}"
+def _surface(found: Surfaces, element: Element, frame: Frame, name: str) -> WrappingSurface:
+    """A sphere, one with a side as an ellipsoid, a cylinder or an ellipsoid."""
+    given = text_of(element, "quadrant", "all").lower().lstrip("+")
+    side = SIDES.get(given)
+    if element.tag == "WrapEllipsoid":
+        sizes = numbers_of(element, "dimensions", 3)
+    else:
+        sizes = (number_of(element, "radius"),) * 3
+    if not all(0.0 < size < math.inf for size in sizes):
+        raise element.wrong(f"{name!r} needs a radius above 0 m, got {min(sizes):g}")
+    kind = element.tag.removeprefix("Wrap").lower()
+    if kind == "cylinder" and side is not None and side[2]:
+        side = None
+    if given != "all" and side is None:
+        found.file.report.approximated.append(
+            f"{kind} {name!r} is wrapped around on the shorter side, not on its side {given!r}"
         )
+    if kind == "cylinder":
+        length = number_of(element, "length", math.inf)
+        return WrappingCylinder(frame, sizes[0], side, length if 0.0 < length < math.inf else None)
+    if kind == "sphere" and side is None:
+        return WrappingSphere(frame, sizes[0])
+    return WrappingEllipsoid(frame, sizes, side)

@@ -15,7 +15,7 @@ from mbd.bodies.marker import Marker
 from mbd.errors import ModelError
 from mbd.forces.muscles import Muscle
 from mbd.forces.muscles.paths import PointPath
-from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingSurface
+from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingEllipsoid, WrappingSurface
 from mbd.joints.cylindrical import Cylindrical
 from mbd.joints.free import Free
 from mbd.joints.planar import Planar
@@ -56,7 +56,7 @@ def osim_of(model: Any) -> tuple[str, ImportReport]:
     surfaces: dict[str, list[str]] = {}
     for force in model.forces:
         simple = isinstance(force, Muscle) and isinstance(force.path, PointPath)
-        if simple and all(isinstance(point, Frame | WrappingSurface) for point in force.path.points):
+        if simple and all(isinstance(point, Frame) or _is_writable(point) for point in force.path.points):
             muscles.append(_muscle(force, names, values, surfaces))
         else:
             rest.append(f"{type(force).__name__} {force.name!r}")
@@ -206,20 +206,30 @@ def _surfaces(known: dict[str, list[str]], body: str) -> str:
     return f"<WrapObjectSet><objects>{own}</objects></WrapObjectSet>" if own else ""
 
 
-def _surface(surface: WrappingSurface, name: str, radius: float, values: dict[str, float]) -> str:
-    """A sphere, or a cylinder about z whose side is x."""
+def _is_writable(point: Any) -> bool:
+    """Whether a point of a path is a surface that the format has: sides of ellipsoids are those of their axes."""
+    if isinstance(point, WrappingEllipsoid) and point.side is not None:
+        return sorted(map(abs, point.side)) == [0.0, 0.0, 1.0]
+    return isinstance(point, WrappingSurface)
+
+
+def _surface(surface: WrappingSurface, name: str, owner: str, values: dict[str, float]) -> str:
+    """A sphere, a cylinder about z whose side is x, or an ellipsoid."""
     place, R = place_of(surface.frame, values)
-    side, more = "all", ""
+    sizes = [values.get(f"{owner}.{size}", value) for size, value in surface.sizes.items()]
+    tag, side, more = "WrapSphere", "all", f"<radius>{_text(sizes[0])}</radius>"
     if isinstance(surface, WrappingCylinder):
-        more = f"<length>{_text(CYLINDER_LENGTH)}</length>"
+        tag, more = "WrapCylinder", f"{more}<length>{_text([*sizes, CYLINDER_LENGTH][1])}</length>"
         if surface.side is not None:
             x, y, _ = surface.side
             side, R = "x", R @ np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])
-    tag = "WrapCylinder" if isinstance(surface, WrappingCylinder) else "WrapSphere"
+    elif isinstance(surface, WrappingEllipsoid):
+        tag, more = "WrapEllipsoid", f"<dimensions>{_text(sizes)}</dimensions>"
+        for axis, value in zip("xyz", surface.side or (0.0,) * 3, strict=True):
+            side = {1.0: axis, -1.0: f"-{axis}"}.get(value, side)
     return (
         f"<{tag} name={quoteattr(name)}><active>true</active><xyz_body_rotation>{_text(_angles(R))}</xyz_body_rotation>"
-        f"<translation>{_text(place)}</translation><quadrant>{side}</quadrant><radius>{_text(radius)}</radius>{more}"
-        f"</{tag}>"
+        f"<translation>{_text(place)}</translation><quadrant>{side}</quadrant>{more}</{tag}>"
     )
 
 
@@ -232,8 +242,8 @@ def _muscle(muscle: Muscle, names: dict[str, str], values: dict[str, float], sur
     points, around = list[str](), list[str]()
     for k, frame in enumerate(muscle.path.points, 1):
         if isinstance(frame, WrappingSurface):
-            name, own = f"{_plain(muscle.name)}_surface_{k}", f"{muscle.name} point {k}.radius"
-            written = _surface(frame, name, values.get(own, frame.radius), values)
+            name = f"{_plain(muscle.name)}_surface_{k}"
+            written = _surface(frame, name, f"{muscle.name} point {k}", values)
             surfaces.setdefault(frame.frame.body.name, []).append(written)
             around.append(
                 f'<PathWrap name="{name}"><wrap_object>{escape(name)}</wrap_object><method>hybrid</method>'
