@@ -21,6 +21,8 @@ from mbd.equations.composition import BOTTOM, MATRIX, RATE, RESIDUAL, RIGHT, TUR
 __all__ = ["Composed", "Shape", "Term"]
 
 Places = NDArray[np.int64]
+FIRST_TERM = 7
+"""Numbers of a plan before those of its terms."""
 
 
 @dataclass(frozen=True)
@@ -87,18 +89,24 @@ class Composed:
     Parameters
     ----------
     size : numbers of the output
+    cleared : which of them are cleared first, a stretch (first, count) and places besides; all where it is None.
+        Others are left as they are
     """
 
-    def __init__(self, name: str, terms: Sequence[Term], size: int) -> None:
+    def __init__(
+        self, name: str, terms: Sequence[Term], size: int, cleared: tuple[int, int, Places] | None = None
+    ) -> None:
         self.name, self.size = name, size
         self._terms = terms
+        self._first, self._count, self._others = (0, size, np.zeros(0, dtype=np.int64)) if cleared is None else cleared
         self._tables = [np.concatenate([term.in_block, term.in_parameters]) for term in terms]
         lines = [
             [0, len(term.places), term.places.ctypes.data, len(term.in_block), len(table), table.ctypes.data]
             for term, table in zip(terms, self._tables, strict=True)
         ]
         most, inputs = max(len(term.places) for term in terms), max(map(len, self._tables))
-        head = [size, most + 1, inputs + 1, len(lines)]
+        others = [len(self._others), self._others.ctypes.data]
+        head = [self._first, self._count, *others, most + 1, inputs + 1, len(lines)]
         self._plan = np.array([*head, *(word for line in lines for word in line)], dtype=np.int64)
 
     @property
@@ -109,8 +117,8 @@ class Composed:
     @property
     def address(self) -> int:
         """Of the jump to the loop; terms are called by the best code that there is now. 0 in plain Python."""
-        self._plan[4::6] = [term.function.address for term in self._terms]
-        return int(self._jump.address) if self._plan[4] else 0
+        self._plan[FIRST_TERM::6] = [term.function.address for term in self._terms]
+        return int(self._jump.address) if self._plan[FIRST_TERM] else 0
 
     @cached_property
     def _jump(self) -> Any:
@@ -119,7 +127,8 @@ class Composed:
         return Jump(self._plan.ctypes.data)
 
     def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None:
-        out[: self.size] = 0.0
+        out[self._first : self._first + self._count] = 0.0
+        out[self._others] = 0.0
         for term, table in zip(self._terms, self._tables, strict=True):
             work, own = np.zeros(len(term.places)), block
             if len(table):

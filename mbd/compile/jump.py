@@ -15,27 +15,45 @@ AT_ONCE = 64
 LOOP = """
 define internal void @compose(ptr %block, ptr %parameters, ptr %out, ptr %plan) {
 enter:
-  %size = load i64, ptr %plan
-  %at.most = getelementptr i64, ptr %plan, i64 1
+  %cleared = load i64, ptr %plan
+  %at.count = getelementptr i64, ptr %plan, i64 1
+  %count = load i64, ptr %at.count
+  %at.others = getelementptr i64, ptr %plan, i64 2
+  %n.others = load i64, ptr %at.others
+  %at.list = getelementptr i64, ptr %plan, i64 3
+  %others = load ptr, ptr %at.list
+  %at.most = getelementptr i64, ptr %plan, i64 4
   %most = load i64, ptr %at.most
-  %at.inputs = getelementptr i64, ptr %plan, i64 2
+  %at.inputs = getelementptr i64, ptr %plan, i64 5
   %most.inputs = load i64, ptr %at.inputs
-  %at.parts = getelementptr i64, ptr %plan, i64 3
+  %at.parts = getelementptr i64, ptr %plan, i64 6
   %parts = load i64, ptr %at.parts
   %room = add i64 %most, %most.inputs
   %room.bytes = mul i64 %room, 8
   %work = call ptr @malloc(i64 %room.bytes)
   %inputs = getelementptr double, ptr %work, i64 %most
-  %bytes = mul i64 %size, 8
-  call ptr @memset(ptr %out, i32 0, i64 %bytes)
-  br label %next
+  %bytes = mul i64 %count, 8
+  %stretch = getelementptr double, ptr %out, i64 %cleared
+  call ptr @memset(ptr %stretch, i32 0, i64 %bytes)
+  br label %other
+other:
+  %c = phi i64 [ 0, %enter ], [ %c.next, %clear ]
+  %uncleared = icmp slt i64 %c, %n.others
+  br i1 %uncleared, label %clear, label %next
+clear:
+  %at.other = getelementptr i64, ptr %others, i64 %c
+  %other.place = load i64, ptr %at.other
+  %to.clear = getelementptr double, ptr %out, i64 %other.place
+  store double 0.0, ptr %to.clear
+  %c.next = add i64 %c, 1
+  br label %other
 next:
-  %k = phi i64 [ 0, %enter ], [ %k.next, %done ]
+  %k = phi i64 [ 0, %other ], [ %k.next, %done ]
   %more = icmp slt i64 %k, %parts
   br i1 %more, label %part, label %leave
 part:
   %before = mul i64 %k, 6
-  %first = add i64 %before, 4
+  %first = add i64 %before, 7
   %entry = getelementptr i64, ptr %plan, i64 %first
   %code = load ptr, ptr %entry
   %at.n = getelementptr i64, ptr %entry, i64 1

@@ -17,7 +17,7 @@ from mbd.compile.cache import key_of
 from mbd.compile.composed import Composed, Shape, Term
 from mbd.compile.energies import Energies
 from mbd.compile.layout import Layout
-from mbd.compile.orders import Filled, elimination_order, is_unit, may_pay, pattern
+from mbd.compile.orders import Filled, elimination_order, is_unit, may_pay, pattern, written
 from mbd.compile.postponed import Postponed
 from mbd.compile.remembered import Facts, Remembered
 from mbd.dataclass import dataclass
@@ -211,13 +211,8 @@ class Mechanism:
         *kinds, stabilized = mode
         parts = [self._part(part, stabilized) for part in Part.of_mode(self.equations, *kinds)]
         rows, n = tuple(sorted(mode[0])), self.layout.n
-        found = []
-        for name in ("tangent", "residual"):
-            shape = Shape(n, self.layout.n_v, rows, stabilized, name == "tangent")
-            terms = [functions[name]._replace(places=shape.places(facts[name])) for facts, functions in parts]
-            found.append(Composed(name, terms, shape.size))
-        size = n + len(rows)
-        shape = Shape(n, self.layout.n_v, rows, stabilized, True)
+        size, n_v = n + len(rows), self.layout.n_v
+        shape, short = (Shape(n, n_v, rows, stabilized, whole) for whole in (True, False))
 
         def make() -> Made:
             entries: dict[tuple[int, int], bool] = {}
@@ -231,8 +226,16 @@ class Mechanism:
             return {}, {"order": self._order(entries, rows)}
 
         facts = self._compiled(("order", mode), make)
-        tangent, residual = found
-        order = _numbers(facts["order"])
+        order, cleared = _numbers(facts["order"]), None
+        if order is not None:
+            matrix, turning = written(order, n, n_v, stabilized)
+            cleared = shape.head, short.size, np.concatenate([matrix, turning])
+
+        def summed(name: str, shape: Shape, cleared: Any = None) -> Composed:
+            terms = [functions[name]._replace(places=shape.places(facts[name])) for facts, functions in parts]
+            return Composed(name, terms, shape.size, cleared)
+
+        tangent, residual = summed("tangent", shape, cleared), summed("residual", short)
         return ModeCode(mode[0], mode[1], mode[2], tangent, residual, given_rows=mode[3], order=order)
 
     def _part(self, part: Part, stabilized: bool) -> tuple[Facts, dict[str, Term]]:

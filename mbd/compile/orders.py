@@ -10,12 +10,14 @@ N + 1, N              where the entries of each pivot's row begin, and its own p
 Z                     the turn of each entry's column
 Z, Z, Z               where its value is: in the tangent; in the program `accelerations` (−1 for zero); there, with Bᵀ
                       in the place of R
+m + 1, …              where the coordinates begin that each row of H concerns, and these, ascending
 ====================  ==============================================================================
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -24,8 +26,20 @@ from mbd.dataclass import dataclass
 from mbd.tape.node import Node
 from mbd.tape.ordering import Order, order
 
-__all__ = ["MIN_SAVING", "MIN_UNKNOWNS", "Filled", "elimination_order", "flat_order", "is_unit", "may_pay", "pattern"]
+__all__ = [
+    "MIN_SAVING",
+    "MIN_UNKNOWNS",
+    "Filled",
+    "elimination_order",
+    "flat_order",
+    "is_unit",
+    "may_pay",
+    "pattern",
+    "written",
+]
 
+HEADER_SIZE = 3
+"""Numbers before the lists of an order."""
 MIN_UNKNOWNS = 21
 """Unknowns from which on an order is looked for: below, loops over dense rows take no longer [-]."""
 MIN_SAVING = 4
@@ -64,7 +78,18 @@ def elimination_order(
     found = order(places, numbers, n, size)
     if found is None or MIN_SAVING * found.operations > size**3 / 3.0:
         return None
-    return flat_order(found, n, n_rows, rows)
+    return flat_order(found, places, n, n_rows, rows)
+
+
+def written(order: Any, n: int, n_v: int, stabilized: bool) -> tuple[Any, Any]:
+    """Places of K and of ∂ḣ/∂x in the output of `programs.newton` that somebody reads who eliminates in this order."""
+    size, m, entries = (int(number) for number in order[:HEADER_SIZE])
+    o_turn = HEADER_SIZE + m + 4 * size + 1
+    matrix = order[o_turn + entries : o_turn + 2 * entries]
+    starts = order[o_turn + 4 * entries :][: m + 1]
+    columns = order[o_turn + 4 * entries + m + 1 :]
+    turning = size * size + n + 2 * m + np.repeat(np.arange(m), np.diff(starts)) * n_v + columns
+    return matrix, turning if stabilized else turning[:0]
 
 
 def pattern(tangent: Sequence[Node], size: int) -> dict[tuple[int, int], bool]:
@@ -120,16 +145,21 @@ def _both(i: int, j: int, n: int, n_rows: int, rows: Sequence[int]) -> tuple[int
     return (at_B + rows[i - n] * n + j,) * 2 if j < n else (-1, -1)
 
 
-def flat_order(found: Order, n: int, n_rows: int, rows: Sequence[int]) -> Any:
-    """An order with where its values are, as the kernel reads it."""
+def flat_order(found: Order, given: Collection[tuple[int, int]], n: int, n_rows: int, rows: Sequence[int]) -> Any:
+    """An order with where its values are, as the kernel reads it; without fill-in they are at `given` places."""
     size = n + len(rows)
     places = [(found.rows[k], found.columns[turn]) for k in range(size) for turn in found.entries[k]]
     starts = np.cumsum([0, *(len(line) for line in found.entries)])
     own = [int(starts[k]) + line.index(k) for k, line in enumerate(found.entries)]
     both = [_both(i, j, n, n_rows, rows) for i, j in places]
+    along: list[list[int]] = [[] for _ in rows]
+    for row, j in sorted(given):
+        if row >= n > j:
+            along[row - n].append(j)
     parts: list[Sequence[int]] = [
         (size, len(rows), len(places)), rows, found.rows, found.columns, starts.tolist(), own,
         [turn for line in found.entries for turn in line], [i * size + j for i, j in places],
         [one for one, _ in both], [other for _, other in both],
+        [0, *accumulate(map(len, along))], [j for line in along for j in line],
     ]  # fmt: skip
     return np.array([number for part in parts for number in part], dtype=np.int64)

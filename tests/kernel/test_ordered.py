@@ -47,7 +47,7 @@ def kernel(A, n, m):
     size, n_rows = n + m, 2 * m
     rows = list(range(1, n_rows, 2))
     places = {(int(i), int(j)) for i, j in np.argwhere(A != 0.0)}
-    flat = flat_order(order(places, set(), n, size), n, n_rows, rows)
+    flat = flat_order(order(places, set(), n, size), places, n, n_rows, rows)
     return Kernel(
         n=n, state=np.zeros(24, dtype=np.int64), mode_count=np.array([1]), mode_order=np.array([1]),
         orders=np.append(0, flat),

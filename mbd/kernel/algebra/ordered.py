@@ -8,17 +8,16 @@ knows which concern it. Nothing is exchanged; instead every pivot is compared wi
 
 from __future__ import annotations
 
+from mbd.compile.orders import HEADER_SIZE
 from mbd.kernel.algebra.linear import solve
-from mbd.kernel.records import Equations, Motion, Reals
+from mbd.kernel.records import Equations, Model, Motion, Reals
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = [
-    "HEADER_SIZE", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "factor_ordered", "order_at", "solve_kkt",
-    "solve_ordered", "weakest_pivot",
+    "HEADER_SIZE", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "clear_tangent", "columns_at", "factor_ordered",
+    "order_at", "solve_kkt", "solve_ordered", "weakest_pivot",
 ]  # fmt: skip
 
-HEADER_SIZE = 3
-"""Numbers before the lists of an order."""
 OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)
 """Where values come from: the matrix of a step, row-major; the program `accelerations`; that with Bᵀ in place of R."""
 NEWTON_PIVOT_RTOL = 1e-8
@@ -39,6 +38,24 @@ def order_at(K: Motion, m: int) -> int:
         if K.orders[o + HEADER_SIZE + k] != K.rows[k]:
             return 0
     return int(o)
+
+
+def columns_at(K: Model, o: int) -> int:
+    """Where the order at o tells which coordinates each row of H concerns: ends of rows, from 0, then coordinates."""
+    return int(o + HEADER_SIZE + K.orders[o + 1] + 4 * K.orders[o] + 1 + 4 * K.orders[o + 2])
+
+
+def clear_tangent(K: Model, m: int, out: Reals) -> None:
+    """Clear what the tangent of the present mode leaves as it is: all that its order does not ask for, if it has one.
+
+    Whoever reads the whole matrix, or ∂ḣ/∂x, calls this first.
+    """
+    if K.mode_order[K.mode_id] > 0:
+        size = K.n + m
+        out[: size * size] = 0.0
+        if K.stabilized == 1:
+            o = size * size + K.n + 2 * m
+            out[o : o + m * K.n_v] = 0.0
 
 
 def factor_ordered(K: Equations, A: Reals, o: int, source: int, loss: float) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.ordered import clear_tangent
 from mbd.kernel.codes import EPS
 from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
@@ -174,6 +175,7 @@ def runs_away(K: Equations, m: int) -> bool:
     Then r would vanish beside its terms whatever the motion, and a step must not be accepted for it.
     """
     size = K.n + m
+    clear_tangent(K, m, K.spare)
     call(K, K.tangent_program, K.spare)
     largest = 0.0
     total = 0.0

@@ -7,11 +7,19 @@ straight-line code. The stabilized form corrects positions by U first, then the 
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.algebra.ordered import (
+    NEWTON_PIVOT_RTOL,
+    OF_TANGENT,
+    clear_tangent,
+    columns_at,
+    factor_ordered,
+    order_at,
+    solve_kkt,
+)
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, TOO_NEAR, TOO_TIGHT
 from mbd.kernel.hooks import call, call_on
-from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, Steps
+from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, SingularSteps
 from mbd.kernel.schemes.iteration import (
     MIN_HALVED_RESIDUAL,
     finish,
@@ -216,6 +224,11 @@ def pass_singularity(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: fl
     fall = steps_by_pivot(K, m, straight)
     if not fall < MAX_STEPS_AWAY + 2.0:
         return -1
+    if not straight and order_of_tangent(K, m) > 0:  # all of the rows and of how they turn
+        clear_tangent(K, m, K.out)
+        call(K, K.tangent_program, K.out)
+        o = (K.n + m) * (K.n + m) + K.n + 2 * m
+        K.turning[: m * K.n_v] = K.out[o : o + m * K.n_v]
     away = steps_to_singularity(K, m, h, c_K / c_C, straight) * h / K.step
     if misses(K, away, h):
         K.inverse_pivot = 0.0
@@ -229,7 +242,7 @@ def pass_singularity(K: Kernel, h: float, t1: float, m: int, c_C: float, c_K: fl
     return -1
 
 
-def renew(K: Equations, m: int, tangents: int) -> bool:
+def renew(K: DependentRows, m: int, tangents: int) -> bool:
     """Residual and tangent in K.out; whether its factors and the correction are there instead of it.
 
     Straight-line code exchanges no rows: where a pivot is too small, or the correction was not what it should be, the
@@ -244,8 +257,15 @@ def renew(K: Equations, m: int, tangents: int) -> bool:
                 K.n_factorizations += 1
                 return True
         K.n_pivoted += 1
+    if tangents >= MAX_FIXED_ORDER or order_of_tangent(K, m) == 0:  # pivots are searched for in all of it
+        clear_tangent(K, m, K.out)
     call(K, K.tangent_program, K.out)
     return False
+
+
+def order_of_tangent(K: DependentRows, m: int) -> int:
+    """Where the order begins in which the tangent of this step is eliminated, 0 if pivots are searched for."""
+    return 0 if sharing(K) else order_at(K, m)
 
 
 def take_shift(K: Equations, m: int) -> bool:
@@ -263,7 +283,7 @@ def take_shift(K: Equations, m: int) -> bool:
     return shifting
 
 
-def right_hand_sides(K: Steps, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
+def right_hand_sides(K: SingularSteps, o_r: int, m: int, c_C: float, c_K: float, tangent: bool, straight: bool) -> bool:
     """−r and −h/c_K (index 3) or −ḣ/c_C in K.rhs; for the stabilized form the position residual in K.work.
 
     Rows on velocities have −rate/c_C in both forms and take no part in the correction of positions.
@@ -273,6 +293,8 @@ def right_hand_sides(K: Steps, o_r: int, m: int, c_C: float, c_K: float, tangent
     """
     n = K.n
     o_h = o_r + n
+    o = order_of_tangent(K, m) if tangent and not straight and m > 0 and K.stabilized == 1 else 0
+    o_column = columns_at(K, o) if o > 0 else 0
     shifting = False
     for i in range(n):
         K.rhs[i] = -K.out[o_r + i]
@@ -290,11 +312,20 @@ def right_hand_sides(K: Steps, o_r: int, m: int, c_C: float, c_K: float, tangent
         if abs(h) > 16.0 * EPS * K.scale[n + K.rows[k]]:
             shifting = True
         h -= (c_K / c_C) * rate
-        if tangent and not straight:
+        if o > 0:
+            for e in range(K.orders[o_column + k], K.orders[o_column + k + 1]):
+                j = K.orders[o_column + m + 1 + e]
+                h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
+        elif tangent and not straight:
             for j in range(K.n_v):
                 h -= K.out[(n + k) * (n + m) + j] * K.shift1[j]
         K.work[n + k] = -h
-    if tangent and K.stabilized == 1:
+    if o > 0:
+        for k in range(m):
+            for e in range(K.orders[o_column + k], K.orders[o_column + k + 1]):
+                place = k * K.n_v + K.orders[o_column + m + 1 + e]
+                K.turning[place] = K.out[o_h + 2 * m + place]
+    elif tangent and K.stabilized == 1:
         K.turning[: m * K.n_v] = K.out[o_h + 2 * m : o_h + 2 * m + m * K.n_v]
     return shifting
 
@@ -305,11 +336,13 @@ def factorize(K: DependentRows, size: int, tangents: int) -> bool:
     Those of a step's first few tangents keep to the order of the mode, if it has one and its pivots are sound.
     """
     m = size - K.n
-    o = 0 if sharing(K) else order_at(K, m)
+    o = order_of_tangent(K, m)
     if o > 0 and tangents <= MAX_FIXED_ORDER:
         if factor_ordered(K, K.out, o, OF_TANGENT, NEWTON_PIVOT_RTOL):
             K.n_factorizations += 1
             return True
+        clear_tangent(K, m, K.out)
+        call(K, K.tangent_program, K.out)
     if o > 0:
         K.n_pivoted += 1
     K.order_start = 0
@@ -322,7 +355,7 @@ def factorize(K: DependentRows, size: int, tangents: int) -> bool:
     return bool(column == 0)
 
 
-def solve_corrections(K: Steps, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
+def solve_corrections(K: SingularSteps, m: int, c_C: float, tangent: bool, shifting: bool, straight: bool) -> None:
     """The change of the position shift in K.work, the corrections of rates and multipliers in K.rhs."""
     if shifting:  # positions first: what that changes of ḣ, the accelerations make good in the same iteration
         solve_with_factors(K, m, K.work, straight)
@@ -331,11 +364,18 @@ def solve_corrections(K: Steps, m: int, c_C: float, tangent: bool, shifting: boo
             K.work[i] -= K.shift1[i]
         inverse = 1.0 / c_C
         turning = soundness_at(K, m) - m * K.n_v
+        o = 0 if straight else order_of_tangent(K, m)
+        o_column = columns_at(K, o) if o > 0 else 0
         for k in range(m):
             turned = 0.0
-            for i in range(K.n_v):
-                entry = K.out[turning + k * K.n_v + i] if straight else K.turning[k * K.n_v + i]
-                turned += entry * K.work[i]
+            if o > 0:
+                for e in range(K.orders[o_column + k], K.orders[o_column + k + 1]):
+                    i = K.orders[o_column + m + 1 + e]
+                    turned += K.turning[k * K.n_v + i] * K.work[i]
+            else:
+                for i in range(K.n_v):
+                    entry = K.out[turning + k * K.n_v + i] if straight else K.turning[k * K.n_v + i]
+                    turned += entry * K.work[i]
             K.rhs[K.n + k] -= turned * inverse
     solve_with_factors(K, m, K.rhs, straight)
     if m > 0 and K.stabilized == 1:

@@ -9,7 +9,14 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.complex_linear import factor_complex, solve_complex
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, OF_TANGENT, factor_ordered, order_at, solve_kkt
+from mbd.kernel.algebra.ordered import (
+    NEWTON_PIVOT_RTOL,
+    OF_TANGENT,
+    clear_tangent,
+    factor_ordered,
+    order_at,
+    solve_kkt,
+)
 from mbd.kernel.algebra.ordered_complex import factor_pair_ordered, solve_pair_ordered
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import PASSING
@@ -89,6 +96,7 @@ def matrices(K: SingularSteps, m: int, h: float) -> None:
 
 def tangent_of_stage(K: DependentRows, m: int) -> None:
     """The tangent at the block in K.out, with what dependent rows bear where a friction slides."""
+    clear_tangent(K, m, K.out)
     call(K, K.tangent_program, K.out)
     if sharing(K):
         add_shares(K, K.out, m)

@@ -7,7 +7,15 @@ projected onto the rows and the scheme starts again, but for the average that it
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, OF_TANGENT, factor_ordered, order_at, solve_kkt, weakest_pivot
+from mbd.kernel.algebra.ordered import (
+    NEWTON_PIVOT_RTOL,
+    OF_TANGENT,
+    clear_tangent,
+    factor_ordered,
+    order_at,
+    solve_kkt,
+    weakest_pivot,
+)
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
@@ -156,6 +164,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
         # tangent and residual at the iterate
         if sharing(K):
             share_loads(K, m)
+        clear_tangent(K, m, K.out)
         call(K, K.tangent_program, K.out)
         K.n_tangents += 1
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, 0)

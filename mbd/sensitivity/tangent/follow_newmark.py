@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import solve_kkt
+from mbd.kernel.algebra.ordered import clear_tangent, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import Integers, Kernel, Reals
@@ -142,6 +142,7 @@ def prepare_newton(K: Kernel, m: int, size: int, c_C: float, c_K: float) -> int:
     """Factors of the matrix of `follow_newton` at the block, with δg where it is that large; 0, or it is singular."""
     n = K.n
     whole = n + m
+    clear_tangent(K, m, K.out)
     call(K, K.tangent_program, K.out)
     if size == whole:
         K.kkt[: whole * whole] = K.out[: whole * whole]
@@ -193,6 +194,7 @@ def prepare_metric(K: Kernel, m: int) -> int:
     n = K.n
     size = n + m
     at = n_inputs(K)
+    clear_tangent(K, m, K.out)
     call_on(K, K.tangent_program, K.starts, K.out)
     K.kkt[: size * size] = K.out[: size * size]
     K.order_start = 0
