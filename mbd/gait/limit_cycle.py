@@ -31,6 +31,8 @@ __all__ = ["limit_cycle", "map_of"]
 
 FIRST_STEP = 1e-2
 """Step of the first return where none is given [s]; later ones follow from its length."""
+MAX_PASSING_RETURNS = 3
+"""Returns after which states of modes repeat that begin in one that no gait comes back to [-]."""
 
 
 def limit_cycle(
@@ -169,7 +171,16 @@ def _found(map_: ReturnMap, start: State, dt: float | None, tol: float, member: 
     if isinstance(begun, Failed):
         return _none(map_, begun)
     section, states = begun
-    return fallen_first(first_found(Search(map_, section, tol, member), states, map_.values, dt), start, map_.values)
+    found = later = first_found(Search(map_, section, tol, member), states, map_.values, dt)
+    for _ in range(MAX_PASSING_RETURNS):
+        if later.outcome.kind != "other states":
+            break
+        again = first_return(map_, states[-1], map_.values)
+        if isinstance(again, Failed):
+            break
+        section, states = again
+        later = first_found(Search(map_, section, tol, member), states, map_.values, dt)
+    return later if later.success else fallen_first(found, start, map_.values)
 
 
 def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:

@@ -216,3 +216,28 @@ def test_a_sampled_law_whose_samples_restart_at_strikes_has_a_gait_and_its_deriv
 
     near, far = (period(h) - period(-h) for h in (1e-5, 2e-5))
     np.testing.assert_allclose(gait.derivatives["period", "PD.period"], (8.0 * near - far) / 12e-5, rtol=1e-5)
+
+
+def test_states_that_only_a_start_has_are_walked_past() -> None:
+    """A side swings 'off' until its first strike and never again: the gait is one of the states that recur."""
+    more = [
+        mbd.Mode(f"{side} swing", ("off", "push", "rest"), transitions=[
+            mbd.Transition(("off", "rest"), "push", on=f"{other} foot"), mbd.Transition("push", "rest", after=0.12),
+        ])
+        for side, other in (("left", "right"), ("right", "left"))
+    ]  # fmt: skip
+    model, start = walker(more=tuple(more))
+    for side in "left", "right":
+        joint = next(joint for joint in model.joints if joint.name == f"{side} hip")
+        names = [f"{side} hip.rate", f"{side} swing.time"]
+        law = {"push": lambda v, t: 4.0 * t - 0.2 * v}
+        model.apply(mbd.Motor(f"{side} push", joint, torque=law, by=f"{side} swing", arguments=names))
+    given = mbd.assemble(
+        model, {name: start[name] for name in ("left hip.angle", "right hip.angle", "waist.angle")},
+        {name: start[name] for name in ("left hip.rate", "right hip.rate", "waist.rate")}, closed=["left foot"],
+    )  # fmt: skip
+    gait = mbd.limit_cycle(model, given, section="right foot", mirror=("left", "right"))
+    walked = mbd.simulate(model, gait.state, mbd.RungeKutta853(), dt=gait.period / 60.0, until=3.5 * gait.period)
+    struck = [event.time for event in walked.events if event.kind == "closed"]
+    np.testing.assert_allclose(struck, gait.period * np.arange(1, 4), atol=1e-9)
+    assert "off" not in set(walked["left swing"]) | set(walked["right swing"])

@@ -56,10 +56,10 @@ class Muscle(Force):
     as the state 'name.activation'; with activation_time=0 and deactivation_time=0 it is e itself. The force acts on the
     rate of the path, so that the moment arm about a coordinate is −∂l_MT/∂q exactly.
 
-    F. De Groote, A. L. Kinney, A. V. Rao and B. J. Fregly, Ann. Biomed. Eng. 44 (2016) 2922 (curves, activation);
-    M. Millard, T. Uchida, A. Seth and S. L. Delp, J. Biomech. Eng. 135 (2013) 021005 (curves, damped equilibrium). The
-    constants of 'de groote' are those of OpenSim's DeGrooteFregly2016Muscle, ``f_T = 0.2 (6^(s/0.049) − 1)`` of a
-    strain s among them: f_T and f_P vanish at slack, which those of the article do not. Of
+    F. De Groote, A. L. Kinney, A. V. Rao and B. J. Fregly, Ann. Biomed. Eng. 44 (2016) 2922 (curves, activation), with
+    the constants of OpenSim's class of this name: ``f_T = 0.2 (6^(s/0.049) − 1)`` of a strain s vanishes at slack
+    length, which that of the article does not;
+    M. Millard, T. Uchida, A. Seth and S. L. Delp, J. Biomech. Eng. 135 (2013) 021005 (curves, damped equilibrium). Of
     bench tests, those authors found mean errors of 9 % of the largest force at full activation, 16 % below it.
 
     Parameters
