@@ -235,8 +235,9 @@ def _long(
     if rate is not None:
         plain += step**2 * (rate[:-1] - rate[1:]) / 12.0
     differ = np.where(known, np.abs(steps - plain), 0.0)
-    if rate is None:
-        differ[known & (differ <= WORK_RTOL * np.max(np.abs(work)))] = np.inf  # few rows: both are the trapezoid
+    # few rows make both the same: the trapezoid, or where rates are known a step between two switches
+    few = known if rate is None else known & (np.append(0.0, step)[:-1] <= 0.0) & (np.append(step, 0.0)[1:] <= 0.0)
+    differ[few & (differ <= WORK_RTOL * np.max(np.abs(work)))] = np.inf
     long = np.sort(np.argsort(-differ, kind="stable")[:20000])
     return np.asarray(long[differ[long] > least])
 

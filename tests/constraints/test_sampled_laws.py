@@ -161,3 +161,19 @@ def test_an_output_with_the_name_of_an_element_is_a_fault():
     law = mbd.SampledLaw("PD", period=0.01, outputs={"motor": lambda q: -q}, arguments=["hinge.angle"])
     model.apply(mbd.Motor("motor", hinge, torque=0.0), law)
     assert "name a parameter, 'motor.torque'" in model.check()[0]
+
+
+@pytest.mark.parametrize(("period", "delay"), [(0.02, 0.005), (0.01, 0.0), (0.013, 0.006)])
+def test_the_energy_ledger_closes_though_each_step_ends_at_a_sample(period: float, delay: float) -> None:
+    """A stiff drive beside a sampled one: its work is integrated within steps that have a switch on either side."""
+    model, rod = mbd.Model("arm"), mbd.Link("rod", mass=2.0, length=0.4, center=0.2, inertia=0.03)
+    hinge = mbd.Revolute("hinge", model.ground.origin, rod.start)
+    model.connect(hinge)
+    law = {"held.torque": lambda q, v: -2.0 * (q - 1.0) - 0.2 * v}
+    model.apply(
+        mbd.Motor("spring", hinge, lambda q, v: -40.0 * (q - 0.5) - 1.5 * v, arguments=["hinge.angle", "hinge.rate"]),
+        mbd.Motor("held", hinge, torque=0.0),
+        mbd.SampledLaw("PD", period, law, arguments=["hinge.angle", "hinge.rate"], delay=delay),
+    )
+    run = mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 0.0}), mbd.RungeKutta853(), dt=0.01, until=1.0)
+    assert abs(run.energy.sums["numerical"]) < 1e-10
