@@ -73,8 +73,6 @@ def among(value: Any, known: Collection[Any]) -> bool:
 
 def is_number(value: Any) -> bool:
     """Whether a value is one real number that a float can hold, finite or not."""
-    if type(value) is float:
-        return True
     if not _is_numeric(value):
         return False
     try:
@@ -86,6 +84,8 @@ def is_number(value: Any) -> bool:
 
 def _is_numeric(value: Any) -> bool:
     """Whether a value may be turned into a float."""
+    if type(value) is float:
+        return True
     if isinstance(value, bool | np.bool_ | str | type) or not hasattr(value, "__float__"):
         return False
     if np.iscomplexobj(value):  # float() drops imaginary parts

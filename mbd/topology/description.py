@@ -172,8 +172,9 @@ class Description:
     @property
     def markers(self) -> list[Frame]:
         """The named points of the bodies, used or not; what is used under a name stands for that name."""
-        used = {frame.full_name: frame for frame in reversed(self.points())}
-        bodies = {id(frame.body): frame.body for frame in self.points()} | {id(self.ground): self.ground}
+        points = self.points()
+        used = {frame.full_name: frame for frame in reversed(points)}
+        bodies = {id(frame.body): frame.body for frame in points} | {id(self.ground): self.ground}
         named = {name: frame for body in bodies.values() for name, frame in body.points.items()}
         return [used.get(name, frame) for name, frame in named.items()]
 
