@@ -9,7 +9,7 @@ both, wherever parameters enter a mirrored gait.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import Any
@@ -43,6 +43,8 @@ EFFECT_RTOL = 1e-6
 WIDEST, GROWTH = 1e12, 30.0
 """Change of a parameter, over its value or 1, up to which an effect is looked for, and the factor of the next [-]."""
 
+MAX_KEPT = 8
+"""Values of the parameters for which a mirror image found once is kept."""
 EVENTS = slice(4, 7)
 """Those of events among the numbers that are watched."""
 
@@ -60,6 +62,19 @@ def require_alike(
     ModelError
         where the mirror image of the mechanism is another mechanism; it tells parameters that differ by name.
     """
+    known: dict[Hashable, Mirror] = mechanism.kept(require_alike, dict)
+    key = mirror.sides, mirror.section, parameters.tobytes()
+    found = known.get(key)
+    if found is None:
+        found = _alike(mechanism, mirror, parameters, values, model)
+        if len(known) >= MAX_KEPT:
+            known.clear()
+        known[key] = found
+    return found
+
+
+def _alike(mechanism: Mechanism, mirror: Mirror, parameters: Vector, values: dict[str, float], model: Any) -> Mirror:
+    """The same, looked for."""
     choices = [replace(mirror, reflection=each) for each in reflections(model, mechanism, mirror, parameters)]
     different = np.inf
     for choice in choices or [mirror]:

@@ -18,7 +18,7 @@ from mbd.compile.trivial_rows import SAMPLED_POSES
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.joints.reflected import ACROSS, mirrored_signs
-from mbd.topology.plan import plan
+from mbd.topology.plan import is_planar, plan
 
 __all__ = ["Reflection", "in_space", "reflections"]
 
@@ -38,7 +38,7 @@ class Reflection:
 
 def in_space(model: Any) -> bool:
     """Whether a model has joints that leave the plane."""
-    return bool(getattr(model, "joints", ())) and not plan(model).planar
+    return bool(getattr(model, "joints", ())) and not is_planar(model)
 
 
 def reflections(model: Any, mechanism: Mechanism, partners: Any, parameters: Vector) -> list[Reflection]:

@@ -99,7 +99,6 @@ def on_section(section: Section, start: State, parameters: Vector, near: float =
 def with_step(search: Search, start: State, values: Values, dt: float | None) -> tuple[Search, float]:
     """The search with a step whose error is below `tol`, from the first return; and the error of its state."""
     map_, parameters = search.map, search.map.vector(values)
-    chart = Chart(search.section, start, parameters)
     if dt is not None:
         return search, float("nan")
     arrival = map_(start, values, strides=1)
@@ -108,6 +107,7 @@ def with_step(search: Search, start: State, values: Values, dt: float | None) ->
         return search, float("nan")
     # beyond, the walk is over
     longest = min(map_.longest, 10.0 * arrival.period) if arrival.outcome.good else map_.longest
+    chart = Chart(search.section, start, parameters)
     before: Vector | None = None
     error = np.inf
     for _ in range(HALVINGS):

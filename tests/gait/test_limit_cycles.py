@@ -12,6 +12,7 @@ import pytest
 import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.gait.mirror import mirror_of
+from mbd.gait.section import Chart
 from mbd.sensitivity.derivative import final_state_derivative
 from tests.cases.walkers import compass, kneed, standing
 from tests.gait.walkers import simplest, simplest_start, slope_of, two_sided
@@ -381,3 +382,36 @@ def test_the_state_of_a_gait_has_its_parameters():
         assert dict(one.state.parameters) == one.map.plain(one.parameters)
         run = mbd.simulate(one.map.model, one.state, one.map.integrator, dt=one.dt, until=one.period)
         assert run["left hip.angle"][-1] == pytest.approx(one.state["right hip.angle"], abs=1e-9)
+
+
+def test_what_a_search_keeps_is_what_it_would_find_again():
+    """The state asked of a chart last, and the mirror image of a walker, are those of a chart and a walker anew."""
+    gait = symmetric("f2-compass-gait-3deg")
+    chart, parameters = gait.chart, gait.map.vector(gait.parameters)
+    one, other = np.full(chart.size, 1e-3), np.linspace(-1e-3, 1e-3, chart.size)
+    for c in (one, one, other, one):
+        kept, new = chart.at(c, parameters), Chart(chart.section, chart.state, chart.parameters).at(c, parameters)
+        assert all(np.array_equal(getattr(kept, part), getattr(new, part)) for part in ("q", "v", "z", "anchors"))
+    steeper = gait.map.vector({**gait.parameters, "slope": gait.parameters["slope"] + 1e-3})
+    new = Chart(chart.section, chart.state, chart.parameters).at(one, steeper)
+    assert np.array_equal(chart.at(one, steeper).v, new.v)
+
+
+def test_sides_that_were_alike_are_compared_again_with_other_parameters():
+    gait = symmetric("f2-compass-gait-3deg")
+    model, known = gait.map.model, dict(gait.parameters)
+    mass = next(name for name in model.parameters if name.startswith("left") and name.endswith(".mass"))
+
+    def search(**more: float) -> mbd.LimitCycle:
+        return mbd.limit_cycle(
+            model, gait.state, section="right foot", mirror=("left", "right"), parameters={**known, **more},
+            functions=slope_of(case("f2-compass-gait-3deg").definition["g"]),
+        )  # fmt: skip
+
+    first = search()
+    for _ in range(2):
+        with pytest.raises(mbd.ModelError, match="the mechanism with its sides exchanged is another one"):
+            search(**{mass: 1.1 * model.parameters[mass]})
+    again = search()
+    assert np.array_equal(first.state.q, again.state.q) and np.array_equal(first.state.v, again.state.v)
+    assert first.period == again.period
