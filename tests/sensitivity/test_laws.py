@@ -69,3 +69,17 @@ def test_derivatives_of_parts_of_a_run_make_a_chain():
     last = second.record
     found = b @ a - np.outer(np.concatenate([last.v[-1], last.a[-1]]), t)
     assert found == pytest.approx(c, abs=1e-8 * np.max(np.abs(c)))
+
+
+@pytest.mark.parametrize("scheme", [mbd.RungeKutta853(), mbd.RungeKutta4(), mbd.RadauIIA(), mbd.HHT()], ids=repr)
+@pytest.mark.parametrize("place", [0.3, 0.45])
+def test_a_contact_watched_from_a_place_on_has_no_part_in_derivatives_before_it_closes(place, scheme):
+    """Nor where the step at which it begins ends there to the bit: x and y at the end move with those at the start."""
+    model, body = mbd.Model("shelf", gravity=(1.0, 0.0, 0.0)), mbd.PointMass("body", 1.0)
+    model.connect(mbd.Translation("slide", model.ground.origin, body.origin))
+    beside = mbd.measure(lambda point: point[0] - place, body.origin)
+    model.constrain(mbd.Unilateral("shelf", mbd.touchdown(body.origin), only_while=beside))
+    start = mbd.assemble(model, {"slide.x": 0.0, "slide.y": -0.2}, {"slide.x": 1.0, "slide.y": 0.7})
+    names = ["slide.x", "slide.y"]
+    found = mbd.sensitivities(model, start, scheme, dt=0.11, until=0.661, wrt=names, of=names)
+    np.testing.assert_allclose(found.matrix, np.eye(2), atol=1e-12)

@@ -403,7 +403,7 @@ def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:
         return float(max(K.guards1[index], -K.guards1[K.at_force + index]))
     if kind == WATCH:
         condition = float(K.guards1[K.at_condition + index])
-        return -condition if condition != 0.0 else 1e-300  # watched only above zero
+        return -condition if condition != 0.0 else 1e-300 - condition  # watched only above zero
     if kind == CROSS:
         return float(K.side[index] * K.guards1[K.at_user + index])
     if kind == STICK:
