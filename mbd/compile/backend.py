@@ -45,10 +45,11 @@ class Function(Protocol):
 class Functions(Protocol):
     """The functions of a model by name; more may be added at any time. They live as long as this does.
 
-    Those that a run calls `rarely` may be slow if they are made the sooner for it.
+    Those that a run calls `rarely` may be slow if they are made the sooner for it, and those that are wanted `soon` at
+    first.
     """
 
-    def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False) -> None: ...
+    def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False, soon: bool = False) -> None: ...
     def __getitem__(self, name: str) -> Function: ...
     def __contains__(self, name: object) -> bool: ...
     def __iter__(self) -> Iterator[str]: ...
@@ -62,7 +63,7 @@ class Twins(ByName[ScalarFunction]):
         super().__init__()
         self.layout = layout
 
-    def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False) -> None:
+    def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False, soon: bool = False) -> None:
         for name, outputs in programs.items():
             self._functions[name] = ScalarFunction(name, outputs, self.layout)
 

@@ -268,8 +268,11 @@ class Library(ByName[MachineFunction]):
         self._machine = Machine()
         self._later: list[Machine] = []
 
-    def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False) -> None:
-        """Compile, or fetch from the cache, one function per name and list of outputs; `rarely` called: at level 0."""
+    def add(self, programs: Mapping[str, Sequence[Node]], rarely: bool = False, soon: bool = False) -> None:
+        """Compile, or fetch from the cache, one function per name and list of outputs.
+
+        rarely : called, so that level 0 will do; soon : level 0 first, however few operations they have
+        """
         for name in programs:
             if name in self._functions:
                 raise ModelError(f"this library already has a function {name!r}; give every function its own name")
@@ -278,7 +281,7 @@ class Library(ByName[MachineFunction]):
         module = Module(programs, self.layout, host().fused, **CUTS.get(final, {}))
         text = module.text()
         written = time.perf_counter()
-        large = not rarely and self.hasty is not None and module.lines > self.hasty
+        large = not rarely and self.hasty is not None and (soon or module.lines > self.hasty)
         texts = module.pieces() if large else [text]
         keys = tuple(tag_key(_tag(text, final)) for text in texts)
         known = [self.cache.load(key) for key in keys]

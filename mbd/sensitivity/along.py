@@ -111,4 +111,4 @@ def _slopes(programs: Programs, motion: Motion, mode: Mode, rates: Rates, names:
     at = motion.at(mode, full.rate, full.lam)
     at.lam = full.lam
     stacked = motion.tangent.stacked(programs.columns, full.of_rate, full.of_lam)
-    return np.array([programs.result(name, at)[1] @ stacked for name in names]).reshape(len(names), -1)
+    return programs.results(names, at)[1] @ stacked

@@ -25,7 +25,7 @@ def final_state_derivative(
 ) -> tuple[Matrix, Vector]:
     """d(q, v) at the end of a run, and d t_end, by coordinates and speeds of its start and by parameters.
 
-    The run is made once more with derivatives, which takes as long as two to four runs, and not longer for thirty
+    The run is made once more with derivatives, which takes as long as two to four runs, and not longer for twenty
     directions than for one. So a Newton iteration on a map of a run, such as a return map, asks once for all
     of its unknowns: ``run = mbd.simulate(…, until="right foot")``, ``final_state_derivative(run, names, held=names)``.
 

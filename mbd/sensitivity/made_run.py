@@ -48,6 +48,7 @@ class MadeRun(TangentRun):
     """
 
     ends_exactly = repeats = False
+    rows_at_once = 512  # of which few have derivatives
     ways: Ways
     ready: Ready | None = None
 

@@ -9,10 +9,9 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.errors import UnknownNameError, nearest
-from mbd.results.stored_states import StoredStates
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.passed import Passed
-from mbd.sensitivity.programs import Programs, State
+from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
 
 __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
@@ -78,32 +77,38 @@ def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]
     at = found.motion.at(found.mode, rates.rate, rates.lam)
     at.lam, at.anchors = rates.lam, _with_turns(rows, programs, at.anchors)
     tangent = found.motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
-    results = [instants[name] or _result(programs, at, tangent, name, wanted[name]) for name in of]
-    values, lines = [value for value, _ in results], [line for _, line in results]
+    values, slopes = programs.results(list(wanted), at)
+    lines = slopes @ tangent
+    for name, value in zip(wanted, values, strict=True):
+        _require_found_again(name, float(value), wanted[name])
+    results = dict(zip(wanted, zip(values, lines, strict=True), strict=True))
+    each = [instants[name] or results[name] for name in of]
     size = len(found.motion.tangent.t)
-    return Lines(tuple(of), np.array(values), np.array(lines).reshape(len(values), size))
+    return Lines(
+        tuple(of), np.array([value for value, _ in each]), np.array([line for _, line in each]).reshape(len(of), size)
+    )
 
 
 def _at_rows(rows: RunRows, found: Passed, names: Sequence[str]) -> dict[str, Vector]:
     """Named results at all rows of the run, evaluated together."""
-    single = list[str]()
+    single, columns = list[str](), rows.run.columns
     for name in names:
-        if name not in rows.run:
+        try:
+            parts = columns.components(name)
+        except UnknownNameError:
             times = [f"{each.fired.name}.time" for each in found.instants]
-            raise UnknownNameError("of: " + nearest(name, {*rows.run.names, *times, "time"}, "result", "The run has"))
-        parts = rows.run.columns.components(name)
+            known = {*rows.run.names, *times, "time"}
+            raise UnknownNameError("of: " + nearest(name, known, "result", "The run has")) from None
         if len(parts) > 1:
             raise UnknownNameError(f"of: {name!r} has three components; ask for {name + '.x'!r}, '.y' or '.z'")
         single += parts
-    return dict(zip(names, rows.run.columns.at_rows(single), strict=True))
+    return dict(zip(names, columns.at_rows(single), strict=True))
 
 
-def _result(programs: Programs, at: State, tangent: Matrix, name: str, wanted: Vector) -> tuple[float, Vector]:
-    """A named result at the end and its derivatives, along `tangent`; it has the values `wanted` at the rows."""
-    value, slopes = programs.result(name, at)
+def _require_found_again(name: str, value: float, wanted: Vector) -> None:
+    """Refuse a named result at the end where it is not the last of those at the rows."""
     if not abs(value - wanted[-1]) <= RESULT_RTOL * max(1.0, float(np.max(np.abs(wanted)))):
         raise refused(f"{name!r} is {wanted[-1]:.9g} at its end, which the pass does not find again ({value:.9g})")
-    return value, slopes @ tangent
 
 
 def _with_turns(rows: RunRows, programs: Programs, anchors: Vector) -> Vector:
@@ -112,7 +117,7 @@ def _with_turns(rows: RunRows, programs: Programs, anchors: Vector) -> Vector:
     if not counts:
         return anchors
     found = anchors.copy()
-    found[counts] = StoredStates(rows.record, programs.equations).anchors[-1, counts]
+    found[counts] = rows.anchors[-1, counts]
     return found
 
 

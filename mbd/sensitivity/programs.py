@@ -41,6 +41,9 @@ from mbd.tape.node import Node
 
 __all__ = ["Columns", "Programs", "Sparse", "State"]
 
+RESULT_SEPARATOR = "\n"
+"""Between names of results that one program lists; no name has it."""
+
 
 @dataclass(frozen=True)
 class Columns:
@@ -168,10 +171,9 @@ class Programs:
         size = sum(len(contact.captured) for contact in self.equations.contacts)
         return self._call("captured", at, size)
 
-    def result(self, name: str, at: State) -> tuple[float, Vector]:
-        """A named result and its derivatives."""
-        values, slopes = self._call(f"result {name}", at, 1)
-        return float(values[0]), slopes[0]
+    def results(self, names: Sequence[str], at: State) -> tuple[Vector, Matrix]:
+        """Named results and their derivatives."""
+        return self._call(f"results {RESULT_SEPARATOR.join(names)}", at, len(names))
 
     def derivatives_of(self, name: str, nodes: Sequence[Node], at: State) -> Matrix:
         """Derivatives (len(nodes), columns) of expressions, compiled under a name."""
@@ -238,7 +240,7 @@ class Programs:
             return [value for machine in equations.machines for value in machine.captured]
         if name == "captured":
             return [value for contact in equations.contacts for value in contact.captured]
-        return [equations.output(name.removeprefix("result "))]
+        return [equations.output(each) for each in name.removeprefix("results ").split(RESULT_SEPARATOR)]
 
 
 def paired(equations: Equations) -> list[int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -102,9 +102,14 @@ class RunRows:
         return _integrator_of(str(self.record.settings["integrator"]))
 
     @cached_property
+    def stored(self) -> StoredStates:
+        """The states at its rows, as its results know them."""
+        return cast(StoredStates, self.run.columns)
+
+    @cached_property
     def ends(self) -> Vector:
         """The times of the rows as steps end there: just before an instant at which forces jump."""
-        found = StoredStates(self.record, self.mechanism.equations).times_beside_jumps
+        found = self.stored.times_beside_jumps
         return self.record.time if found is None else found
 
     @cached_property
@@ -136,7 +141,7 @@ class RunRows:
     @cached_property
     def anchors(self) -> Matrix:
         """What contacts hold at every row."""
-        return StoredStates(self.record, self.mechanism.equations).anchors
+        return self.stored.anchors
 
     @cached_property
     def changes(self) -> dict[int, Vector]:

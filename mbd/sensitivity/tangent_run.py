@@ -215,6 +215,9 @@ class TangentRun(Run):
     def collect(self) -> None:
         v, stored, known = self.kernel, self.stored, len(self.events)
         count, logged = int(v.n_stored), int(v.n_logged)
+        if not count and not logged:
+            super().collect()
+            return
         lines = self.stepper.tangent("log").reshape(-1, v.event_width, LANES)[:logged, 0, :DIRECTIONS].copy()
         rows = self.stepper.tangent("store").reshape(-1, v.width, LANES)
         log = v.log[: logged * v.event_width].reshape(logged, v.event_width)

@@ -1,7 +1,8 @@
 """Typed trees of the kernel (`mbd.trees.tree`) → LLVM IR in which every real carries its derivatives.
 
-A real is a value and a vector of `LANES` derivatives, one for each direction; an array of reals is two addresses, the
-array and one with a vector for each of its numbers; the kernel is two tables, whose fields have the same places. Rules
+A real is a value and `LANES` derivatives, one for each direction, in vectors that registers hold; an array of reals is
+two addresses, the array and one with `LANES` numbers for each of its own; the kernel is two tables, whose fields have
+the same places. Rules
 (Griewank & Walther 2008, Evaluating Derivatives, ch. 2): those of + − × ÷, powers, roots and |x|; an extreme or a
 choice takes the derivatives of the value that it takes; integers, conditions and numbers of the record have none.
 Values are computed by the very operations of the kernel, so that a run with derivatives is the run without them;
@@ -22,13 +23,21 @@ from mbd.trees import tree
 
 __all__ = ["LANES", "TangentBody", "is_called_plain", "tangent_text"]
 
-LANES = 32
-"""Derivatives of a real; the last is kept for that by the size of a step, which an event needs."""
-VECTOR = f"<{LANES} x double>"
+WIDTH = 8
+"""Derivatives in one vector: a power of 2, as others are taken apart number by number."""
+LANES = 3 * WIDTH
+"""Derivatives of a real; the last is kept for that by the size of a step, which an event needs.
+
+Two sums of as many stay in the sixteen registers of four numbers that most processors have.
+"""
+PIECES = LANES // WIDTH
+VECTOR = f"<{WIDTH} x double>"
 ROOM = f"[{LANES} x double]"
-"""The same in memory, without gaps between one and the next."""
-WITH_TANGENT = {"real": VECTOR, "reals": "ptr", "kernel": "ptr"}
-ZERO = "zeroinitializer"
+"""All of them in memory, without gaps between one and the next."""
+Parts = tuple[str, ...]
+"""Operands of the derivatives of one value: vectors of those of a real, the address of those of an array or a table."""
+WITH_TANGENT = {"real": PIECES * (VECTOR,), "reals": ("ptr",), "kernel": ("ptr",)}
+ZERO: Parts = PIECES * ("zeroinitializer",)
 HELD_ARRAYS = frozenset(
     (
         "scale", "known", "weight", "blurs", "typical", "largest", "error", "closing_gap", "deepest", "sinking",
@@ -43,8 +52,26 @@ HELD_PLACES = frozenset(
 """The same of single numbers: steps that follow an error are held as they were."""
 PLAIN_PREFIX = "plain_"
 """What names of arrays begin with that are given without derivatives."""
-BUNDLES = {kind: f"{{ {LLVM[kind]}, {more} }}" for kind, more in WITH_TANGENT.items()}
+BUNDLES = {kind: f"{{ {', '.join((LLVM[kind], *more))} }}" for kind, more in WITH_TANGENT.items()}
 """What functions return that return reals, or the address of an array."""
+
+
+def each(line: str) -> str:
+    """A line for every vector of derivatives, whose number stands in the place of #."""
+    return "\n".join(f"  {line.replace('#', str(piece))}" for piece in range(PIECES))
+
+
+def loaded(name: str, address: str) -> str:
+    """Lines that read the derivatives of a number."""
+    place = each(f"%{name}.at.# = getelementptr {VECTOR}, ptr %{address}, i64 #")
+    return place + "\n" + each(f"%{name}.# = load {VECTOR}, ptr %{name}.at.#, align 8")
+
+
+def stored(name: str, address: str) -> str:
+    """Lines that write them."""
+    place = each(f"%{name}.to.# = getelementptr {VECTOR}, ptr %{address}, i64 #")
+    return place + "\n" + each(f"store {VECTOR} %{name}.#, ptr %{name}.to.#, align 8")
+
 
 PRODUCT = f"""\
 define internal void @product(
@@ -85,20 +112,20 @@ input:
   %number.of = select i1 %of.state, i64 %place, i64 %parameter
   %array = select i1 %of.state, ptr %of.block, ptr %of.params
   %source = getelementptr {ROOM}, ptr %array, i64 %number.of
-  %first = load {VECTOR}, ptr %source, align 8
+{loaded("first", "source")}
   %other.at = getelementptr i64, ptr %others, i64 %i
   %other = load i64, ptr %other.at
   %pair = icmp sge i64 %other, 0
   br i1 %pair, label %both, label %keep
 both:
   %second.at = getelementptr {ROOM}, ptr %of.block, i64 %other
-  %second = load {VECTOR}, ptr %second.at, align 8
-  %together = fadd {VECTOR} %first, %second
+{loaded("second", "second.at")}
+{each(f"%together.# = fadd {VECTOR} %first.#, %second.#")}
   br label %keep
 keep:
-  %whole = phi {VECTOR} [ %first, %input ], [ %together, %both ]
+{each(f"%whole.# = phi {VECTOR} [ %first.#, %input ], [ %together.#, %both ]")}
   %kept.at = getelementptr {ROOM}, ptr %room, i64 %i
-  store {VECTOR} %whole, ptr %kept.at, align 8
+{stored("whole", "kept.at")}
   %i.next = add i64 %i, 1
   br label %inputs
 lines:
@@ -112,8 +139,8 @@ line:
   br label %entries
 entries:
   %e = phi i64 [ %begin, %line ], [ %e.next, %add ]
-  %even = phi {VECTOR} [ zeroinitializer, %line ], [ %odd, %add ]
-  %odd = phi {VECTOR} [ zeroinitializer, %line ], [ %total, %add ]
+{each(f"%even.# = phi {VECTOR} [ zeroinitializer, %line ], [ %odd.#, %add ]")}
+{each(f"%odd.# = phi {VECTOR} [ zeroinitializer, %line ], [ %total.#, %add ]")}
   %left = icmp slt i64 %e, %last
   br i1 %left, label %add, label %store
 add:
@@ -122,17 +149,17 @@ add:
   %entry.at = getelementptr double, ptr %numbers, i64 %e
   %number = load double, ptr %entry.at
   %input.at = getelementptr {ROOM}, ptr %room, i64 %column
-  %input.of = load {VECTOR}, ptr %input.at, align 8
+{loaded("input.of", "input.at")}
   %only = insertelement {VECTOR} poison, double %number, i64 0
-  %factor = shufflevector {VECTOR} %only, {VECTOR} poison, <{LANES} x i32> zeroinitializer
-  %part = fmul contract {VECTOR} %factor, %input.of
-  %total = fadd contract {VECTOR} %even, %part
+  %factor = shufflevector {VECTOR} %only, {VECTOR} poison, <{WIDTH} x i32> zeroinitializer
+{each(f"%part.# = fmul contract {VECTOR} %factor, %input.of.#")}
+{each(f"%total.# = fadd contract {VECTOR} %even.#, %part.#")}
   %e.next = add i64 %e, 1
   br label %entries
 store:
-  %sum = fadd {VECTOR} %even, %odd
+{each(f"%sum.# = fadd {VECTOR} %even.#, %odd.#")}
   %out.at = getelementptr {ROOM}, ptr %of.out, i64 %k
-  store {VECTOR} %sum, ptr %out.at, align 8
+{stored("sum", "out.at")}
   %k.next = add i64 %k, 1
   br label %lines
 end:
@@ -143,18 +170,18 @@ end:
 
 
 class Dual(str):
-    """An operand with the operand of its derivatives: a vector of a real, an address of an array or a table."""
+    """An operand with those of its derivatives."""
 
-    tangent: str
+    tangent: Parts
 
-    def __new__(cls, value: str, tangent: str) -> Dual:
+    def __new__(cls, value: str, tangent: Parts) -> Dual:
         found = super().__new__(cls, value)
         found.tangent = tangent
         return found
 
 
-def of(operand: str) -> str:
-    """The operand of the derivatives; zero for what has none."""
+def of(operand: str) -> Parts:
+    """The operands of the derivatives; zero for what has none."""
     return operand.tangent if isinstance(operand, Dual) else ZERO
 
 
@@ -169,8 +196,8 @@ def tangent_text(functions: Sequence[tree.Function], entry: str, held: Collectio
     needed = _reached(functions[-1].symbol, {_name(each): each.called for each in (*bodies, *plain)})
     texts = [body.text(calls[_name(body)] == 1) for body in (*plain, *bodies) if _name(body) in needed]
     head = HEAD + "declare double @log(double) nounwind nobuiltin willreturn memory(none)\n"
-    head += f"declare {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR})\n"
-    head += f"declare double @llvm.vector.reduce.fmax.v{LANES}f64({VECTOR})\n"
+    head += f"declare {VECTOR} @llvm.fabs.v{WIDTH}f64({VECTOR})\n"
+    head += f"declare double @llvm.vector.reduce.fmax.v{WIDTH}f64({VECTOR})\n"
     whole = "\n".join([head, tags(), PRODUCT, *texts])
     return whole.replace(f"internal i64 @{functions[-1].symbol}.d(", f"i64 @{entry}(")
 
@@ -205,59 +232,83 @@ class TangentBody(Body):
         super().begin_arguments()
         for name, kind in self.function.arguments.items():
             if kind in WITH_TANGENT:
-                self.lines.append(f"store {WITH_TANGENT[kind]} %of.{name}, ptr %tangent.{name}{self.align(kind)}")
+                given = [f"%of.{name}.{piece}" for piece in range(len(WITH_TANGENT[kind]))]
+                self.keep(given, kind, f"%tangent.{name}")
 
     def text(self, once: bool) -> str:
         function = self.function
         given = [f"{LLVM[kind]} %in.{name}" for name, kind in function.arguments.items()]
-        given += [f"{WITH_TANGENT[k]} %of.{name}" for name, k in function.arguments.items() if k in WITH_TANGENT]
+        given += [
+            f"{part} %of.{name}.{piece}"
+            for name, kind in function.arguments.items()
+            for piece, part in enumerate(WITH_TANGENT.get(kind, ()))
+        ]
         inlining = " noinline" if function.apart else " alwaysinline" if once else ""
         result = BUNDLES.get(self.result, LLVM[self.result])
         head = f"define internal {result} @{function.symbol}.d({', '.join(given)}) nounwind{inlining} align 64 {{"
         own = [f"%own.{name} = alloca {LLVM[kind]}" for name, kind in function.locals.items()]
-        own += [f"%tangent.{n} = alloca {WITH_TANGENT[k]}" for n, k in function.locals.items() if k in WITH_TANGENT]
+        own += [
+            f"%tangent.{name}.{piece} = alloca {part}"
+            for name, kind in function.locals.items()
+            for piece, part in enumerate(WITH_TANGENT.get(kind, ()))
+        ]
         return "\n".join([head, "entry:", *own, *self.slots, *self.lines, "}"])
 
     @staticmethod
     def align(kind: str) -> str:
         return ", align 8" if kind == "real" else ""
 
-    def vector_slot(self) -> str:
+    def keep(self, given: Sequence[str], kind: str, slot: str) -> None:
+        """Derivatives into memory of their own, which optimization makes names of."""
+        for piece, (operand, part) in enumerate(zip(given, WITH_TANGENT[kind], strict=True)):
+            self.lines.append(f"store {part} {operand}, ptr {slot}.{piece}{self.align(kind)}")
+
+    def kept(self, kind: str, slot: str) -> Parts:
+        """What `keep` has written."""
+        align = self.align(kind)
+        parts = enumerate(WITH_TANGENT[kind])
+        return tuple(self.emit(f"load {part}, ptr {slot}.{piece}{align}") for piece, part in parts)
+
+    def tangent_slot(self, kind: str) -> str:
         name = self.fresh()
-        self.slots.append(f"{name} = alloca {VECTOR}, align 8")
+        self.slots += [f"{name}.{piece} = alloca {part}" for piece, part in enumerate(WITH_TANGENT[kind])]
         return name
 
-    def splat(self, operand: str) -> str:
+    def vectors(self, word: str, *operands: Parts) -> Parts:
+        """An operation on vectors, piece by piece."""
+        return tuple(self.emit(f"{word} {VECTOR} {', '.join(each)}") for each in zip(*operands, strict=True))
+
+    def splat(self, operand: str) -> Parts:
         first = self.emit(f"insertelement {VECTOR} poison, double {operand}, i64 0")
-        return self.emit(f"shufflevector {VECTOR} {first}, {VECTOR} poison, <{LANES} x i32> zeroinitializer")
+        same = self.emit(f"shufflevector {VECTOR} {first}, {VECTOR} poison, <{WIDTH} x i32> zeroinitializer")
+        return PIECES * (same,)
 
-    def scaled(self, factor: str, tangent: str) -> str:
-        """A vector times a number; ZERO stays."""
-        return ZERO if tangent == ZERO else self.emit(f"fmul contract {VECTOR} {self.splat(factor)}, {tangent}")
+    def scaled(self, factor: str, tangent: Parts) -> Parts:
+        """Derivatives times a number; ZERO stays."""
+        return ZERO if tangent == ZERO else self.vectors("fmul contract", self.splat(factor), tangent)
 
-    def sum(self, a: str, b: str, word: str = "fadd") -> str:
+    def sum(self, a: Parts, b: Parts, word: str = "fadd") -> Parts:
         if b == ZERO:
             return a
         if a == ZERO:
-            return b if word == "fadd" else self.emit(f"fneg {VECTOR} {b}")
-        return self.emit(f"{word} contract {VECTOR} {a}, {b}")
+            return b if word == "fadd" else self.vectors("fneg", b)
+        return self.vectors(f"{word} contract", a, b)
 
-    def dual(self, value: str, tangent: str) -> str:
+    def dual(self, value: str, tangent: Parts) -> str:
         return value if tangent == ZERO else Dual(value, tangent)
 
     # statements -----------------------------------------------------------------------------------------------------
     def assign(self, target: tree.Local | tree.Element, value: Value) -> None:
         super().assign(target, value)
         if isinstance(target, tree.Local) and target.kind in WITH_TANGENT:
-            operand = of(self.cast(value, target.kind))
-            kind = WITH_TANGENT[target.kind]
-            self.lines.append(f"store {kind} {operand}, ptr %tangent.{target.name}{self.align(target.kind)}")
+            self.keep(of(self.cast(value, target.kind)), target.kind, f"%tangent.{target.name}")
 
     def store(self, target: tree.Element, place: str, value: Value) -> None:
         super().store(target, place, value)
         if not self.is_held(target):
             tangent = of(self.cast(value, "real"))
-            self.lines.append(f"store {VECTOR} {tangent}, ptr {of(place)}, align 8, !tbaa !{TAGS[target.what]}")
+            for part, address in zip(tangent, self.pieces(place), strict=True):
+                self.lines.append(f"store {VECTOR} {part}, ptr {address}, align 8, !tbaa !{TAGS[target.what]}")
 
     def _Return(self, node: tree.Return) -> None:
         if node.value is None or self.result not in BUNDLES:
@@ -265,8 +316,9 @@ class TangentBody(Body):
             return
         bundle, kind = BUNDLES[self.result], self.result
         value = self.as_kind(node.value, kind)
-        half = self.emit(f"insertvalue {bundle} poison, {LLVM[kind]} {value}, 0")
-        whole = self.emit(f"insertvalue {bundle} {half}, {WITH_TANGENT[kind]} {of(value)}, 1")
+        whole = self.emit(f"insertvalue {bundle} poison, {LLVM[kind]} {value}, 0")
+        for piece, (operand, part) in enumerate(zip(of(value), WITH_TANGENT[kind], strict=True), 1):
+            whole = self.emit(f"insertvalue {bundle} {whole}, {part} {operand}, {piece}")
         self.lines.append(f"ret {bundle} {whole}")
         self.begin(self.label())
 
@@ -275,13 +327,12 @@ class TangentBody(Body):
         value = super()._Local(node)
         if node.kind not in WITH_TANGENT:
             return value
-        tangent = self.emit(f"load {WITH_TANGENT[node.kind]}, ptr %tangent.{node.name}{self.align(node.kind)}")
-        return Dual(value, tangent)
+        return Dual(value, self.kept(node.kind, f"%tangent.{node.name}"))
 
     def _Field(self, node: tree.Field) -> str:
         record = self.value(node.record)[0]
         value = self.field(record, node.name, node.kind)
-        return Dual(value, self.field(of(record), node.name, "reals")) if node.kind == "reals" else value
+        return Dual(value, (self.field(of(record)[0], node.name, "reals"),)) if node.kind == "reals" else value
 
     @staticmethod
     def is_held(node: tree.Element) -> bool:
@@ -298,13 +349,20 @@ class TangentBody(Body):
         place = self.emit(f"getelementptr inbounds {LLVM[node.kind]}, ptr {array}, i64 {index}")
         if self.is_held(node):
             return place
-        return Dual(place, self.emit(f"getelementptr inbounds {ROOM}, ptr {of(array)}, i64 {index}"))
+        return Dual(place, (self.emit(f"getelementptr inbounds {ROOM}, ptr {of(array)[0]}, i64 {index}"),))
+
+    def pieces(self, place: str) -> Parts:
+        """Addresses of the vectors of an element's derivatives."""
+        words = [f"getelementptr inbounds {VECTOR}, ptr {of(place)[0]}, i64 {piece}" for piece in range(PIECES)]
+        return tuple(self.emit(word) for word in words)
 
     def load(self, node: tree.Element, place: str) -> str:
         value = super().load(node, place)
         if self.is_held(node):
             return value
-        return Dual(value, self.emit(f"load {VECTOR}, ptr {of(place)}, align 8, !tbaa !{TAGS[node.what]}"))
+        tag = TAGS[node.what]
+        read = [f"load {VECTOR}, ptr {address}, align 8, !tbaa !{tag}" for address in self.pieces(place)]
+        return Dual(value, tuple(self.emit(word) for word in read))
 
     def operation(self, operator: str, a: str, b: str, kind: str) -> str:
         value = super().operation(operator, a, b, kind)
@@ -339,7 +397,7 @@ class TangentBody(Body):
         if tangent == ZERO:
             return value
         if node.operator == "-":
-            return Dual(value, self.emit(f"fneg {VECTOR} {tangent}"))
+            return Dual(value, self.vectors("fneg", tangent))
         if node.operator == "abs":
             below = self.emit(f"fcmp olt double {operand}, 0.0")
             return Dual(value, self.scaled(self.emit(f"select i1 {below}, double -1.0, double 1.0"), tangent))
@@ -350,19 +408,18 @@ class TangentBody(Body):
     def _Choice(self, node: tree.Choice) -> str:
         if node.kind not in WITH_TANGENT:
             return super()._Choice(node)
-        kind = WITH_TANGENT[node.kind]
         slot, yes, no, end = self.slot(node.kind), self.label(), self.label(), self.label()
-        more = self.vector_slot() if node.kind == "real" else self.slot(node.kind)
+        more = self.tangent_slot(node.kind)
         self.branch(self.as_kind(node.test, "bool"), yes, no)
         for label, choice in ((yes, node.yes), (no, node.no)):
             self.begin(label)
             value = self.as_kind(choice, node.kind)
             self.lines.append(f"store {LLVM[node.kind]} {value}, ptr {slot}")
-            self.lines.append(f"store {kind} {of(value)}, ptr {more}{self.align(node.kind)}")
+            self.keep(of(value), node.kind, more)
             self.go(end)
         self.begin(end)
         value = self.emit(f"load {LLVM[node.kind]}, ptr {slot}")
-        return Dual(value, self.emit(f"load {kind}, ptr {more}{self.align(node.kind)}"))
+        return Dual(value, self.kept(node.kind, more))
 
     def _Extreme(self, node: tree.Extreme) -> str:
         if node.kind != "real":
@@ -374,7 +431,8 @@ class TangentBody(Body):
             better = self.compared(node.operator, (other, "real"), (best, "real"))
             best = self.emit(f"select i1 {better}, double {other}, double {best}")
             if not tangent == of(other) == ZERO:
-                tangent = self.emit(f"select i1 {better}, {VECTOR} {of(other)}, {VECTOR} {tangent}")
+                pairs = zip(of(other), tangent, strict=True)
+                tangent = tuple(self.emit(f"select i1 {better}, {VECTOR} {a}, {VECTOR} {b}") for a, b in pairs)
         return self.dual(best, tangent)
 
     def _Call(self, node: tree.Call) -> str:
@@ -384,8 +442,8 @@ class TangentBody(Body):
         name = node.function.symbol
         operands = [self.as_kind(argument, kind) for argument, kind in zip(node.arguments, kinds, strict=True)]
         if name.startswith("rules.seeded."):
-            lanes = ", ".join(f"double {1.0 if k == LANES - 1 else 0.0}" for k in range(LANES))
-            return Dual(str(operands[0]), f"<{lanes}>")
+            last = ", ".join([*(WIDTH - 1) * ["double 0.0"], "double 1.0"])
+            return Dual(str(operands[0]), (*ZERO[1:], f"<{last}>"))
         if name.startswith("rules.at_root."):
             return self.at_root(*operands)
         if name.startswith("rules.seed_rate."):
@@ -399,7 +457,9 @@ class TangentBody(Body):
         if name.startswith("rules.largest_derivative."):
             return self.largest(operands[0])
         given = [f"{LLVM[kind]} {operand}" for kind, operand in zip(kinds, operands, strict=True)]
-        given += [f"{WITH_TANGENT[k]} {of(each)}" for k, each in zip(kinds, operands, strict=True) if k in WITH_TANGENT]
+        for kind, each in zip(kinds, operands, strict=True):
+            if kind in WITH_TANGENT:
+                given += [f"{part} {operand}" for part, operand in zip(WITH_TANGENT[kind], of(each), strict=True)]
         self.called.append(f"{name}.d")
         result = BUNDLES.get(node.kind, LLVM[node.kind])
         call = f"call {result} @{name}.d({', '.join(given)})"
@@ -409,47 +469,64 @@ class TangentBody(Body):
         both = self.emit(call)
         if node.kind not in BUNDLES:
             return both
-        return Dual(self.emit(f"extractvalue {result} {both}, 0"), self.emit(f"extractvalue {result} {both}, 1"))
+        value, *parts = (
+            self.emit(f"extractvalue {result} {both}, {piece}") for piece in range(1 + len(WITH_TANGENT[node.kind]))
+        )
+        return Dual(value, tuple(parts))
 
     def at_root(self, place: str, value: str) -> str:
         """The place h at which a value is 0: ``h' = −g'/ġ``, with ġ in the last lane; there nothing is left of it."""
         rate = self.last(value)
         over = self.emit(f"fdiv double -1.0, {rate}")
         moved = self.scaled(over, of(value))
-        return Dual(str(place), self.emit(f"insertelement {VECTOR} {moved}, double 0.0, i64 {LANES - 1}"))
+        last = self.emit(f"insertelement {VECTOR} {moved[-1]}, double 0.0, i64 {WIDTH - 1}")
+        return Dual(str(place), (*moved[:-1], last))
 
     def last(self, value: str) -> str:
         """The derivative in the last lane."""
-        return self.emit(f"extractelement {VECTOR} {of(value)}, i64 {LANES - 1}")
+        return self.emit(f"extractelement {VECTOR} {of(value)[-1]}, i64 {WIDTH - 1}")
 
     def takes_part(self, value: str) -> str:
         """Whether a value or one of its derivatives is not 0."""
         own = self.compared("!=", (str(value), "real"), ("0.0", "real"))
         if of(value) == ZERO:
             return own
-        bits = self.emit(f"fcmp une {VECTOR} {of(value)}, {ZERO}")
-        word = self.emit(f"bitcast <{LANES} x i1> {bits} to i{LANES}")
-        return self.emit(f"or i1 {own}, {self.emit(f'icmp ne i{LANES} {word}, 0')}")
+        for part in of(value):
+            bits = self.emit(f"fcmp une {VECTOR} {part}, zeroinitializer")
+            word = self.emit(f"bitcast <{WIDTH} x i1> {bits} to i{WIDTH}")
+            own = self.emit(f"or i1 {own}, {self.emit(f'icmp ne i{WIDTH} {word}, 0')}")
+        return own
 
     def largest(self, value: str) -> str:
         """The largest size of the derivatives."""
         if of(value) == ZERO:
             return "0.0"
-        sizes = self.emit(f"call {VECTOR} @llvm.fabs.v{LANES}f64({VECTOR} {of(value)})")
-        return self.emit(f"call double @llvm.vector.reduce.fmax.v{LANES}f64({VECTOR} {sizes})")
+        largest = [
+            self.emit(
+                f"call double @llvm.vector.reduce.fmax.v{WIDTH}f64({VECTOR} "
+                f"{self.emit(f'call {VECTOR} @llvm.fabs.v{WIDTH}f64({VECTOR} {part})')})"
+            )
+            for part in of(value)
+        ]
+        found = largest[0]
+        for other in largest[1:]:
+            found = self.emit(
+                f"select i1 {self.emit(f'fcmp ogt double {other}, {found}')}, double {other}, double {found}"
+            )
+        return found
 
     def _Evaluate(self, node: tree.Evaluate) -> str:
         table, number = self.value(node.kernel)[0], self.as_kind(node.number, "int")
         inputs = None if node.inputs is None else self.value(node.inputs)[0]
         out = self.value(node.out)[0]
-        tables = table, of(table)
+        tables = table, of(table)[0]
         code, params = ([self.field(each, name, "reals") for each in tables] for name in ("code", "params"))
-        block = [self.field(each, "block", "reals") for each in tables] if inputs is None else [inputs, of(inputs)]
+        block = [self.field(each, "block", "reals") for each in tables] if inputs is None else [inputs, of(inputs)[0]]
         places = [self.emit(f"getelementptr inbounds ptr, ptr {each}, i64 {number}") for each in code]
         function, program = (self.emit(f"load ptr, ptr {place}") for place in places)
         self.lines.append(
             f"call void @product(ptr {program}, ptr {block[0]}, ptr {params[0]}, ptr {block[1]}, ptr {params[1]}, "
-            f"ptr {of(out)})"
+            f"ptr {of(out)[0]})"
         )
         self.lines.append(f"call void {function}(ptr {block[0]}, ptr {params[0]}, ptr {out})")
         return ""

@@ -38,8 +38,9 @@ class Derivative:
 
     Attributes
     ----------
-    address : of ``[code, outputs, ends of their lines, columns, numbers, inputs, places, second places, room]``, as
-        `printer.PRODUCT` reads it: columns are numbers of inputs, whose derivatives come into the room first
+    address : of ``[code, outputs, ends of their lines, columns, numbers, inputs, places, second places, room]``, with
+        the best code that there is now, as `printer.PRODUCT` reads it: columns are numbers of inputs, whose derivatives
+        come into the room first
     """
 
     def __init__(
@@ -65,10 +66,15 @@ class Derivative:
             each.ctypes.data
             for each in (self._ends, known.columns, self._numbers, known.inputs, known.others, self._room)
         )
-        code = 0 if known.function is None else known.function.address
-        words = [code, self._size, ends, columns, numbers, len(known.inputs), inputs, others, room]
+        words = [0, self._size, ends, columns, numbers, len(known.inputs), inputs, others, room]
         self._words = np.array(words, dtype=np.int64)
-        self.address = int(self._words.ctypes.data)
+        self._address = int(self._words.ctypes.data)
+
+    @property
+    def address(self) -> int:
+        if self._known.function is not None:
+            self._words[0] = self._known.function.address
+        return self._address
 
     def product(self, block: Pair, parameters: Pair) -> Matrix:
         """The derivatives of its outputs, in Python."""
@@ -129,7 +135,7 @@ def _made(
         own.append(-1 - index if kind == "p" else layout.place(kind, index))
     made.sort(key=lambda each: each[0])
     if made:
-        mechanism.common.add({symbol: [entry for _, _, entry in made]}, True)
+        mechanism.common.add({symbol: [entry for _, _, entry in made]}, soon=True)
     function = mechanism.common[symbol] if made else None
     lines, columns = ([each[k] for each in made] for k in (0, 1))
     return _Entries(function, *(np.array(each, dtype=np.int64) for each in (lines, columns, own, others)))
@@ -177,7 +183,7 @@ def balance_function(mechanism: Mechanism) -> Any:
     """The code of `balance`."""
 
     def made() -> Any:
-        mechanism.common.add({BALANCE: balance(mechanism)}, True)
+        mechanism.common.add({BALANCE: balance(mechanism)}, soon=True)
         return mechanism.common[BALANCE]
 
     return mechanism.kept(balance_function, made)
