@@ -41,7 +41,7 @@ def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
     numbers: dict[str, Any] = {name: counts[place] for name, place in COUNTS.items()}
     if run.kernel.adaptive:
         numbers["rejected"] = int(run.kernel.n_rejected)
-    if run.kernel.adaptive or (run.kernel.explicit and run.kernel.estimates):
+    if run.kernel.adaptive or run.kernel.estimates:
         numbers["local_errors"] = float(run.kernel.error_sum)
     if run.kernel.n_cones > 0 and run.kernel.strategy == 1:
         numbers["cone_residual"] = float(run.kernel.cone_residual)

@@ -134,8 +134,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given.worker:
         _work()
         return
-    base = DRIVEN if given.driven else SPACE if given.space else 0
+    base, above = (DRIVEN, None) if given.driven else (SPACE, DRIVEN) if given.space else (0, SPACE)
     first, end = (int(part) + base for part in given.scenes.split(":"))
+    if above is not None and end > above:
+        parser.error(f"--scenes ends at {end - base}, expected at most {above - base}: the rest are others")
     began, lock, found = time.perf_counter(), threading.Lock(), list[dict[str, Any]]()
 
     def hear(told: dict[str, Any]) -> None:

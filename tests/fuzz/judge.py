@@ -170,8 +170,6 @@ def between(run: mbd.Trajectory, model: mbd.Model, parameters: Mapping[str, floa
             uncertain = 4 * int(run.stats["singular_steps"])  # a row ends two steps, each looked at twice
             laws.closure(found, bodies, rates="index3" not in run.settings["integrator"], told=uncertain)
             share = 1e-5 if precise else 0.02 + _unresolved(run, times)
-            if has_friction:  # curves pass through rows that may err by tol rad: forces turn by that
-                share += tol
             stiff = unknown_force(bodies, tol, h, laws.size_of(bodies)) if tol and not again else 0.0
             laws.balance(found, bodies, loads(bodies), share, stiff + _turned(run, model, times))
             laws.constraints(found, bodies)

@@ -282,8 +282,8 @@ def _story(run: mbd.Trajectory) -> tuple[int, list[tuple[str, str]]]:
 def _schemes(made: Scene, run: mbd.Trajectory) -> list[str]:
     """Another scheme comes to the same end, within what two thirds of the step change there, and its half there.
 
-    Steps that follow a friction are the same with two thirds of dt: where ends differ by more, they must by less than
-    half with a quarter of it, and by no more than a step of dt leaves open, ``dt² Δa``, or than a note says.
+    Steps that follow a friction are the same with two thirds of dt: where ends differ by more, those with a quarter of
+    dt must differ by less than half, and none by more than its run tells or its order leaves open.
     """
     if run.settings["contact"] == "nonsmooth" or "dt" not in made.options:
         return []
@@ -297,10 +297,12 @@ def _schemes(made: Scene, run: mbd.Trajectory) -> list[str]:
     names = [name for joint in made.model.joints for name in joint.coordinate_names]
     a, b, c, d = (_ends(names, each, run) for each in (run, finer, other, near))
     off, allowed = np.abs(a - c), 27.0 * (np.max(np.abs(a - b)) + np.max(np.abs(c - d))) + 1e-6 * (1.0 + np.abs(a))
-    if np.any(off > allowed) and np.max(off) <= _left_open(made, run):
-        finest = run_of(made, dt=made.options["dt"] / 4.0)
-        if finest.success and np.all(np.abs(_ends(names, finest, run) - c) <= 0.5 * np.max(off)):
-            return []
+    if np.any(off > allowed) and np.max(off) <= _left_open(made, run) + _left_open(made, other):
+        finest = [run_of(made, **more, dt=made.options["dt"] / 4.0) for more in ({}, {"integrator": scheme})]
+        if all(each.success for each in finest):
+            left = np.abs(np.subtract(*(_ends(names, each, run) for each in finest)))
+            if np.all(left <= np.maximum(0.5 * np.max(off), allowed)):
+                return []
     return [
         f"schemes: {names[k]!r} ends at {a[k]:.9g}, with {scheme!r} at {c[k]:.9g}, allowed {allowed[k]:.2g}"
         for k in np.flatnonzero(~(off <= allowed))
@@ -308,11 +310,10 @@ def _schemes(made: Scene, run: mbd.Trajectory) -> list[str]:
 
 
 def _left_open(made: Scene, run: mbd.Trajectory) -> float:
-    """What accelerations change within a step of dt, or the error that a note tells, at the end of a run [m, rad]."""
-    open_ = float(made.options["dt"]) ** 2 * float(np.max(np.ptp(run.record.a, axis=0), initial=0.0))
-    if any("estimated errors of velocities add up" in str(note) for note in run.stats["notes"]):
-        open_ = max(open_, float(run.stats["local_errors"] * made.options["until"]))
-    return open_
+    """Error of the end of a run [m, rad]: what it tells of, or what accelerations change in a step of order 2."""
+    if "local_errors" in run.stats:
+        return float(run.stats["local_errors"]) * float(made.options["until"])
+    return float(made.options["dt"]) ** 2 * float(np.max(np.ptp(run.record.a, axis=0), initial=0.0))
 
 
 def _tolerance(made: Scene, run: mbd.Trajectory) -> list[str]:

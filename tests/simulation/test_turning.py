@@ -42,13 +42,18 @@ def test_a_run_that_turns_beyond_all_numbers_ends_in_an_error(scheme, center):
         spun(rotor(center), 1e14, scheme)
 
 
+def of_turns(run):
+    """The notes of a run but for what RadauIIA estimates of its errors, which a radian in a step makes."""
+    return [note for note in run.stats["notes"] if not note.startswith("estimated errors of velocities")]
+
+
 @pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.GeneralizedAlpha(0.8), mbd.RadauIIA()], ids=repr)
 def test_turns_that_steps_do_not_resolve_are_reported_where_the_motion_follows_from_them(scheme):
     rng = np.random.default_rng(11)
     for speed in np.pi / 1e-2 * np.append(rng.uniform(0.1, 0.9, 2), rng.uniform(1.1, 50.0, 3)):
-        notes = spun(rotor(0.4), speed, scheme).stats["notes"]
+        notes = of_turns(spun(rotor(0.4), speed, scheme))
         assert [note.split(" turns by")[0] for note in notes] == (["'hinge.angle'"] if speed > np.pi / 1e-2 else [])
         assert spun(rotor(), speed, scheme).stats["notes"] == []
         assert spun(rotor(0.4, gravity=(0.0, 0.0, 0.0)), speed, scheme).stats["notes"] == []
-    assert "in one step" in spun(rotor(0.4), 700.0, scheme, store=2).stats["notes"][0]
-    assert spun(rotor(0.4), 100.0, scheme, store=20).stats["notes"] == []
+    assert "in one step" in of_turns(spun(rotor(0.4), 700.0, scheme, store=2))[0]
+    assert of_turns(spun(rotor(0.4), 100.0, scheme, store=20)) == []

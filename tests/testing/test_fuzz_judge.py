@@ -359,3 +359,10 @@ def test_the_judge_sees_accelerations_that_alternate_around_those_of_a_drive():
     place = [c.name for c in run.record.equations.coordinates].index("main.angle")
     wrong = altered(run, "a", np.s_[3::2, place], lambda right: right + 0.2 * np.max(np.abs(right)))
     assert "a drive gives its acceleration" in laws_broken(wrong, model, made.parameters)
+
+
+@pytest.mark.parametrize("given", [("--scenes", "30000000:30000001"), ("--space", "--scenes", "9000000:9000001")])
+def test_numbers_of_scenes_that_would_be_of_another_kind_are_refused(given, capsys):
+    with pytest.raises(SystemExit):
+        batch.main(given)
+    assert "the rest are others" in capsys.readouterr().err

@@ -38,6 +38,11 @@ __all__ = ["MAX_SHORTENINGS", "end_timer", "judge_step"]
 
 MAX_SHORTENINGS = 5
 """Tries of shorter steps as sliding begins or ends [-]."""
+ESTIMATE_EXCESS = 10.0
+"""An estimate of low order over the change of rates, times this, is a step's ratio to the time of a change [-].
+
+The factor of Hairer, Norsett & Wanner 1993, II.10, between two estimates of a step.
+"""
 
 
 def has_spurious_reaction(K: Mechanism) -> bool:
@@ -141,14 +146,22 @@ def find_event(K: Kernel, h: float, t1: float) -> int:
 
 
 def add_error(K: Kernel, h: float, fired: bool) -> None:
-    """The local error of the candidate, or of the part of it before an event, to the sum of all."""
+    """The local error of the candidate, or of the part of it before an event, to the sum of all.
+
+    An implicit scheme with an embedded estimate of order p is a collocation of order 2p − 1: of its estimate e beside
+    the change c of the rates in the step, 1/c of it counts as ``(ESTIMATE_EXCESS e/c)^((2p−1)/p)`` where that is less.
+    """
     if K.adaptive == 1:
         part = max(K.event_after, 0.0) / h if fired else 1.0
         K.error_sum += K.local_error * part ** (K.error_order + 1.0)
-    elif K.explicit == 1 and K.estimates == 1:
+    elif K.estimates == 1:
         largest = 0.0
+        change = 0.0
         for i in range(K.n_v):
             largest = max(largest, abs(K.error[K.n_v + i]))
+            change = max(change, h * max(abs(K.rate[i]), abs(K.rate1[i])))
+        if K.explicit == 0 and ESTIMATE_EXCESS * largest < change:
+            largest *= (ESTIMATE_EXCESS * largest / change) ** (1.0 - 1.0 / K.error_order)
         K.error_sum += largest
 
 
