@@ -264,13 +264,24 @@ class Mechanism:
             return {}, facts
 
         facts, functions = self._compiled(("part", key), make), {}
-        for name in ("tangent", "residual"):
+        names = "tangent", "residual"
+        if not all(self._has_program(facts[f"program of {name}"]) for name in names):
+            # remembered, but not its programs: their nodes and inputs come in another order on another tape
+            while self._unmade:
+                self._unmade.pop(0)()
+            facts = make()[1]
+            self._remembered.keep(("part", key), facts, False)
+        for name in names:
             called, (block, parameters) = facts[f"program of {name}"], facts[f"inputs of {name}"]
             if called not in self.common:
                 self._compiled(called, lambda called=called: ({called: self._drawn[called]}, {}))  # type: ignore[misc]
             functions[name] = Term(self.common[called], _places([]), _places(block), _places(parameters))
         self._parts_of_modes[key] = facts, functions
         return self._parts_of_modes[key]
+
+    def _has_program(self, called: str) -> bool:
+        """Whether a program of a part is there, drawn in this process or remembered, which loads it."""
+        return called in self.common or called in self._drawn or self._remembered.find(called) is not None
 
     def stepping(
         self,

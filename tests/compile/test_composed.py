@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.compile import mechanism as mechanisms
+from mbd.compile import backend as backends, mechanism as mechanisms
+from mbd.compile.cache import ObjectCache
 from mbd.compile.composed import Composed
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.orders import written
@@ -95,3 +96,31 @@ def test_a_run_of_modes_of_parts_is_that_of_whole_modes(scheme, monkeypatch):
         for column, close in (("x", 1e-9), ("y", 1e-9), ("x.rate", 1e-7), ("y.rate", 1e-7)):
             name = f"fly {k}.{column}"
             np.testing.assert_allclose(parts[name][-1], run[name][-1], rtol=0.0, atol=close, err_msg=name)
+
+
+def test_parts_of_which_some_are_remembered_are_the_same(tmp_path, monkeypatch):
+    """Modes asked for in another order number the nodes of their parts in another way."""
+    monkeypatch.setattr(mechanisms, "choose_backend", lambda cache: backends.backend("llvm", 0, cache))
+    model, cache = floor(space=False), ObjectCache(tmp_path)
+    rows, random = derive(model).rows, np.random.default_rng(5)
+    held = [range(9), range(4), range(3, 9), (0, 8)]
+    modes = [(tuple(k for k, row in enumerate(rows) if row.contact in {-1, *each}), (), True) for each in held]
+    modes += [(mode[0], (), False) for mode in modes[:2]]
+
+    def values(modes, cache):
+        found = Mechanism(derive(model), cache)
+        block = np.random.default_rng(4).uniform(-1.0, 1.0, found.layout.size)
+        outputs = {}
+        for mode in modes:
+            code = found.mode(*mode)
+            outputs[mode] = np.zeros(code.tangent.size)
+            code.tangent(block, found.parameters(), outputs[mode])
+        return outputs
+
+    expected = values(modes, ObjectCache())
+    for _ in range(8):
+        for mode, found in values([modes[k] for k in random.permutation(len(modes))[:4]], cache).items():
+            np.testing.assert_allclose(found, expected[mode], rtol=1e-12, atol=1e-12 * np.abs(expected[mode]).max())
+        for path in sorted(tmp_path.iterdir()):
+            if random.random() < 0.2:
+                path.unlink()
