@@ -121,8 +121,9 @@ def assemble(
     equations, values = mechanism.equations, mechanism.parameters(changed, getattr(model, "parameters", {}))
     manager = manager_of(mechanism, values)
     named, faults = _named(model, mechanism, position or {}, velocity or {})
+    known = manager.names
     for what, names in (("closed", closed), ("open", opened)):
-        faults += [f"{what}: " + nearest(name, manager.names, "contact") for name in names if name not in manager.names]
+        faults += [f"{what}: " + nearest(name, known, "contact") for name in names if name not in known]
     faults += [f"contact {name!r} is named both closed and open" for name in set(closed) & set(opened)]
     if faults:
         raise UnknownNameError(faults)

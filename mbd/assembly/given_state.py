@@ -79,7 +79,8 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
             f"the model has {', '.join(names)} and {equations.n_z} states; assemble it from this model"
         )
     contacts = [*sorted(start.mode.closed), *sorted(start.armed or ())]
-    unknown = [nearest(name, manager.names, "contact") for name in dict.fromkeys(contacts) if name not in manager.names]
+    known = manager.names
+    unknown = [nearest(name, known, "contact") for name in dict.fromkeys(contacts) if name not in known]
     if unknown:
         raise UnknownNameError(unknown)
     if len(start.anchors) != anchors and (start.mode.closed or (len(start.anchors) and equations.turns)):

@@ -127,19 +127,32 @@ def remaining_norm(K: DependentRows, row: int, kept: int) -> float:
     K.lower[kept * K.n_rows : kept * K.n_rows + kept] = 0.0
     for _ in range(2):
         for i in range(kept):
-            K.lower[kept * K.n_rows + i] += clear_row(K.basis, base, i * n, n)
+            first = K.support[2 * i]
+            K.lower[kept * K.n_rows + i] += clear_row(
+                K.basis, base + first, i * n + first, K.support[2 * i + 1] - first
+            )
     left = square(K.basis, base, n)
     return float(sqrt(left / size)) if size > 0.0 else 0.0
 
 
 def keep_row(K: DependentRows, row: int, kept: int) -> None:
-    """The next vector of K.basis, which `remaining_norm` has found, gets length 1; its row number into K.columns."""
+    """The next vector of K.basis, which `remaining_norm` has found, gets length 1; its row number into K.columns.
+
+    K.support tells from where to where it has entries: rows of one part of a mechanism have nothing to do with others.
+    """
     n = K.n
     left = sqrt(square(K.basis, kept * n, n)) + 1e-300
     K.lower[kept * K.n_rows + kept] = left
+    first = n
+    end = n
     for j in range(n):
         K.basis[kept * n + j] /= left
+        if takes_part(K.basis[kept * n + j]):
+            first = min(first, j)
+            end = j + 1
     K.columns[kept] = row
+    K.support[2 * kept] = first
+    K.support[2 * kept + 1] = end
 
 
 def combine(K: DependentRows, row: int, kept: int) -> None:
