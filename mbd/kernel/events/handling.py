@@ -20,7 +20,7 @@ from mbd.kernel.contact.nonsmooth import keep, put_back, rebound, strike
 from mbd.kernel.events.crowding import count_impact
 from mbd.kernel.events.guard_sides import find_crossings, find_passed, is_at_event, keep_at_zero, log_crossings
 from mbd.kernel.events.guards import update_side
-from mbd.kernel.events.impulses import presses
+from mbd.kernel.events.impulses import is_followed_by_impulse
 from mbd.kernel.events.switching import switch
 from mbd.kernel.events.transitions import has_happened, is_allowed, settle_fresh, take_transitions
 from mbd.kernel.records import Guards, Kernel, Switching
@@ -137,7 +137,7 @@ def handle_event(K: Kernel) -> int:
         K.restart_due = 1
         return EVENT if is_awaited(K, first) else -1
     if kind == CLOSE and K.n_switches > K.max_switches // 2:  # impacts by turns: their limit is plastic, all at once
-        if presses(K, index):
+        if is_followed_by_impulse(K, index):
             return CHATTER
         K.plastic_impact = 1
         K.n_endless += 1

@@ -13,7 +13,7 @@ from mbd.kernel.contact.impact import impact
 from mbd.kernel.records import Contacts, Switching
 from mbd.kernel.stepping.restart import evaluate
 
-__all__ = ["AFTER", "BEFORE", "BESIDE", "presses", "push"]
+__all__ = ["AFTER", "BEFORE", "BESIDE", "is_followed_by_impulse", "push"]
 
 BEFORE, BESIDE, AFTER = 0, 1, 2
 """Orders of impulses, as `mbd.constraints.impulse.ORDERS` has them."""
@@ -24,7 +24,7 @@ def is_pushed(K: Contacts, i: int, order: int) -> bool:
     return bool(K.impulse_order[i] == order and K.closing[K.impulse_contact[i]] == 1)
 
 
-def presses(K: Switching, c: int) -> bool:
+def is_followed_by_impulse(K: Contacts, c: int) -> bool:
     """Whether an impulse follows each strike of contact c, so that strikes at one instant have no limit."""
     found = False
     for i in range(K.n_impulses):
