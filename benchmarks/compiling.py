@@ -12,6 +12,7 @@ from benchmarks.stopwatch import processor_seconds
 from benchmarks.walkers import kneed_model
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.derivation import derive
+from mbd.equations.programs import ActiveSet
 from mbd.kernel.contact.active_set import ActiveSetManager
 
 __all__ = ["MODES", "measure", "python_loop"]
@@ -66,7 +67,7 @@ def _make(folder: str, modes: int) -> None:
         manager = ActiveSetManager(mechanism.equations)
         for closed in MODES[:modes]:
             flags = manager.flags(closed)
-            mechanism.stepping(manager.active_rows(flags), manager.penalties(flags), stabilized=True)
+            mechanism.stepping(ActiveSet(manager.active_rows(flags), manager.penalties(flags)))
     finally:
         del os.environ["MBD_CACHE"]
         if before is not None:

@@ -32,9 +32,9 @@ def measure() -> list[Figure]:
         rows = manager.active_rows(manager.flags(closed))
         outputs = {"accelerations": programs.accelerations(equations), "guards": programs.guards(equations)}
         for form, stabilized in ("index 3", False), ("stabilized", True):
-            outputs[f"tangent, {form}"] = programs.newton(equations, rows, (), stabilized)
-            outputs[f"residual, {form}"] = programs.residual(equations, rows, (), stabilized)
-            straight = programs.correction(equations, rows, (), stabilized)
+            outputs[f"tangent, {form}"] = programs.newton(equations, programs.ActiveSet(rows, (), stabilized))
+            outputs[f"residual, {form}"] = programs.residual(equations, programs.ActiveSet(rows, (), stabilized))
+            straight = programs.correction(equations, programs.ActiveSet(rows, (), stabilized))
             outputs[f"correction, {form}"] = straight.outputs if straight else []
             outputs[f"solution, {form}"] = straight.solution if straight else []
         figures += [Figure(f"{name}: {program}", total(nodes), "ops") for program, nodes in outputs.items() if nodes]

@@ -80,7 +80,7 @@ def _counts() -> list[Figure]:
     for name, make in (("in flight", _flying), ("on two feet", _standing)):
         equations = derive(make())
         rows = ActiveSetManager(equations).active_rows(())
-        tangent = operations(programs.newton(equations, rows, (), True))
+        tangent = operations(programs.newton(equations, programs.ActiveSet(rows)))
         found.append(Figure(f"person {name}: tangent, stabilized", tangent, "ops"))
     return found
 
@@ -166,7 +166,7 @@ def _make(folder: str, wait: bool = False) -> None:
     os.environ["MBD_CACHE"] = folder
     try:
         mechanism = Mechanism(derive(_flying()))
-        mechanism.stepping(ActiveSetManager(mechanism.equations).active_rows(()), (), stabilized=True)
+        mechanism.stepping(programs.ActiveSet(ActiveSetManager(mechanism.equations).active_rows(())))
         if wait:
             finish()
     finally:

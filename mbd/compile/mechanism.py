@@ -26,6 +26,7 @@ from mbd.equations.charts import chart_end, chart_motion
 from mbd.equations.composition import Part, composes, own_program
 from mbd.equations.equations import Equations
 from mbd.equations.explicit_solution import explicit_solution
+from mbd.equations.programs import ActiveSet
 from mbd.equations.sizes import require_room_for_tangent, tangent_refused
 from mbd.errors import MemoryLimitError, ModelError, UnknownNameError, nearest
 from mbd.tape.derivatives import live
@@ -38,20 +39,17 @@ __all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
 class ModeCode:
     """Code of one contact mode: Newton tangent with residual, and residual alone.
 
+    active : what acts in it
     correction, solution : the tangent with its factors and what solves with these (see `programs.correction`), or None
-    given_rows : rows that depend on `rows`; their multipliers are given and act
     order : in which the matrices of many unknowns are eliminated (see `orders`), or None
     rates, returns : accelerations, and corrections onto the rows (see `mbd.equations.explicit_solution`), or None
     """
 
-    rows: tuple[int, ...]
-    penalties: tuple[int, ...]
-    sliding: tuple[int, ...]
+    active: ActiveSet
     tangent: Any
     residual: Any
     correction: Any = None
     solution: Any = None
-    given_rows: tuple[int, ...] = ()
     order: Any = None
     rates: Any = None
     returns: Any = None
@@ -114,7 +112,7 @@ class Mechanism:
         self.postponed: list[Postponed] = []
         self.without_effect: frozenset[str] = frozenset()
         self._modes: dict[tuple[Any, ...], ModeCode] = {}
-        self._parts_of_modes: dict[tuple[Part, bool], tuple[Facts, dict[str, Term]]] = {}
+        self._parts_of_modes: dict[Part, tuple[Facts, dict[str, Term]]] = {}
         self._drawn: dict[str, Sequence[Node]] = {}
         self._has_free_rates: bool | None = None
         equations.memory["mechanism"] = ref(self)
@@ -176,41 +174,27 @@ class Mechanism:
         found = programs.free_rates(self.equations, self._accelerations[n * n : n * (n + 1)])
         return {} if found is None else {"free_rates": found}, {"found": found is not None}
 
-    def mode(
-        self,
-        rows: Sequence[int],
-        penalties: Sequence[int],
-        stabilized: bool,
-        sliding: Sequence[int] = (),
-        given_rows: Sequence[int] = (),
-    ) -> ModeCode:
-        """Code of the mode with these rows, penalty contacts and sliding frictions, made on first use.
-
-        given_rows : rows that depend on those, with given multipliers
-        """
-        key = (tuple(rows), tuple(penalties), tuple(sliding), tuple(given_rows), stabilized)
+    def mode(self, active: ActiveSet) -> ModeCode:
+        """Code of a contact mode, made on first use."""
         with self.equations.tape.lock:  # runs in other threads share this mechanism
-            if key not in self._modes and self._composes:
-                self._modes[key] = self._composed(key)
-            elif key not in self._modes:
+            if active not in self._modes and self._composes:
+                self._modes[active] = self._composed(active)
+            elif active not in self._modes:
 
                 def make() -> Made:
                     require_room_for_tangent(len(self.equations.tape.nodes))
-                    outputs = self._of(key, programs.newton)
-                    order = self._order(pattern(outputs, self.layout.n + len(key[0])), key[0])
-                    return {"tangent": outputs, "residual": self._of(key, programs.residual)}, {"order": order}
+                    outputs = programs.newton(self.equations, active)
+                    order = self._order(pattern(outputs, self.layout.n + len(active.rows)), active.rows)
+                    return {"tangent": outputs, "residual": programs.residual(self.equations, active)}, {"order": order}
 
-                facts, (tangent, residual) = self._add("mode", key, ("tangent", "residual"), make)
-                self._modes[key] = ModeCode(
-                    key[0], key[1], key[2], tangent, residual, given_rows=key[3], order=_numbers(facts["order"])
-                )
-            return self._modes[key]
+                facts, (tangent, residual) = self._add("mode", active, ("tangent", "residual"), make)
+                self._modes[active] = ModeCode(active, tangent, residual, order=_numbers(facts["order"]))
+            return self._modes[active]
 
-    def _composed(self, mode: Any) -> ModeCode:
+    def _composed(self, active: ActiveSet) -> ModeCode:
         """A mode of parts, each of which is made the first time that a mode needs it."""
-        *kinds, stabilized = mode
-        parts = [self._part(part, stabilized) for part in Part.of_mode(self.equations, *kinds)]
-        rows, n = tuple(sorted(mode[0])), self.layout.n
+        parts = [self._part(part) for part in Part.of_mode(self.equations, active)]
+        rows, n, stabilized = tuple(sorted(active.rows)), self.layout.n, active.stabilized
         size, n_v = n + len(rows), self.layout.n_v
         shape, short = (Shape(n, n_v, rows, stabilized, whole) for whole in (True, False))
 
@@ -225,7 +209,7 @@ class Mechanism:
                         entries[at] = is_number and at not in entries
             return {}, {"order": self._order(entries, rows)}
 
-        facts = self._compiled(("order", mode), make)
+        facts = self._compiled(("order", active), make)
         order, cleared = _numbers(facts["order"]), None
         if order is not None:
             matrix, turning = written(order, n, n_v, stabilized)
@@ -236,25 +220,24 @@ class Mechanism:
             return Composed(name, terms, shape.size, cleared)
 
         tangent, residual = summed("tangent", shape, cleared), summed("residual", short)
-        return ModeCode(mode[0], mode[1], mode[2], tangent, residual, given_rows=mode[3], order=order)
+        return ModeCode(active, tangent, residual, order=order)
 
-    def _part(self, part: Part, stabilized: bool) -> tuple[Facts, dict[str, Term]]:
+    def _part(self, part: Part) -> tuple[Facts, dict[str, Term]]:
         """Where the outputs of a part of a mode go, and its functions; the same one for all contacts of a kind."""
-        key = (part, stabilized)
-        if key in self._parts_of_modes:
-            return self._parts_of_modes[key]
+        if part in self._parts_of_modes:
+            return self._parts_of_modes[part]
 
         def make() -> Made:
             require_room_for_tangent(len(self.equations.tape.nodes))
             facts: dict[str, Any] = {}
             for name, made in (("tangent", part.newton), ("residual", part.residual)):
-                found = made(self.equations, stabilized)
+                found = made(self.equations)
                 outputs, inputs = [node for _, node in found], list[tuple[str, int]]()
                 facts[name], facts[f"units of {name}"] = [at for at, _ in found], [is_unit(node) for node in outputs]
                 if part.contact >= 0 and not any(node.op == "table" for node in live(outputs)):
                     outputs, inputs = own_program(outputs)
                 tape = outputs[0].tape if outputs else self.equations.tape
-                known = (tuple(tape.keys()), [node.index for node in outputs]) if inputs else key
+                known = (tuple(tape.keys()), [node.index for node in outputs]) if inputs else part
                 facts[f"program of {name}"] = called = f"{name}_{key_of(repr(known))[:16]}"
                 facts[f"inputs of {name}"] = [
                     [self.layout.place(kind, i) for kind, i in inputs if kind != "p"],
@@ -263,123 +246,96 @@ class Mechanism:
                 self._drawn[called] = outputs
             return {}, facts
 
-        facts, functions = self._compiled(("part", key), make), {}
+        facts, functions = self._compiled(("part", part), make), {}
         names = "tangent", "residual"
         if not all(self._has_program(facts[f"program of {name}"]) for name in names):
             # remembered, but not its programs: their nodes and inputs come in another order on another tape
             while self._unmade:
                 self._unmade.pop(0)()
             facts = make()[1]
-            self._remembered.keep(("part", key), facts, False)
+            self._remembered.keep(("part", part), facts, False)
         for name in names:
             called, (block, parameters) = facts[f"program of {name}"], facts[f"inputs of {name}"]
             if called not in self.common:
                 self._compiled(called, lambda called=called: ({called: self._drawn[called]}, {}))  # type: ignore[misc]
             functions[name] = Term(self.common[called], _places([]), _places(block), _places(parameters))
-        self._parts_of_modes[key] = facts, functions
-        return self._parts_of_modes[key]
+        self._parts_of_modes[part] = facts, functions
+        return self._parts_of_modes[part]
 
     def _has_program(self, called: str) -> bool:
         """Whether a program of a part is there, drawn in this process or remembered, which loads it."""
         return called in self.common or called in self._drawn or self._remembered.find(called) is not None
 
-    def stepping(
-        self,
-        rows: Sequence[int],
-        penalties: Sequence[int],
-        stabilized: bool,
-        sliding: Sequence[int] = (),
-        given_rows: Sequence[int] = (),
-    ) -> ModeCode:
+    def stepping(self, active: ActiveSet) -> ModeCode:
         """The same for the compiled kernel: with factors in straight-line code where that pays and no row is `given`.
 
         The tangent as a matrix is then needed only where a pivot of these is too small; it is made the first time.
         """
-        if given_rows:
-            return self.mode(rows, penalties, stabilized, sliding, given_rows)
-        mode = (tuple(rows), tuple(penalties), tuple(sliding), (), stabilized)
-        key = (*mode, "stepping")
+        if active.given_rows:
+            return self.mode(active)
+        key = (*active, "stepping")
         with self.equations.tape.lock:
             if key not in self._modes:
-                self._modes[key] = self._straight(mode) or self.mode(rows, penalties, stabilized, sliding)
+                self._modes[key] = self._straight(active) or self.mode(active)
             return self._modes[key]
 
-    def explicit(
-        self,
-        rows: Sequence[int],
-        penalties: Sequence[int],
-        stabilized: bool,
-        sliding: Sequence[int] = (),
-        given_rows: Sequence[int] = (),
-    ) -> ModeCode:
+    def explicit(self, active: ActiveSet) -> ModeCode:
         """The same for steps that ask for accelerations alone: tangent and residual are made if somebody calls them."""
-        mode = (tuple(rows), tuple(penalties), tuple(sliding), tuple(given_rows), stabilized)
-        key = (*mode, "explicit")
+        key = (*active, "explicit")
         with self.equations.tape.lock:
             if key not in self._modes:
-                n, m = self.layout.n, len(rows)
-                tail = n + (2 if stabilized else 1) * m
-                size = (n + m) ** 2 + tail + (m * self.layout.n_v if stabilized else 0)
-                tangent = self._later("tangent", mode, size, self._newton)
-                residual = self._later("residual", mode, tail, programs.residual)
+                n, rows = self.layout.n, active.rows
+                tangent = self._later("tangent", active, active.size(n, self.layout.n_v), self._newton)
+                residual = self._later("residual", active, active.tail(n), programs.residual)
 
                 def make() -> Made:
                     order = None
                     pays = may_pay(self._filled, n, sorted(rows))
                     if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
-                        order = self._order(pattern(self._of(mode, programs.newton), n + m), rows)
+                        order = self._order(pattern(programs.newton(self.equations, active), n + len(rows)), rows)
                     found = None
-                    if order is None and not given_rows:
+                    if order is None and not active.given_rows:
                         found = explicit_solution(self.equations, self._accelerations, sorted(rows))
                     made = {} if found is None else {"rates": found.rates, "returns": found.returns}
                     return made, {"order": order}
 
-                facts, made = self._add("explicit", mode, ("rates", "returns"), make)
+                facts, made = self._add("explicit", active, ("rates", "returns"), make)
                 rates, returns = made or (None, None)
-                self._modes[key] = ModeCode(
-                    *mode[:3], tangent, residual, given_rows=mode[3], order=_numbers(facts["order"]), rates=rates,
-                    returns=returns,
-                )  # fmt: skip
+                order = _numbers(facts["order"])
+                self._modes[key] = ModeCode(active, tangent, residual, order=order, rates=rates, returns=returns)
             return self._modes[key]
 
-    def _straight(self, mode: Any) -> ModeCode | None:
+    def _straight(self, active: ActiveSet) -> ModeCode | None:
         """A mode with factors, None where they do not pay."""
         names = "residual", "correction", "solution"
 
         def make() -> Made:
             require_room_for_tangent(len(self.equations.tape.nodes))
-            rows, penalties, sliding, _, stabilized = mode
-            found = programs.correction(self.equations, rows, penalties, stabilized, sliding)
+            found = programs.correction(self.equations, active)
             if found is None:
                 return {}, {"tail": None}
-            residual = self._of(mode, programs.residual)
+            residual = programs.residual(self.equations, active)
             return dict(zip(names, (residual, found.outputs, found.solution), strict=True)), {"tail": found.tail}
 
-        facts, functions = self._add("straight", mode, names, make)
+        facts, functions = self._add("straight", active, names, make)
         if facts["tail"] is None:
             return None
         residual, first, again = functions
-        size = (self.layout.n + len(mode[0])) ** 2 + facts["tail"]
-        tangent = self._later("tangent", mode, size, self._newton)
-        return ModeCode(mode[0], mode[1], mode[2], tangent, residual, first, again)
+        tangent = self._later("tangent", active, active.size(self.layout.n, self.layout.n_v), self._newton)
+        return ModeCode(active, tangent, residual, first, again)
 
-    def _of(self, mode: Any, make: Callable[..., Sequence[Node]]) -> Sequence[Node]:
-        """A program of a mode (rows, penalties, frictions, given rows, form)."""
-        rows, penalties, sliding, given_rows, stabilized = mode
-        return make(self.equations, rows, penalties, stabilized, sliding, given_rows)
-
-    def _newton(self, equations: Equations, *mode: Any) -> Sequence[Node]:
+    def _newton(self, equations: Equations, active: ActiveSet) -> Sequence[Node]:
         """`programs.newton` within a run, which ends in order where it does not fit into the memory that is free."""
         refused = tangent_refused(len(equations.tape.nodes))
         if refused:
             raise MemoryLimitError(f"a step needs the tangent as a matrix: {refused}")
-        return programs.newton(equations, *mode)
+        return programs.newton(equations, active)
 
-    def _later(self, name: str, mode: Any, size: int, maker: Callable[..., Sequence[Node]]) -> Postponed:
+    def _later(self, name: str, active: ActiveSet, size: int, maker: Callable[..., Sequence[Node]]) -> Postponed:
         """A program of a mode, of so many outputs, that is compiled when it is called first."""
 
         def make() -> Function:
-            return self._add(name, mode, (name,), lambda: ({name: self._of(mode, maker)}, {}))[1][0]
+            return self._add(name, active, (name,), lambda: ({name: maker(self.equations, active)}, {}))[1][0]
 
         later = Postponed(make, size)
         self.postponed.append(later)
@@ -392,13 +348,13 @@ class Mechanism:
         return None if found is None else list(found.tolist())
 
     def _add(
-        self, kind: str, mode: Any, names: Sequence[str], make: Callable[[], Made]
+        self, kind: str, active: ActiveSet, names: Sequence[str], make: Callable[[], Made]
     ) -> tuple[Facts, list[Function]]:
         """Compile those programs of a mode that there are not yet, with the mode in their names; facts and functions.
 
         There are none where `make` makes none.
         """
-        own = f"_{key_of(repr(mode))[:16]}"
+        own = f"_{key_of(repr(active))[:16]}"
         with self.equations.tape.lock:
             started = perf_counter()
             wanted = tuple(name for name in names if name + own not in self.common)
@@ -407,7 +363,7 @@ class Mechanism:
                 made, facts = make()
                 return {name + own: made[name] for name in wanted if name in made}, facts
 
-            facts = self._compiled((kind, mode, wanted), named)
+            facts = self._compiled((kind, active, wanted), named)
             self.seconds += perf_counter() - started
             return facts, [self.common[name + own] for name in names if name + own in self.common]
 

@@ -47,65 +47,56 @@ def composes(equations: Equations) -> bool:
 
 @dataclass(frozen=True)
 class Part:
-    """The rows, penalty contacts, sliding frictions and given rows of a mode that belong to one contact.
+    """What of a mode belongs to one contact.
 
     contact : its number; −1 for the balance, and what belongs to no contact
+    active : its rows, penalty, sliding frictions and given rows
     """
 
     contact: int
-    rows: tuple[int, ...] = ()
-    penalties: tuple[int, ...] = ()
-    sliding: tuple[int, ...] = ()
-    given_rows: tuple[int, ...] = ()
+    active: programs.ActiveSet
 
     @classmethod
-    def of_mode(
-        cls,
-        equations: Equations,
-        rows: Sequence[int],
-        penalties: Sequence[int],
-        sliding: Sequence[int],
-        given_rows: Sequence[int],
-    ) -> list[Part]:
+    def of_mode(cls, equations: Equations, mode: programs.ActiveSet) -> list[Part]:
         """The parts of a mode, the common one first."""
-        kinds = (rows, penalties, sliding, given_rows)
+        kinds = (mode.rows, mode.penalties, mode.sliding, mode.given_rows)
         owners = (
-            [equations.rows[k].contact for k in rows], list(penalties),
-            [equations.frictions[k].contact for k in sliding], [equations.rows[k].contact for k in given_rows],
+            [equations.rows[k].contact for k in mode.rows], list(mode.penalties),
+            [equations.frictions[k].contact for k in mode.sliding],
+            [equations.rows[k].contact for k in mode.given_rows],
         )  # fmt: skip
         own: dict[int, tuple[list[int], ...]] = {-1: ([], [], [], [])}
         for place, (numbers, contacts) in enumerate(zip(kinds, owners, strict=True)):
             for number, contact in zip(numbers, contacts, strict=True):
                 own.setdefault(contact, ([], [], [], []))[place].append(number)
-        return [cls(contact, *map(tuple, own[contact])) for contact in sorted(own)]
+        found = []
+        for contact in sorted(own):
+            rows, penalties, sliding, given_rows = map(tuple, own[contact])
+            found.append(cls(contact, programs.ActiveSet(rows, penalties, mode.stabilized, sliding, given_rows)))
+        return found
 
-    def newton(self, equations: Equations, stabilized: bool) -> Sparse:
+    def newton(self, equations: Equations) -> Sparse:
         """What is not zero of its share in `programs.newton`."""
-        rows = sorted(self.rows)
-        S, right, bottom, tail = programs.system(
-            equations, rows, self.penalties, stabilized, self.sliding, self.given_rows, alone=self.contact >= 0
-        )
+        rows = sorted(self.active.rows)
+        S, right, bottom, tail = programs.system(equations, self.active, alone=self.contact >= 0)
         n, zero = len(S), equations.tape.zero
         found = [
             ((MATRIX, i, j), S[j][i]) for j in range(n) if any(node is not zero for node in S[j]) for i in range(n)
         ]
         found += [((RIGHT, i, row), line[i]) for row, line in zip(rows, right, strict=True) for i in range(n)]
         found += [((BOTTOM, row, j), line[j]) for row, line in zip(rows, bottom, strict=True) for j in range(len(line))]
-        return _filled(found + self._tail(tail, rows, n, equations.n_v, stabilized))
+        return _filled(found + self._tail(tail, n, equations.n_v))
 
-    def residual(self, equations: Equations, stabilized: bool) -> Sparse:
+    def residual(self, equations: Equations) -> Sparse:
         """What is not zero of its share in `programs.residual`."""
-        rows = sorted(self.rows)
-        outputs = programs.residual(
-            equations, rows, self.penalties, stabilized, self.sliding, self.given_rows, alone=self.contact >= 0
-        )
-        n = equations.n_v + equations.n_z
-        return _filled(self._tail(outputs, rows, n, equations.n_v, stabilized))
+        outputs = programs.residual(equations, self.active, alone=self.contact >= 0)
+        return _filled(self._tail(outputs, equations.n_v + equations.n_z, equations.n_v))
 
-    def _tail(self, outputs: Sequence[Node], rows: list[int], n: int, n_v: int, stabilized: bool) -> Sparse:
+    def _tail(self, outputs: Sequence[Node], n: int, n_v: int) -> Sparse:
         """r | h | ḣ | ∂ḣ/∂x with their places."""
+        rows = sorted(self.active.rows)
         places = [(RESIDUAL, i, 0) for i in range(n)] + [(VALUE, row, 0) for row in rows]
-        if stabilized:
+        if self.active.stabilized:
             places += [(RATE, row, 0) for row in rows] + [(TURNING, row, j) for row in rows for j in range(n_v)]
         return list(zip(places, outputs, strict=False))
 

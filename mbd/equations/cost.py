@@ -7,7 +7,7 @@ from typing import Any
 
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
-from mbd.equations.programs import accelerations, guards, newton, residual
+from mbd.equations.programs import ActiveSet, accelerations, guards, newton, residual
 from mbd.notebook import table
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
@@ -82,13 +82,12 @@ def cost(model: Any) -> Cost:
     model = model.without(*described) if described else model  # they take no operation, and may need an effect
     equations = derive(model)
     base = _newton(equations)
-    mode = equations.bilateral
     rubbing = {f"{friction.name} friction": k for k, friction in enumerate(equations.frictions)}
     effects = [effect.name for effect in equations.effects if effect.contact < 0 and effect.name not in rubbing]
     return Cost(
         equations.name,
         newton=base,
-        residual=operations(residual(equations, mode, (), stabilized=False)),
+        residual=operations(residual(equations, ActiveSet(equations.bilateral, (), False))),
         accelerations=operations(accelerations(equations)),
         guards=operations(guards(equations)),
         effects={name: base - _newton(derive(model.without(name))) for name in effects},
@@ -102,11 +101,11 @@ def _sliding(equations: Equations, friction: int) -> int:
     contact = equations.frictions[friction].contact
     rows = [] if contact < 0 else [k for k in equations.contacts[contact].rows if equations.rows[k].friction < 0]
     sliding = equations.frictions[friction].group or (friction,)
-    return operations(newton(equations, [*equations.bilateral, *rows], (), False, sliding))
+    return operations(newton(equations, ActiveSet([*equations.bilateral, *rows], (), False, sliding)))
 
 
 def _newton(equations: Equations, closed: int | None = None) -> int:
     """Operations of one Newton iteration, with one contact closed or none."""
     contact = () if closed is None else equations.contacts[closed].rows
     penalties = () if closed is None or contact else (closed,)
-    return operations(newton(equations, [*equations.bilateral, *contact], penalties, stabilized=False))
+    return operations(newton(equations, ActiveSet([*equations.bilateral, *contact], penalties, False)))

@@ -14,7 +14,7 @@ from mbd.equations.contacts import anchors_held, laws
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.dynamics import Dynamics, Work
 from mbd.equations.effects import causes, effect_of, weight_of
-from mbd.equations.equations import Equations, Facing
+from mbd.equations.equations import ActingForces, Equations, Facing
 from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.gathered import Gathered
 from mbd.equations.held_forces import HeldForces, held_force_faults
@@ -266,55 +266,29 @@ class TreeGeometry:
                 trees.setdefault(body.path[0], set()).update(body.path)
         return max(map(len, trees.values()), default=0)
 
-    def balance_with(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> list[Node]:
+    def balance_with(self, forces: ActingForces) -> list[Node]:
         """The balance with forces on these values and velocities in the same reverse sweep."""
-        work = self.work + self._viewed(values, multipliers, rates, forces)
+        work = self.work + self._viewed(forces)
         return [*self.dynamics.balance(work), *self.rests]
 
-    def forces(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> list[Node]:
+    def forces(self, forces: ActingForces) -> list[Node]:
         """What `balance_with` adds to the balance."""
-        pushed = self.dynamics.generalized(self._viewed(values, multipliers, rates, forces))
+        pushed = self.dynamics.generalized(self._viewed(forces))
         return [*pushed, *([self.scope.tape.zero] * len(self.rests))]
 
-    def tangent(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> list[list[Node]] | None:
+    def tangent(self, forces: ActingForces) -> list[list[Node]] | None:
         """The columns of S of the same balance from quantities of branches: of planar trees whose coordinates add."""
         if not self.planar:
             return None
-        return self.dynamics.tangent(self.work + self._viewed(values, multipliers, rates, forces), self.rests)
+        return self.dynamics.tangent(self.work + self._viewed(forces), self.rests)
 
-    def eliminated(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> TreeFactors | None:
+    def eliminated(self, forces: ActingForces) -> TreeFactors | None:
         """S of the same balance eliminated from the tips of the tree, or None where it is no sum over joints."""
         if self.rests:
             return None
-        return self.dynamics.eliminated(self.work + self._viewed(values, multipliers, rates, forces))
+        return self.dynamics.eliminated(self.work + self._viewed(forces))
 
-    def _viewed(
-        self, values: Sequence[Node], multipliers: Sequence[Node], rates: Sequence[Node], forces: Sequence[Node]
-    ) -> Work:
+    def _viewed(self, forces: ActingForces) -> Work:
         """Forces on values and velocities, written in views."""
         laws = self.constraints
         rows = list(zip(laws.rows, laws.viewed, strict=True))
@@ -326,8 +300,8 @@ class TreeGeometry:
         reals = [velocity for contact in laws.contacts for _, velocity, _ in contact.drags]
         moving |= {real.index: view for real, (_, view, _) in zip(reals, laws.drags, strict=True)}
         return Work(
-            [viewed.get(value.index, value) for value in values], list(multipliers),
-            [moving.get(rate.index, rate) for rate in rates], list(forces),
+            [viewed.get(value.index, value) for value in forces.values], list(forces.multipliers),
+            [moving.get(rate.index, rate) for rate in forces.rates], list(forces.along_rates),
         )  # fmt: skip
 
     def mass_matrix(self) -> list[list[Node]] | None:

@@ -30,8 +30,8 @@ from mbd.equations.shapes import Shape
 from mbd.tape.node import Node, Table, Tape
 
 __all__ = [
-    "Chart", "Contact", "Coordinate", "Effect", "Eliminated", "Equations", "Facing", "Friction", "Geometry", "Guard",
-    "Parameter", "Machine", "Row", "Transition", "Turn",
+    "ActingForces", "Chart", "Contact", "Coordinate", "Effect", "Eliminated", "Equations", "Facing", "Friction",
+    "Geometry", "Guard", "Parameter", "Machine", "Row", "Transition", "Turn",
 ]  # fmt: skip
 
 
@@ -352,6 +352,20 @@ class Eliminated(Protocol):
     def read(self, kept: Mapping[int, Node]) -> Eliminated: ...
 
 
+@dataclass(frozen=True)
+class ActingForces:
+    """What acts besides the balance: Σ_k multiplier_k ∂value_k/∂x + Σ_k force_k ∂rate_k/∂v.
+
+    values, multipliers : functions of t and q ⊕ x, and what acts on each
+    rates, along_rates : functions that depend on v too, and the force on each
+    """
+
+    values: Sequence[Node] = ()
+    multipliers: Sequence[Node] = ()
+    rates: Sequence[Node] = ()
+    along_rates: Sequence[Node] = ()
+
+
 class Geometry(Protocol):
     """What a derivation knows of its own expressions: shorter ways to derivatives that the tape could take alone.
 
@@ -365,25 +379,10 @@ class Geometry(Protocol):
     @property
     def largest_tree(self) -> int: ...
 
-    def balance_with(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> list[Node]:
-        """balance + Σ_k multiplier_k ∂value_k/∂x + Σ_k force_k ∂rate_k/∂v (length n_v + n_z).
+    def balance_with(self, forces: ActingForces) -> list[Node]:
+        """The balance with these forces too (length n_v + n_z)."""
 
-        The values depend on t and q ⊕ x only, the rates on v too.
-        """
-
-    def forces(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> list[Node]:
+    def forces(self, forces: ActingForces) -> list[Node]:
         """What `balance_with` adds to the balance."""
 
     def mass_matrix(self) -> list[list[Node]] | None:
@@ -395,22 +394,10 @@ class Geometry(Protocol):
         None where it knows none.
         """
 
-    def tangent(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> list[list[Node]] | None:
+    def tangent(self, forces: ActingForces) -> list[list[Node]] | None:
         """The columns of S = M + c_C C + c_K K of `balance_with` by a shorter way, or None where it knows none."""
 
-    def eliminated(
-        self,
-        values: Sequence[Node],
-        multipliers: Sequence[Node],
-        rates: Sequence[Node] = (),
-        forces: Sequence[Node] = (),
-    ) -> Eliminated | None:
+    def eliminated(self, forces: ActingForces) -> Eliminated | None:
         """The same S eliminated without the matrix, with operations in proportion to the bodies; None if it cannot."""
 
     def partials(self, outputs: Sequence[Node]) -> list[dict[Node, Node]]:

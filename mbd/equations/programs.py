@@ -25,41 +25,60 @@ All are values: functions from equations to nodes, which the compile stage turns
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 from mbd.dataclass import dataclass
 from mbd.equations.cones import cosine, sliding_force
-from mbd.equations.equations import Contact, Eliminated, Equations
+from mbd.equations.equations import ActingForces, Contact, Eliminated, Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.magnitudes import magnitudes
-from mbd.equations.tangents import Columns, Forces, seeded, tangent
+from mbd.equations.tangents import Columns, seeded, tangent
 from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
 from mbd.tape.elimination import factors
 from mbd.tape.node import Node, Scalar
 
 __all__ = [
-    "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "constraint_terms", "correction",
+    "ActiveSet", "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "constraint_terms",
+    "correction",
     "follows_multipliers", "free_rates", "guard_terms", "guards", "increment_rates", "is_judged", "law_forces",
     "loaded_balance", "mass_matrix", "newton", "residual", "row_forces", "scales", "switched_balance", "system",
 ]  # fmt: skip
 
 
-def newton(
-    equations: Equations,
-    rows: Sequence[int],
-    penalties: Sequence[int],
-    stabilized: bool,
-    sliding: Sequence[int] = (),
-    given_rows: Sequence[int] = (),
-) -> list[Node]:
-    """Tangent and residual of one Newton iteration of the Newmark family.
+class ActiveSet(NamedTuple):
+    """What acts in a contact mode, and in which form its rows are held: all that the programs of a mode depend on.
 
-    The rows `given_rows` take part with their multipliers alone, which are given.
+    rows : that are held
+    penalties : contacts that push by a penalty
+    stabilized : rows are held at position and velocity, else by index 3
+    sliding : dry frictions that slide
+    given_rows : rows that depend on `rows`; they take part with their multipliers alone, which are given
+    """
+
+    rows: Sequence[int] = ()
+    penalties: Sequence[int] = ()
+    stabilized: bool = True
+    sliding: Sequence[int] = ()
+    given_rows: Sequence[int] = ()
+
+    def tail(self, n: int) -> int:
+        """How many numbers the residual has: r (n), h, and ḣ of the stabilized form."""
+        return n + (2 if self.stabilized else 1) * len(self.rows)
+
+    def size(self, n: int, n_v: int) -> int:
+        """How many numbers `newton` gives."""
+        return (n + len(self.rows)) ** 2 + self.tail(n) + (len(self.rows) * n_v if self.stabilized else 0)
+
+
+def newton(equations: Equations, active: ActiveSet) -> list[Node]:
+    """Tangent and residual of one Newton iteration of the Newmark family.
 
     ``K = [S  ∂r/∂λ; B̃  0]`` with ``S = M + c_C C_t + c_K K_t`` (`mbd.equations.tangents`) and
     ``B̃ = B`` (index 3) or ``B + (c_K/c_C) ∂ḣ/∂x`` (stabilized, and rows on velocities in both); the columns of
     first-order states are zero in B̃.
     """
-    matrix, tail = _whole(equations, *system(equations, sorted(rows), penalties, stabilized, sliding, given_rows))
+    matrix, tail = _whole(equations, *system(equations, active))
     return [entry for line in matrix for entry in line] + tail
 
 
@@ -83,22 +102,20 @@ MIN_COORDINATES = 24
 """Coordinates of one tree from which on it is eliminated from its tips: matrices of small ones have few entries."""
 
 
-def correction(
-    equations: Equations, rows: Sequence[int], penalties: Sequence[int], stabilized: bool, sliding: Sequence[int] = ()
-) -> Correction | None:
+def correction(equations: Equations, active: ActiveSet) -> Correction | None:
     """Tangent, its factors in a fixed order, and the Newton correction, as one program; None where that does not pay.
 
     Index 3 solves ``K (δv̇, δλ) = −(r, h/c_K)``, with ``rate/c_C`` for rows on velocities. The stabilized form first
     corrects positions, ``K (U, ·) = −(0, h − (c_K/c_C) ḣ − B̃ u)`` with the U = u of the prediction, then solves
     ``K (δv̇, δλ) = −(r, (ḣ + ∂ḣ/∂x (U − u))/c_C)``.
     """
-    inputs, rows, tape = Inputs.of(equations), sorted(rows), equations.tape
+    inputs, rows, stabilized, tape = Inputs.of(equations), sorted(active.rows), active.stabilized, equations.tape
     n, n_v, m = inputs.n, equations.n_v, len(rows)
     if n >= MIN_COORDINATES and m == 0:
-        return _from_the_tips(equations, penalties, sliding)
+        return _from_the_tips(equations, active)
     if not 0 < n + m <= MAX_UNKNOWNS:
         return None
-    matrix, tail = _whole(equations, *system(equations, rows, penalties, stabilized, sliding))
+    matrix, tail = _whole(equations, *system(equations, active))
     inertia = substitute([matrix[k][k] for k in range(n)], {inputs.c[0]: 0.0, inputs.c[1]: 0.0})
     # beyond so many operations making the code takes longer than it is likely to save
     found = factors(matrix, n, 1000, {k for k in range(n) if inertia[k].is_zero})
@@ -124,15 +141,16 @@ def correction(
     return _kept(found, tail, out, n + m)
 
 
-def _from_the_tips(equations: Equations, penalties: Sequence[int], sliding: Sequence[int]) -> Correction | None:
+def _from_the_tips(equations: Equations, active: ActiveSet) -> Correction | None:
     """The same of a large tree without rows, eliminated from its tips; None where its tangent is no sum over joints."""
     known = equations.geometry
     if known is None or known.largest_tree < MIN_COORDINATES:
         return None
-    found = known.eliminated(*_forces(equations, (), [(c, equations.tape.one) for c in penalties], sliding))
+    forces = _acting(equations, active)
+    found = known.eliminated(forces)
     if found is None:
         return None
-    r = balance_with(equations, (), penalties, sliding)
+    r = _pushed(equations, forces)
     return _kept(found, r, found.solve([-force for force in r]), len(r))
 
 
@@ -147,20 +165,14 @@ def _kept(found: Eliminated, tail: list[Node], solved: Sequence[Node], size: int
 
 
 def system(
-    equations: Equations,
-    rows: Sequence[int],
-    penalties: Sequence[int],
-    stabilized: bool,
-    sliding: Sequence[int],
-    given_rows: Sequence[int] = (),
-    alone: bool = False,
+    equations: Equations, active: ActiveSet, alone: bool = False
 ) -> tuple[Columns, Columns, list[list[Node]], list[Node]]:
     """S and ∂r/∂λ column by column, B̃ line by line, and r | h | ḣ | ∂ḣ/∂x, the last two stabilized only.
 
     alone : r are the forces of these rows, penalties and frictions, without those of the balance
     """
-    inputs = Inputs.of(equations)
-    forces = _forces(equations, sorted({*rows, *given_rows}), [(c, equations.tape.one) for c in penalties], sliding)
+    inputs, rows, stabilized = Inputs.of(equations), sorted(active.rows), active.stabilized
+    forces = _acting(equations, active)
     r = _pushed(equations, forces, alone)
     B = constraint_jacobian(equations, rows)
     bottom, turning = [inputs.row_by_increments(line) for line in B], list[Node]()
@@ -187,20 +199,10 @@ def _whole(
     return lines + [[*line, *padding] for line in bottom], tail
 
 
-def residual(
-    equations: Equations,
-    rows: Sequence[int],
-    penalties: Sequence[int],
-    stabilized: bool,
-    sliding: Sequence[int] = (),
-    given_rows: Sequence[int] = (),
-    alone: bool = False,
-) -> list[Node]:
-    """r | h | ḣ of one contact mode; of the rows `given_rows` only the given multipliers; `alone` as in `system`."""
-    rows = sorted(rows)
-    forces = _forces(equations, sorted({*rows, *given_rows}), [(c, equations.tape.one) for c in penalties], sliding)
-    r = _pushed(equations, forces, alone)
-    return r + _levels(equations, rows, stabilized)
+def residual(equations: Equations, active: ActiveSet, alone: bool = False) -> list[Node]:
+    """r | h | ḣ of one contact mode; `alone` as in `system`."""
+    r = _pushed(equations, _acting(equations, active), alone)
+    return r + _levels(equations, sorted(active.rows), active.stabilized)
 
 
 def _levels(equations: Equations, rows: Sequence[int], stabilized: bool) -> list[Node]:
@@ -357,21 +359,21 @@ def loaded_balance(equations: Equations) -> list[Node]:
     inputs = Inputs.of(equations)
     switches = [(c, equations.tape.input("switch", c)) for c in range(len(equations.contacts))]
     plain = [k for k, row in enumerate(equations.rows) if row.friction < 0]
-    values, multipliers, rates, forces = _forces(equations, plain, switches, ())
-    rates = [*rates, *(friction.rate for friction in equations.frictions)]
-    forces = [*forces, *(inputs.lam[friction.row] for friction in equations.frictions)]
-    return _pushed(equations, (values, multipliers, rates, forces))
+    forces = _forces(equations, plain, switches, ())
+    rates = [*forces.rates, *(friction.rate for friction in equations.frictions)]
+    along_rates = [*forces.along_rates, *(inputs.lam[friction.row] for friction in equations.frictions)]
+    return _pushed(equations, replace(forces, rates=rates, along_rates=along_rates))
 
 
-def _pushed(equations: Equations, forces: Forces, alone: bool = False) -> list[Node]:
+def _pushed(equations: Equations, forces: ActingForces, alone: bool = False) -> list[Node]:
     """The balance with these forces, or these forces alone."""
     inputs = Inputs.of(equations)
-    values, multipliers, rates, rubbing = forces
+    values, multipliers, rates, rubbing = forces.values, forces.multipliers, forces.rates, forces.along_rates
     result = [equations.tape.zero] * inputs.n if alone else list(equations.balance)
     if not values and not rates:
         return result
     if equations.geometry is not None:
-        return (equations.geometry.forces if alone else equations.geometry.balance_with)(*forces)
+        return (equations.geometry.forces if alone else equations.geometry.balance_with)(forces)
     for outputs, adjoints, along in (values, multipliers, inputs.x), (rates, rubbing, inputs.v):
         if outputs:
             added = vjp(outputs, adjoints, along) + [equations.tape.zero] * equations.n_z
@@ -379,10 +381,16 @@ def _pushed(equations: Equations, forces: Forces, alone: bool = False) -> list[N
     return result
 
 
+def _acting(equations: Equations, active: ActiveSet) -> ActingForces:
+    """What acts in a contact mode besides `balance`."""
+    rows, penalties = sorted({*active.rows, *active.given_rows}), [(c, equations.tape.one) for c in active.penalties]
+    return _forces(equations, rows, penalties, active.sliding)
+
+
 def _forces(
     equations: Equations, rows: Iterable[int], penalties: Iterable[tuple[int, Node]], sliding: Iterable[int],
     rubbed: Scalar = 1.0,
-) -> Forces:  # fmt: skip
+) -> ActingForces:  # fmt: skip
     """What acts besides `balance`."""
     inputs, rows = Inputs.of(equations), list(rows)
     work = [(equations.rows[k].value, inputs.lam[k]) for k in rows if not equations.rows[k].is_velocity]
@@ -406,7 +414,7 @@ def _forces(
         for _, velocity, drag in contact.drags:
             rates.append(velocity)
             forces.append(-(switch * drag))
-    return [value for value, _ in work], [multiplier for _, multiplier in work], rates, forces
+    return ActingForces([value for value, _ in work], [multiplier for _, multiplier in work], rates, forces)
 
 
 def _rubbing(equations: Equations, rows: Iterable[int]) -> list[Contact]:

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from mbd.equations.equations import Equations
+from mbd.equations.equations import ActingForces, Equations
 from mbd.equations.factoring import factored
 from mbd.equations.inputs import Inputs
 from mbd.tape.derivatives import Sweeps, live
 from mbd.tape.node import Node
 
-__all__ = ["Columns", "Forces", "seeded", "tangent"]
+__all__ = ["Columns", "seeded", "tangent"]
 
 Columns = list[list[Node]]
 """A matrix, column by column."""
-Forces = tuple[list[Node], list[Node], list[Node], list[Node]]
-"""What acts besides `balance`: values, what acts on each of them; rates, what acts on each of them."""
 
 MIN_ADVANTAGE = 0.1
 """Part by which one way must be shorter for the balance alone to be taken for every contact mode without counting."""
@@ -29,7 +27,7 @@ MAX_DEPTH = 8.0
 """
 
 
-def tangent(equations: Equations, r: Sequence[Node], forces: Forces, others: Sequence[Node]) -> Columns:
+def tangent(equations: Equations, r: Sequence[Node], forces: ActingForces, others: Sequence[Node]) -> Columns:
     """The columns of S.
 
     The choice depends on the equations and the mode alone, never on what was asked before.
@@ -66,15 +64,15 @@ def seeded(equations: Equations, r: Sequence[Node]) -> Columns:
     return columns
 
 
-def _known(equations: Equations, forces: Forces) -> Columns | None:
-    return None if equations.geometry is None else equations.geometry.tangent(*forces)
+def _known(equations: Equations, forces: ActingForces) -> Columns | None:
+    return None if equations.geometry is None else equations.geometry.tangent(forces)
 
 
 def _ratio(equations: Equations) -> float:
     """Nodes of the balance alone with its tangent by branches, over those with seeds; ∞ where there is no such way."""
     if "branches over seeds" not in equations.memory:
         balance, ratio = list(equations.balance), float("inf")
-        known = _known(equations, ([], [], [], []))
+        known = _known(equations, ActingForces())
         if known is not None:
             deep = equations.geometry is not None and equations.geometry.depth >= MAX_DEPTH
             ratio = 0.0 if deep else _size(balance, known) / max(1, _size(balance, seeded(equations, balance)))

@@ -143,9 +143,9 @@ class TangentStepper(Stepper):
         known = len(self.functions)
         super().add_mode()
         code, others = self.modes[-1], len(self.functions) - known - 2
-        key = (code.rows, code.penalties, code.sliding, code.given_rows)
+        key = code.active
         if key not in self._of_modes:
-            self._of_modes[key] = derivatives_of_modes(self.mechanism, code, self.stabilized, self.places or ())
+            self._of_modes[key] = derivatives_of_modes(self.mechanism, key, self.places or ())
         tangent, residual, turned = self._of_modes[key]
         self._programs += [tangent, residual, *others * [turned], turned]  # others run without derivatives only
         self.functions.append(code.residual)  # see `follow_newmark.turned_program`

@@ -13,6 +13,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, ModeCode
 from mbd.dataclass import dataclass
+from mbd.equations.programs import ActiveSet
 from mbd.errors import ModelError
 from mbd.integrators import Integrator
 from mbd.kernel.translation.interpreted import InterpretedScheme
@@ -193,32 +194,30 @@ class _Watched:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._mechanism, name)
 
-    def mode(self, *chosen: Any) -> ModeCode:
+    def mode(self, active: ActiveSet) -> ModeCode:
         """Code of a mode that can be watched, as `Mechanism.mode` takes it; compiled programs keep their addresses."""
-        return self._watched(self._mechanism.mode, *chosen)
+        return self._watched(self._mechanism.mode, active)
 
-    def stepping(self, *chosen: Any) -> ModeCode:
+    def stepping(self, active: ActiveSet) -> ModeCode:
         """The same as the compiled kernel has it."""
-        return self._watched(self._mechanism.stepping, *chosen)
+        return self._watched(self._mechanism.stepping, active)
 
-    def explicit(self, *chosen: Any) -> ModeCode:
+    def explicit(self, active: ActiveSet) -> ModeCode:
         """The same as explicit steps have it."""
-        return self._watched(self._mechanism.explicit, *chosen)
+        return self._watched(self._mechanism.explicit, active)
 
-    def _watched(self, make: Callable[..., ModeCode], *chosen: Any) -> ModeCode:
-        mode = tuple(one if isinstance(one, bool) else tuple(one) for one in chosen)
-        key = (make.__name__, *mode)
+    def _watched(self, make: Callable[[ActiveSet], ModeCode], active: ActiveSet) -> ModeCode:
+        key = (make.__name__, active)
         if key not in self._codes:
-            code, stabilized = make(*mode), mode[2]
-            n, m = self._mechanism.layout.n, len(code.rows)
-            kept = n + (2 if stabilized else 1) * m
-            tangent = _Seen(code.tangent, self.note, code.rows, (n + m) ** 2, kept)
-            residual = _Seen(code.residual, self.note, code.rows, 0, kept)
-            first = None if code.correction is None else _Seen(code.correction, self.note, code.rows, 0, kept)
+            code, n = make(active), self._mechanism.layout.n
+            matrix, kept = (n + len(active.rows)) ** 2, active.tail(n)
+            tangent = _Seen(code.tangent, self.note, active.rows, matrix, kept)
+            residual = _Seen(code.residual, self.note, active.rows, 0, kept)
+            first = None if code.correction is None else _Seen(code.correction, self.note, active.rows, 0, kept)
             self._codes[key] = replace(code, tangent=tangent, residual=residual, correction=first)
         return self._codes[key]
 
-    def note(self, block: Vector, rows: tuple[int, ...], residual: Vector) -> None:
+    def note(self, block: Vector, rows: Sequence[int], residual: Vector) -> None:
         """An evaluation at an iterate, once; where corrections are counted, the last one before the next of them."""
         before, self._last = self._last, block.copy()
         if before is not None and np.array_equal(before, block, equal_nan=True):
@@ -251,13 +250,13 @@ class _Noted:
 
     time: float
     factor: float
-    rows: tuple[int, ...]
+    rows: Sequence[int]
     corrections: int
     residual: Vector
     halvings: int = 0
 
     @property
-    def step(self) -> tuple[float, float, tuple[int, ...]]:
+    def step(self) -> tuple[float, float, Sequence[int]]:
         """What tells one try from another."""
         return self.time, self.factor, self.rows
 
@@ -265,7 +264,7 @@ class _Noted:
 class _Seen:
     """A program whose residuals are noted; `factor` (∂q/∂v̇) is positive in the iterations of a step only."""
 
-    def __init__(self, program: Any, note: Any, rows: tuple[int, ...], place: int, kept: int) -> None:
+    def __init__(self, program: Any, note: Any, rows: Sequence[int], place: int, kept: int) -> None:
         self.program = program
         self._note, self._rows, self._place, self._kept = note, rows, place, kept
 

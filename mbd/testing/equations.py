@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.equations import derive
 from mbd.equations.equations import Contact, Equations
-from mbd.equations.programs import accelerations, constraint_jacobian, mass_matrix, newton, residual
+from mbd.equations.programs import ActiveSet, accelerations, constraint_jacobian, mass_matrix, newton, residual
 from mbd.tape.node import Node
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.numbers import Numbers, Point, at, block, derivative, inputs
@@ -209,8 +209,9 @@ def _tangent(findings: Findings, equations: Equations, point: Point) -> None:
     for stabilized in False, True:
         law = f"tangent exactness: Newton's matrix against differences ({'ggl' if stabilized else 'index 3'})"
         sizes = ((n,), (m,), (m,), (m, n_v)) if stabilized else ((n,), (m,))
-        K, *parts = block(at(newton(equations, rows, penalties, stabilized), point), (n + m, n + m), *sizes)
-        out = residual(equations, rows, penalties, stabilized)
+        active = ActiveSet(rows, penalties, stabilized)
+        K, *parts = block(at(newton(equations, active), point), (n + m, n + m), *sizes)
+        out = residual(equations, active)
         if stabilized:
             _turning(findings, law, parts.pop(), out, point, hint)
         r = np.concatenate(parts)

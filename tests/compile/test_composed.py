@@ -11,6 +11,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.orders import written
 from mbd.equations.composition import composes
 from mbd.equations.derivation import derive
+from mbd.equations.programs import ActiveSet
 
 
 def floor(space=True, soft=False):
@@ -55,8 +56,8 @@ def test_a_sum_of_parts_is_the_program_of_the_mode(name, stabilized, backend, mo
             if row.contact < 0 or (closed[row.contact] and row.friction not in slips)
         )
         pushing = tuple(c for c, contact in enumerate(equations.contacts) if closed[c] and contact.kind == "penalty")
-        mode = rows, pushing, stabilized, tuple(slips)
-        one, other = whole.mode(*mode), parts.mode(*mode)
+        mode = ActiveSet(rows, pushing, stabilized, tuple(slips))
+        one, other = whole.mode(mode), parts.mode(mode)
         assert other.order is not None and isinstance(other.tangent, Composed) and not isinstance(one.tangent, Composed)
         for program in ("tangent", "residual"):
             a, b = getattr(one, program), getattr(other, program)
@@ -104,15 +105,15 @@ def test_parts_of_which_some_are_remembered_are_the_same(tmp_path, monkeypatch):
     model, cache = floor(space=False), ObjectCache(tmp_path)
     rows, random = derive(model).rows, np.random.default_rng(5)
     held = [range(9), range(4), range(3, 9), (0, 8)]
-    modes = [(tuple(k for k, row in enumerate(rows) if row.contact in {-1, *each}), (), True) for each in held]
-    modes += [(mode[0], (), False) for mode in modes[:2]]
+    modes = [ActiveSet(tuple(k for k, row in enumerate(rows) if row.contact in {-1, *each})) for each in held]
+    modes += [mode._replace(stabilized=False) for mode in modes[:2]]
 
     def values(modes, cache):
         found = Mechanism(derive(model), cache)
         block = np.random.default_rng(4).uniform(-1.0, 1.0, found.layout.size)
         outputs = {}
         for mode in modes:
-            code = found.mode(*mode)
+            code = found.mode(mode)
             outputs[mode] = np.zeros(code.tangent.size)
             code.tangent(block, found.parameters(), outputs[mode])
         return outputs

@@ -60,9 +60,9 @@ def texts(equations):
         made |= {"chart_end": chart_end(equations), "chart_motion": chart_motion(equations)}
     made |= {"scales": programs.scales(equations), "terms": programs.guard_terms(equations)}
     for stabilized in (True, False):
-        mode = (list(rows), (), stabilized, range(len(equations.frictions)), ())
-        made |= {f"tangent {stabilized}": programs.newton(equations, *mode)}
-        made |= {f"residual {stabilized}": programs.residual(equations, *mode)}
+        mode = programs.ActiveSet(rows, (), stabilized, range(len(equations.frictions)))
+        made |= {f"tangent {stabilized}": programs.newton(equations, mode)}
+        made |= {f"residual {stabilized}": programs.residual(equations, mode)}
     return Module({name.replace(" ", "_"): nodes for name, nodes in made.items()}, layout).text()
 
 
@@ -72,7 +72,7 @@ def made(model, cache, modes=2):
     manager = ActiveSetManager(found.equations)
     rows = manager.active_rows(manager.flags(()))
     for ask in (found.stepping, found.mode, found.explicit)[:modes]:
-        code = ask(rows, (), stabilized=True)
+        code = ask(programs.ActiveSet(rows))
         code.tangent(*arrays(found, code.tangent.size))
     return found
 

@@ -10,7 +10,7 @@ import sympy
 
 import mbd
 from mbd.equations import derive
-from mbd.equations.programs import accelerations, constraint_jacobian, newton, residual
+from mbd.equations.programs import ActiveSet, accelerations, constraint_jacobian, newton, residual
 from tests.cases.sleighs import Sleigh, blade_row, rolling_wheel, tractor
 from tests.equations.numbers import at, block, derivative, inputs
 from tests.helpers import assert_second_order
@@ -54,8 +54,8 @@ def test_newton_matrix_is_the_derivative_of_the_residual(scene, stabilized):
     point = inputs(equations, 5, x=0.2)
     c0, c1 = point["c", 0], point["c", 1]
     sizes = (n + m, n + m), (n + m + stabilized * m,), (stabilized * m, n)
-    K, *rest = block(at(newton(equations, range(m), (), stabilized), point), *sizes)
-    out = residual(equations, range(m), (), stabilized)
+    K, *rest = block(at(newton(equations, ActiveSet(range(m), (), stabilized)), point), *sizes)
+    out = residual(equations, ActiveSet(range(m), (), stabilized))
     np.testing.assert_allclose(at(out, point), rest[0], rtol=1e-12, atol=1e-12)
     for j in range(n):
         change = derivative(out, point, {("a", j): 1.0, ("v", j): c0, ("x", j): c1})
@@ -85,7 +85,7 @@ def test_accelerations_program_has_the_slopes_of_each_rate(scene):
     np.testing.assert_allclose(hv, at(rates, point), atol=1e-14)
     motion = {("x", k): point["v", k] for k in range(n)} | {("t", 0): 1.0}
     np.testing.assert_allclose(bias, derivative(rates, point, motion), atol=1e-7)
-    out = at(residual(equations, range(R), (), stabilized=True), point)
+    out = at(residual(equations, ActiveSet(range(R))), point)
     lam, a = (np.array([point[kind, k] for k in range(size)]) for kind, size in (("lam", R), ("a", n)))
     np.testing.assert_allclose(M @ a + f + Rm @ lam, out[:n], rtol=1e-10, atol=1e-10)
     assert not h[[row.is_velocity for row in equations.rows]].any()

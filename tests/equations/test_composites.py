@@ -10,6 +10,7 @@ import mbd
 from mbd.bodies.algebra import ZERO, axis_rotation
 from mbd.bodies.base import Frame
 from mbd.equations import derive, programs
+from mbd.equations.equations import ActingForces
 from mbd.equations.tangents import seeded
 from mbd.joints.base import Joint, Label
 from mbd.tape.node import Tape
@@ -30,7 +31,7 @@ def both(equations):
     penalties = [k for k, contact in enumerate(equations.contacts) if contact.kind == "penalty"]
     forces = programs._forces(equations, rows, [(c, equations.tape.one) for c in penalties], frictions)
     r = programs.balance_with(equations, rows, penalties, frictions)
-    return r, seeded(equations, r), equations.geometry.tangent(*forces)
+    return r, seeded(equations, r), equations.geometry.tangent(forces)
 
 
 def assert_same(equations, seed=0):
@@ -103,13 +104,13 @@ class Eccentric(Joint):
 
 def test_what_branches_do_not_know_is_seeded():
     spatial = derive(random_tree(5, 3, spatial=True))
-    assert spatial.geometry.tangent([], []) is None
+    assert spatial.geometry.tangent(ActingForces()) is None
     model = mbd.Model("eccentric")
     links = [mbd.Link(name, 1.0, 0.5, 0.2, inertia=0.03) for name in ("upper", "lower")]
     model.connect(
         Eccentric("cam", model.ground.origin, links[0].start), mbd.Revolute("elbow", links[0].end, links[1].start)
     )
-    assert derive(model).geometry.tangent([], []) is None
+    assert derive(model).geometry.tangent(ActingForces()) is None
 
 
 def chain(n):
@@ -128,20 +129,20 @@ def test_the_shorter_way_is_taken(make):
     rows = equations.bilateral
     r = programs.balance_with(equations, rows, ())
     forces = programs._forces(equations, rows, (), ())
-    counts = [total([*r, *flat(S)]) for S in (seeded(equations, r), equations.geometry.tangent(*forces))]
+    counts = [total([*r, *flat(S)]) for S in (seeded(equations, r), equations.geometry.tangent(forces))]
     taken = programs.tangent(equations, r, forces, ())
     assert total([*r, *flat(taken)]) == min(counts)
 
 
 def test_a_chain_takes_operations_with_the_square_of_its_links_at_most():
-    counts = [total(programs.newton(derive(chain(n)), (), (), stabilized=False)) for n in (10, 20, 40)]
+    counts = [total(programs.newton(derive(chain(n)), programs.ActiveSet(stabilized=False))) for n in (10, 20, 40)]
     assert counts[1] < 1300 + 5 * 20**2 and counts[2] - 2 * counts[1] < 4.5 * (40**2 - 2 * 20**2)
 
 
 def test_the_choice_does_not_depend_on_what_was_asked_before():
     def asked(*modes):
         equations = derive(leg())
-        made = {mode: programs.newton(equations, mode, (), stabilized=True) for mode in modes}
+        made = {mode: programs.newton(equations, programs.ActiveSet(mode)) for mode in modes}
         copy = Tape()
         return [str(node) for node in mbd.tape.derivatives.substitute(made[(0,)], {}, copy)]
 

@@ -7,7 +7,7 @@ import pytest
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
-from mbd.equations.programs import balance_with, newton
+from mbd.equations.programs import ActiveSet, balance_with, newton
 from mbd.testing.numbers import at, derivative, inputs
 from tests.simulation.frictions import brick, four_bar
 
@@ -38,7 +38,7 @@ def test_the_tangent_of_sliding_friction_is_exact(model, stabilized):
     rows, sliding = held(equations), range(len(equations.frictions))
     n, m = equations.n_v, len(rows)
     r = balance_with(equations, rows, (), sliding)
-    program = newton(equations, rows, (), stabilized, sliding)
+    program = newton(equations, ActiveSet(rows, (), stabilized, sliding))
     for seed in range(3):
         point = sliding_point(equations, seed)
         c_C, c_K = point["c", 0], point["c", 1]

@@ -9,7 +9,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 import mbd
 from mbd.equations import derive
-from mbd.equations.programs import newton, residual
+from mbd.equations.programs import ActiveSet, newton, residual
 from tests.equations.numbers import at, block, derivative, inputs, placed, solved
 
 m, L, g, k = sp.symbols("m L g k")
@@ -53,8 +53,8 @@ def test_tangent_is_the_derivative_of_the_residual():
     )  # fmt: skip
     equations = derive(bead)
     point = inputs(equations, 3, x=0.1)
-    K, r, h, hv, _ = block(at(newton(equations, [0], (), True), point), (4, 4), (3,), (1,), (1,), (1, 3))
-    out = residual(equations, [0], (), True)
+    K, r, h, hv, _ = block(at(newton(equations, ActiveSet([0])), point), (4, 4), (3,), (1,), (1,), (1, 3))
+    out = residual(equations, ActiveSet([0]))
     np.testing.assert_allclose(np.concatenate([r, h, hv]), at(out, point))
     c0, c1 = point["c", 0], point["c", 1]
     for j in range(3):

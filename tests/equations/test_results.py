@@ -5,6 +5,7 @@ import pytest
 
 import mbd
 from mbd.equations import derive
+from mbd.equations.programs import ActiveSet
 from tests.equations.mechanisms import four_bar, furnished, leg, random_tree, walker
 from tests.equations.numbers import at, derivative, inputs
 
@@ -132,7 +133,7 @@ def test_small_programs_stay_small():
     counts = {}
     for name, make, rows in (("walker", walker, (0, 1, 2, 5)), ("four-bar", four_bar, (0, 1))):
         equations = derive(make())
-        counts[name] = [operations(p(equations, rows, (), False)) for p in (newton, residual)]
+        counts[name] = [operations(p(equations, ActiveSet(rows, (), False))) for p in (newton, residual)]
     assert counts["walker"][0] <= 416
     assert counts["walker"][1] <= 153
     assert counts["four-bar"][0] <= 370
@@ -146,7 +147,7 @@ def test_only_the_inputs_of_the_contract_are_left(make):
 
     equations = derive(make())
     rows = range(len(equations.rows))
-    nodes = [*accelerations(equations), *guards(equations), *scales(equations), *newton(equations, rows, (), True)]
+    nodes = [*accelerations(equations), *guards(equations), *scales(equations), *newton(equations, ActiveSet(rows))]
     nodes += [equations.output(name) for name in equations.output_names()]
     nodes += [node for effect in equations.effects for node in effect.generalized()]
     kinds = {node.data[0] for node in live(nodes) if node.op == "input"}

@@ -8,7 +8,7 @@ import pytest
 import mbd
 from mbd.bodies.base import Frame
 from mbd.equations import derive
-from mbd.equations.programs import accelerations, newton, residual
+from mbd.equations.programs import ActiveSet, accelerations, newton, residual
 from mbd.forces.base import Action, Force
 from mbd.joints.base import Joint
 from tests.equations.numbers import at, block, derivative, inputs
@@ -68,8 +68,8 @@ def test_states_stand_behind_the_coordinates():
 def test_tangent_covers_states():
     equations = derive(model())
     point = inputs(equations, 2, x=0.1)
-    K, *_ = block(at(newton(equations, [0], (), True), point), (4, 4), (3,), (1,), (1,), (1, 2))
-    out = residual(equations, [0], (), True)
+    K, *_ = block(at(newton(equations, ActiveSet([0])), point), (4, 4), (3,), (1,), (1,), (1, 2))
+    out = residual(equations, ActiveSet([0]))
     c0, c1 = point["c", 0], point["c", 1]
     for j in range(2):
         change = derivative(out, point, {("a", j): 1.0, ("v", j): c0, ("x", j): c1})

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbd.equations import derive
-from mbd.equations.programs import accelerations, residual
+from mbd.equations.programs import ActiveSet, accelerations, residual
 from tests.equations.mechanisms import four_bar, furnished, leg, random_tree, walker
 from tests.equations.numbers import at, block, derivative, inputs
 
@@ -27,7 +27,7 @@ def test_accelerations_program_is_the_linear_form_of_the_residual(scene):
     sizes = ((n, n), (n,), (n, R), (R, n), (R,), (R,), (R,), (equations.n_anchors,), (1,))
     M, f, Rm, B, h, hv, bias, captured, T = block(values, *sizes)
     penalties = [k for k, contact in enumerate(equations.contacts) if contact.kind == "penalty"]
-    out = at(residual(equations, range(R), penalties, stabilized=True), point)
+    out = at(residual(equations, ActiveSet(range(R), penalties)), point)
     rates = np.array([point["a", k] for k in range(n_v)] + [point["s", k] for k in range(equations.n_z)])
     lam = np.array([point["lam", k] for k in range(R)])
     v = np.array([point["v", k] for k in range(n_v)])

@@ -10,7 +10,8 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.compile.mechanism import Mechanism
 from mbd.equations import derive
-from mbd.equations.programs import MIN_COORDINATES, balance_with
+from mbd.equations.equations import ActingForces
+from mbd.equations.programs import MIN_COORDINATES, ActiveSet, balance_with
 from mbd.equations.tangents import seeded
 from tests.equations.mechanisms import random_tree
 from tests.equations.numbers import at, inputs
@@ -41,7 +42,7 @@ def both(model, seed):
     equations, rng = derive(model), np.random.default_rng(seed)
     n, tape = equations.n_v, equations.tape
     S = seeded(equations, balance_with(equations, (), ()))
-    found = equations.geometry.eliminated([], [], [], [])
+    found = equations.geometry.eliminated(ActingForces())
     b = rng.normal(size=n)
     point = inputs(equations, seed) | {("view", 10**6 + k): b[k] for k in range(n)}
     matrix = at([entry for column in S for entry in column], point).reshape(n, n).T
@@ -82,7 +83,7 @@ def test_pivots_of_a_long_chain_are_sound():
         model.connect(mbd.Revolute(f"hinge {k}", before.end if before else model.ground.origin, rod.start))
         before = rod
     equations = derive(model)
-    found = equations.geometry.eliminated([], [], [], [])
+    found = equations.geometry.eliminated(ActingForces())
     assert equations.geometry.largest_tree == 200
     point = inputs(equations, 0) | {("c", 0): 5e-4, ("c", 1): 2.5e-7}
     assert at([found.sound], point)[0] == 1.0
@@ -91,7 +92,7 @@ def test_pivots_of_a_long_chain_are_sound():
 def test_a_force_that_follows_other_joints_is_no_sum_over_joints():
     model = tree(0, 3, spatial=False)
     model.apply(mbd.Motor("far", model.joints[0], lambda x: -2.0 * x, arguments=["joint 2.angle"]))
-    assert derive(model).geometry.eliminated([], [], [], []) is None
+    assert derive(model).geometry.eliminated(ActingForces()) is None
 
 
 @pytest.mark.parametrize("spatial", [False, True])
@@ -116,7 +117,7 @@ def test_steps_of_a_chain_use_it_and_those_of_small_trees_do_not():
                 rod = mbd.Link(f"rod {c}-{k}", length=1.0, **mbd.rod(mass=1.0, length=1.0).link)
                 model.connect(mbd.Revolute(f"hinge {c}-{k}", before, rod.start))
                 before = rod.end
-        return Mechanism(derive(model)).stepping((), (), True).correction is not None
+        return Mechanism(derive(model)).stepping(ActiveSet()).correction is not None
 
     assert uses(1, 32)
     assert not uses(32, 1)

@@ -10,6 +10,7 @@ import mbd
 from mbd.compile import orders
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.orders import flat_order
+from mbd.equations.programs import ActiveSet
 from mbd.kernel.algebra.ordered import (
     DIRECT_PIVOT_RTOL,
     NEWTON_PIVOT_RTOL,
@@ -189,4 +190,4 @@ def test_small_mechanisms_have_no_order_and_long_chains_of_loops_have_one():
     for count, expected in ((2, False), (LOOPS, True)):
         found = mechanism_of(four_bars(count).start[0])
         rows = found.equations.bilateral
-        assert (found.mode(rows, (), True).order is not None) == expected
+        assert (found.mode(ActiveSet(rows)).order is not None) == expected

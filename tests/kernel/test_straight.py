@@ -101,7 +101,7 @@ def test_straight_line_code_solves_the_equations_of_accelerations_and_rows(seed,
     mechanism = Mechanism(derive(furnished(random_tree(seed, 3, spatial, most=4), seed)))
     equations, layout, rng = mechanism.equations, mechanism.layout, np.random.default_rng(seed)
     rows = tuple(k for k, row in enumerate(equations.rows) if row.contact < 0)
-    code = mechanism.explicit(rows, (), False)
+    code = mechanism.explicit(programs.ActiveSet(rows, (), False))
     if code.rates is None:
         return
     n, m, parameters = layout.n, len(rows), mechanism.parameters()
@@ -176,8 +176,8 @@ def test_passing_a_pose_without_rank_is_noticed_either_way(monkeypatch):
 def test_factors_of_a_walker_cost_less_than_its_tangent(stabilized):
     equations = derive(kneed_walker())
     rows = [0, 1, 2]
-    found = programs.correction(equations, rows, (), stabilized)
-    tangent = programs.newton(equations, rows, (), stabilized)
+    found = programs.correction(equations, programs.ActiveSet(rows, (), stabilized))
+    tangent = programs.newton(equations, programs.ActiveSet(rows, (), stabilized))
     assert total(found.outputs) < 1.7 * total(tangent)
     assert total(found.solution) < (len(equations.balance) + len(rows)) ** 2 * 2
 
@@ -187,7 +187,7 @@ def test_large_systems_are_left_to_loops():
     for k in range(programs.MAX_UNKNOWNS + 1):
         wagon = mbd.PointMass(f"wagon {k}", mass=1.0)
         model.connect(mbd.Prismatic(f"track {k}", model.ground.origin, wagon.origin))
-    assert programs.correction(derive(model), (), (), True) is None
+    assert programs.correction(derive(model), programs.ActiveSet()) is None
 
 
 def test_a_tangent_is_compiled_when_it_is_asked_for():
@@ -208,7 +208,7 @@ def test_explicit_steps_have_neither_tangent_nor_residual_compiled():
 @pytest.mark.parametrize("stabilized", [False, True])
 def test_what_is_compiled_later_has_as_many_outputs_as_was_said(stabilized):
     mechanism = mechanism_of(kneed_walker())
-    late, made = (make((0, 1, 2), (), stabilized) for make in (mechanism.explicit, mechanism.mode))
+    late, made = (make(programs.ActiveSet((0, 1, 2), (), stabilized)) for make in (mechanism.explicit, mechanism.mode))
     assert (late.tangent.size, late.residual.size) == (made.tangent.size, made.residual.size)
     block, parameters = np.linspace(0.1, 0.9, mechanism.layout.size), mechanism.parameters()
     for one, other in (late.tangent, made.tangent), (late.residual, made.residual):

@@ -189,30 +189,30 @@ def balance_function(mechanism: Mechanism) -> Any:
     return mechanism.kept(balance_function, made)
 
 
-def derivatives_of_modes(mechanism: Mechanism, code: Any, stabilized: bool, places: Sequence[int]) -> list[Derivative]:
+def derivatives_of_modes(mechanism: Mechanism, active: programs.ActiveSet, places: Sequence[int]) -> list[Derivative]:
     """Of the tangent and the residual of a mode, and of the matrix times a correction W of positions.
 
     The matrix by itself is held, as Newton's method may take any; where it is a metric, `rules.begin_corrections` asks
     for ``K W`` with W held, which stands behind the block, and of rows on positions the part that is a change.
     """
-    key = (code.rows, code.penalties, code.sliding, code.given_rows, stabilized)
-    n, m, layout, tape = mechanism.layout.n, len(code.rows), mechanism.layout, mechanism.equations.tape
-    name, size = f"residual_{key}", (n + m) ** 2
+    equations, layout, tape = mechanism.equations, mechanism.layout, mechanism.equations.tape
+    n, m = layout.n, len(active.rows)
+    name, size = f"residual_{active}", (n + m) ** 2
 
     def residual() -> Sequence[Node]:
-        return mechanism._of(key, programs.residual)
+        return programs.residual(equations, active)
 
     def turned() -> Sequence[Node]:
-        entries = mechanism._of(key, programs.newton)
+        entries = programs.newton(equations, active)
         whole = [tape.input("held", layout.size + k) for k in range(n + m)]
         parts = [tape.input("held", layout.size + n + m + k) for k in range(layout.n_v)]
-        entire = [*(True for _ in range(n)), *(mechanism.equations.rows[row].is_velocity for row in code.rows)]
+        entire = [*(True for _ in range(n)), *(equations.rows[row].is_velocity for row in active.rows)]
         return [_dot(entries[k * (n + m) : (k + 1) * (n + m)], whole if entire[k] else parts) for k in range(n + m)]
 
     found = [Derivative(mechanism, name, residual, places, first) for first in (size, 0)]
-    if not stabilized or not m:
+    if not active.stabilized or not m:
         return [*found, found[-1]]
-    return [*found, Derivative(mechanism, f"turned_{key}", turned, places, without=("switch", "held", "shift"))]
+    return [*found, Derivative(mechanism, f"turned_{active}", turned, places, without=("switch", "held", "shift"))]
 
 
 def _dot(a: Sequence[Node], b: Sequence[Node]) -> Node:

@@ -150,7 +150,7 @@ def _redundancy(run: RunData, record: Record) -> str:
     """The note on rows that left the solve."""
     equations, dependent = run.mechanism.equations, run.stepper.dependent
     loaded = bool(run.kernel.loaded) or any(friction.contact >= 0 for friction in equations.frictions)
-    slid = loaded and any(code.given_rows for code in run.stepper.modes)
+    slid = loaded and any(code.active.given_rows for code in run.stepper.modes)
     moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MIN_MOTION for part in blocks(record.q))
     return redundancy(equations.rows, dependent, slid, moved, _left_singular(run), readers_of(equations, dependent))
 

@@ -18,11 +18,11 @@ def residuals_of(stepper: Stepper, block: Vector) -> dict[str, float]:
     if mode < 0:
         return {}
     code, n = stepper.modes[mode], stepper.kernel.n
-    out = np.zeros(n + 2 * len(code.rows) + 1)
+    out = np.zeros(n + 2 * len(code.active.rows) + 1)
     with np.errstate(all="ignore"):
         program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step
         program(block, stepper.kernel.params, out)
-    return dict(zip(residual_names(stepper, code.rows), out.tolist(), strict=False))
+    return dict(zip(residual_names(stepper, code.active.rows), out.tolist(), strict=False))
 
 
 def residual_names(stepper: Stepper, rows: Sequence[int]) -> list[str]:

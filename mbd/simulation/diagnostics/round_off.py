@@ -44,7 +44,7 @@ def remainder(stepper: Stepper) -> Remainder:
 def _balance(stepper: Stepper, block: Vector) -> Vector:
     """M v̇ + f + Bᵀλ and ż − s at the inputs in a block."""
     code, n = stepper.modes[int(stepper.kernel.mode_id)], int(stepper.kernel.n)
-    out = np.zeros(n + 2 * len(code.rows) + 1)
+    out = np.zeros(n + 2 * len(code.active.rows) + 1)
     with np.errstate(all="ignore"):
         program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step
         program(block, stepper.kernel.params, out)

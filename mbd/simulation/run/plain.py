@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector, read_only
-from mbd.compile.mechanism import Mechanism, ModeCode
+from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
-from mbd.equations.programs import follows_multipliers, mass_matrix
+from mbd.equations.programs import ActiveSet, follows_multipliers, mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
@@ -96,9 +96,9 @@ class MechanismSystem(System):
         rows = tuple(row for row in self.manager.active_rows(flags, self.sticks) if not self.dropped[row])
         return rows, self.manager.penalties(flags)
 
-    def _code(self, rows: tuple[int, ...], penalties: tuple[int, ...], given_rows: tuple[int, ...]) -> ModeCode:
+    def _acting(self, rows: tuple[int, ...], penalties: tuple[int, ...], given_rows: tuple[int, ...]) -> ActiveSet:
         sliding = tuple(int(f) for f in np.flatnonzero(self.slip))
-        return self.mechanism.mode(rows, penalties, self.stabilized, sliding, given_rows)
+        return ActiveSet(rows, penalties, self.stabilized, sliding, given_rows)
 
     def _given_rows(self, mode: Mode) -> tuple[int, ...]:
         """Rows that act and depend on others, where how loads are shared moves the mechanism: a friction slides."""
@@ -111,7 +111,8 @@ class MechanismSystem(System):
         """Terms of `Terms` at a point of the mechanism."""
         rows, penalties = self.active(mode)
         given_rows = self._given_rows(mode)
-        code = self._code(rows, penalties, given_rows)
+        active = self._acting(rows, penalties, given_rows)
+        code = self.mechanism.mode(active)
         n, m = self.mechanism.layout.n, len(rows)
         block = self.evaluated = self._block(point, rows, penalties)
         brought = self._share_loads(block, rows, given_rows) if given_rows else 0.0
@@ -121,8 +122,7 @@ class MechanismSystem(System):
         r_size, h_size, rate_size = np.split(scale, [n, n + self.mechanism.layout.n_rows])
         size, speed = _by_coordinate(point, self.mechanism)
         h_size, rate_size = np.maximum(h_size, size), np.maximum(rate_size, speed)
-        tail = n + (2 if self.stabilized else 1) * m
-        full = (n + m) ** 2 + tail + (m * self.n_v if self.stabilized else 0)
+        tail, full = active.tail(n), active.size(n, self.n_v)
         turning = None
         if tangent is None:
             out = np.zeros(tail)
@@ -210,8 +210,9 @@ class MechanismSystem(System):
                 break
         if not self.slip.any() and not any(self.dropped) and _least_pivot(terms.M) < CORRECTED_PIVOT_RTOL:
             block = self._block(Point(t, q, np.zeros(self.n_v), y, solved[:n], solved[n:]), rows, penalties)
-            out = np.zeros(n + (2 if self.stabilized else 1) * m)
-            self._code(rows, penalties, ()).residual(block, self.parameters, out)
+            active = self._acting(rows, penalties, ())
+            out = np.zeros(active.tail(n))
+            self.mechanism.mode(active).residual(block, self.parameters, out)
             off = np.concatenate([out[:n], terms.B[picked] @ solved[:n] + terms.bias[picked]])
             solved = solved - np.linalg.solve(matrix, off)
         return solved[:n], solved[n:]

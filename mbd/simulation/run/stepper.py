@@ -11,7 +11,7 @@ from mbd.arrays import Vector
 from mbd.assembly.dependence import MIN_COEFFICIENT
 from mbd.compile.mechanism import AccelerationTerms, Mechanism
 from mbd.equations.equations import Equations
-from mbd.equations.programs import follows_multipliers
+from mbd.equations.programs import ActiveSet, follows_multipliers
 from mbd.errors import MemoryLimitError, ModelError
 from mbd.integrators.base import Integrator
 from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
@@ -240,7 +240,7 @@ class Stepper:
         given_rows = tuple(row for row in held if dropped[row]) if sliding or v.loads_act else ()
         make = self._maker()
         try:
-            code = make(rows, self.manager.penalties(flags), self.stabilized, sliding, given_rows)
+            code = make(ActiveSet(rows, self.manager.penalties(flags), self.stabilized, sliding, given_rows))
         except ModelError as refused:
             if int(v.n_steps) == 0:
                 raise
