@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.constraints.machine import SEPARATOR
 from mbd.results.ledger import SPENT
 from mbd.results.names import AXES
 from mbd.results.summary import facts
@@ -126,14 +128,32 @@ def content(run: Trajectory, picture: Scene) -> dict[str, Any]:
             for mode, states in run.facts.modes
             for state in states
         ],
-        "events": [
-            {"time": event.time, "kind": event.kind, "name": event.name, "side": side(event.name), "loss": loss}
-            for event, loss in zip(run.events, losses(run), strict=True)
-        ],
+        "events": _listed(run),
         "charts": _charts(run, picture.instants),
         "spin": _fastest(run),
         "facts": facts(run),
     }
+
+
+SAMPLED = ("sample", "output")
+"""What `mbd.SampledLaw` does without end, by the names of its events."""
+
+
+def _listed(run: Trajectory) -> list[dict[str, Any]]:
+    """The events, of which those of a sampled law are one line each, at the first, with how many there are."""
+    modes = {name for name, _ in run.facts.modes}
+    counts, found = Counter[Any](), dict[Any, dict[str, Any]]()
+    for number, (event, loss) in enumerate(zip(run.events, losses(run), strict=True)):
+        law, mark, what = event.name.partition(SEPARATOR)
+        sampled = event.kind == "event" and mark and what in SAMPLED and law not in modes
+        key = event.name if sampled and f"{law}.period" in run.parameters else number
+        counts[key] += 1
+        found.setdefault(key, {
+            "time": event.time, "kind": event.kind, "name": event.name, "side": side(event.name), "loss": loss,
+        })  # fmt: skip
+    return [
+        {**line, "name": f"{line['name']} × {counts[key]}"} if counts[key] > 1 else line for key, line in found.items()
+    ]
 
 
 def losses(run: Trajectory) -> list[float | None]:

@@ -127,6 +127,28 @@ def test_forces_and_powers_have_curves_and_angles_are_in_degrees(tmp_path):
     assert data["spin"]["rate"] > 0.0 and [contact["foot"] for contact in data["contacts"]] == [True, True]
 
 
+def test_samples_are_one_line_among_the_events_with_their_number(tmp_path):
+    model = mbd.Model("held")
+    arm = mbd.Link("arm", mass=1.0, length=0.5, center=0.25, inertia=0.02)
+    hinge = mbd.Revolute("hinge", model.ground.origin, arm.start)
+    model.connect(hinge)
+    model.apply(
+        mbd.Motor("motor", hinge, torque=0.0),
+        mbd.SampledLaw("PD", 0.01, {"motor.torque": lambda q: -20.0 * q}, arguments=("hinge.angle",), delay=0.004),
+        mbd.Event("level", mbd.measure(lambda angle: angle - 0.1, "hinge.angle")),
+    )  # fmt: skip
+    run = mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 0.3}), mbd.HHT(), dt=1e-3, until=1.0)
+    _, data = page(run, tmp_path)
+    for name in "PD: sample", "PD: output":
+        own = [event for event in run.events if event.name == name]
+        (line,) = [event for event in data["events"] if event["name"].startswith(name)]
+        assert line["name"] == f"{name} × {len(own)}" and len(own) >= 99
+        assert line["time"] == own[0].time
+    others = [event.time for event in run.events if event.name == "level"]
+    assert [event["time"] for event in data["events"] if event["name"] == "level"] == others and others
+    assert len(data["events"]) == 2 + len(others)
+
+
 def test_contacts_events_and_energies_share_the_clock(tmp_path):
     run = ball(bounces=2)
     _, data = page(run, tmp_path)
