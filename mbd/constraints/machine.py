@@ -38,6 +38,7 @@ class Change:
     condition : what must be positive for it to happen
     stored : by the number of the field, what the machine holds from then on
     reset, terminal : of its event, as of `mbd.Event`
+    timed : whether the guard is a time in the state less one, so that it is due at once where that is no time to come
     """
 
     name: str
@@ -51,6 +52,7 @@ class Change:
     stored: Mapping[int, Scalar] = field(default_factory=dict)
     reset: Any = None
     terminal: bool = False
+    timed: bool = False
 
 
 class Machine(Constraint):

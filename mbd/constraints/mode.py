@@ -39,7 +39,8 @@ class Transition:
         entered has to go back first
     after : time in the state after which it happens [s], > 0; a number is the parameter '<name of the mode>.<source>
         to <target>.after', a text the name of a parameter or quantity, whose value as time passes
-        counts. A remembered time that is not positive is due at once
+        counts. A time that is not positive as the state is entered is due at once, also in the first state of a run.
+        Of timers of one state that end together the first is taken: two of equal length are an error
     only_while : it happens only while this holds at its instant: a contact is closed ('right foot'), another mode is
         in a state ('other: stance'), or a measure is positive. Where it does not hold, the instant has passed: a timer
         begins again as the state is entered again
@@ -237,19 +238,21 @@ class Mode(Machine):
         ]
 
     def _preceded(self) -> list[str]:
-        """Transitions behind another one with the same cause, which always comes first."""
+        """Transitions behind another one with the same cause, or an equal time, which always comes first."""
         found, first = [], dict[tuple[str, str], Transition]()
         for each in self.transitions:
-            for source in each.source if each.on is not None else ():
-                before = first.get((source, str(each.on)))
+            cause = each.on if each.on is not None else each.after
+            words = f"{'after' if each.on is None else 'on'} {cause!r}" + (" s" if is_number(cause) else "")
+            for source in each.source if cause is not None else ():
+                before = first.get((source, words))
                 if before is not None:
                     found.append(
-                        f"Mode '{self.name}' never goes from {source!r} to {each.target!r} on {each.on!r}: the "
+                        f"Mode '{self.name}' never goes from {source!r} to {each.target!r} {words}: the "
                         f"transition to {before.target!r} is first at the same instant; give that one an only_while=, "
                         "or leave one out"
                     )
                 elif each.only_while is None:
-                    first[source, str(each.on)] = each
+                    first[source, words] = each
         return found
 
     # the promise of machines --------------------------------------------------------------------------------------
@@ -315,7 +318,7 @@ class Mode(Machine):
                     guard, direction = (scope.time - held[SINCE]) - limit, 1
                 found.append(Change(
                     name, self.states.index(source), self.states.index(each.target), guard, direction, each.on or "",
-                    contact, condition, self._stored(scope, each.target),
+                    contact, condition, self._stored(scope, each.target), timed=each.after is not None,
                 ))  # fmt: skip
         return found
 

@@ -197,6 +197,7 @@ class Transition:
     contact : number of a contact that must be closed for it, −1 for none
     condition : what must be positive for it, None for nothing
     stored : numbers of the anchors that are stored with it; `Machine.captured` tells what
+    timed : as of `mbd.constraints.machine.Change`
     """
 
     machine: int
@@ -206,6 +207,7 @@ class Transition:
     contact: int = -1
     condition: Node | None = None
     stored: tuple[int, ...] = ()
+    timed: bool = False
 
 
 @dataclass(frozen=True)

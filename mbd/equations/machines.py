@@ -106,7 +106,7 @@ def machine_guards(
             change.name, value, rate, change.direction, change.terminal, change.reset,
             transition=Transition(
                 m, change.source, change.target, causes.of(change, len(events) + number), contact, condition,
-                tuple(places),
+                tuple(places), change.timed,
             ),
         ))  # fmt: skip
     faults += _never(guards, len(events), [change.on for _, change in changes]) if not faults else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -430,6 +431,48 @@ def test_a_remembered_time_that_is_not_positive_is_due_at_once(wait: float) -> N
     lasts = [0.3, max(wait, 0.0)] * 3
     assert [event.time for event in run.events] == pytest.approx(np.cumsum(lasts)[: len(run.events)], abs=1e-14)
     assert len(run.events) == (5 if wait > 0.0 else 6)
+
+
+@pytest.mark.parametrize("after", ["m.stored", "rail.displacement"])
+@pytest.mark.parametrize("speed", [-2.0, 0.0, 2.0])
+@pytest.mark.parametrize("wait", [-0.4, 0.0, 0.05])
+@pytest.mark.parametrize("integrator", [mbd.HHT(), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
+def test_a_time_that_is_not_positive_on_entry_is_due_at_once_also_as_a_run_begins(integrator, wait, speed, after):
+    """The slider moves evenly, x = wait + speed t: a timer of x, begun at s, ends at once or where t − s = x(t)."""
+    model = mbd.Model("slider")
+    body = mbd.PointMass("body", mass=1.0)
+    model.connect(mbd.Prismatic("rail", model.ground.origin, body.origin))
+    stored = mbd.measure(lambda x, wait: wait + 0.0 * x, "rail.displacement", "m.wait")
+    changes = [T("a", "b", after=0.3), T("b", "a", after=after)]
+    model.apply(mbd.Mode(
+        "m", ("a", "b"), start="b", transitions=changes, remembers={"stored": stored}, numbers={"wait": wait}
+    ))  # fmt: skip
+    start = mbd.assemble(model, {"rail.displacement": wait}, {"rail.rate": speed})
+    run = mbd.simulate(model, start, integrator, dt=0.01, until=0.98)
+    expected, now = list[float](), 0.0
+    while now < 1.0:
+        moved = speed if after == "rail.displacement" else 0.0
+        left = wait + moved * now
+        if left > 0.0:  # of t − s = wait + moved t
+            left = left / (1.0 - moved) if moved < 1.0 else math.inf
+        now += max(left, 0.0)
+        expected += [now, now + 0.3]
+        now += 0.3
+    expected = [each for each in expected if each < 0.98]
+    assert [event.time for event in run.events] == pytest.approx(expected, abs=1e-12)
+
+
+def test_the_second_of_two_timers_of_equal_length_is_an_error() -> None:
+    back = T(("b", "c"), "a", after=1.0)
+    for time, said in (0.3, "0.3 s"), ("m.t", "'m.t'"):
+        both = [T("a", "b", after=time), T("a", "c", after=time)]
+        with pytest.raises(
+            ModelError, match=f"never goes from 'a' to 'c' after {said}: the transition to 'b' is first"
+        ):
+            mbd.Mode("m", ("a", "b", "c"), transitions=[*both, back], numbers={"t": 0.3})
+        first = T("a", "b", after=time, only_while="other: on")
+        mode = mbd.Mode("m", ("a", "b", "c"), transitions=[first, both[1], back], numbers={"t": 0.3})
+        assert mode.states == ("a", "b", "c")
 
 
 def test_a_law_that_compares_the_number_of_a_state_with_its_name_is_an_error() -> None:

@@ -167,8 +167,7 @@ class ActiveSetManager:
             "guard_source": [-1 if each is None else each.source for _, each in own],
             "guard_target": [-1 if each is None else each.target for _, each in own],
             "guard_fires": [int(each is not None and ("event", e) in each.causes) for e, each in own],
-            "guard_timed": [int(each is not None and guard.is_timer) for guard, (_, each) in zip(
-                self.guards, own, strict=True)],
+            "guard_timed": [0 if each is None else 2 * self.guards[e].is_timer + each.timed for e, each in own],
             "guard_kink": [int(guard.is_kink) for guard in self.guards],
             "guard_contact": [-1 if each is None else each.contact for _, each in own],
             "release_start": release_starts, "release_mark": releases,

@@ -15,7 +15,12 @@ from mbd.kernel.events.guards import watch
 from mbd.kernel.records import Events, Guards, Switching
 from mbd.kernel.stepping.restart import evaluate
 
-__all__ = ["find_due", "has_happened", "is_allowed", "is_due", "settle_fresh", "take_transitions"]
+__all__ = ["begins_now", "find_due", "has_happened", "is_allowed", "is_due", "settle_fresh", "take_transitions"]
+
+
+def begins_now(K: Guards, e: int) -> bool:
+    """Whether the state that timer e leaves begins at the accepted state."""
+    return bool(K.anchors[K.machine_start[K.guard_machine[e]] + 1] == K.time)
 
 
 def find_due(K: Guards) -> None:
@@ -28,6 +33,8 @@ def find_due(K: Guards) -> None:
         if K.side[e] > 0.0:  # it has passed while its condition did not hold
             continue
         due = K.time - min(K.guards0[K.at_user + e], 0.0)
+        if K.guard_timed[e] == 1 and (not begins_now(K, e) or due - K.time > 8.0 * EPS * max(abs(K.time), K.step)):
+            continue  # its instant moves, and is located as that of any guard
         if K.due_guard < 0 or due < K.due_time:
             K.due_time = due
             K.due_guard = e
@@ -142,7 +149,7 @@ def settle_fresh(K: Switching) -> None:
         if K.fresh[e] == 0:
             continue
         K.fresh[e] = 0
-        if K.guard_timed[e] == 1:
+        if K.guard_timed[e] > 0:
             K.side[e] = -1.0
             continue
         value = K.guards0[K.at_user + e]

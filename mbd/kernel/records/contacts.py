@@ -81,7 +81,7 @@ class Events(SchemeAbilities):
     guard_source: Integers = integers()  # the state that it leaves
     guard_target: Integers = integers()  # and enters
     guard_fires: Integers = integers()  # 1: it happens as its guard crosses zero, 0: as something else happens
-    guard_timed: Integers = integers()  # 1: it is the time less an instant that is known, at which a step ends
+    guard_timed: Integers = integers()  # 1: by after=, + 2: its instant is known, and a step ends there
     guard_kink: Integers = integers()  # 1: a step ends at it, and nothing tells of it
     guard_contact: Integers = integers()  # that must be closed for it, −1 for none
     cause_start: Integers = integers()  # what makes a transition happen

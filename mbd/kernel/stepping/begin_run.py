@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import ACCELERATIONS, DOUBTFUL_START, GUARDS, SCALES
 from mbd.kernel.events.guard_round_off import guard_round_off
+from mbd.kernel.events.transitions import begins_now
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Guards, Kernel, Mechanism, Switching
 from mbd.kernel.stepping.candidate import carry
@@ -127,7 +128,8 @@ def set_side(K: Switching, e: int) -> None:
     fill_block(K, K.time, K.q, K.y)
     refresh_scales(K)
     doubt = guard_round_off(K, e, K.time, K.q, K.y)
-    if abs(value) <= doubt and K.n_machines > 0 and K.guard_timed[e] == 1:
+    timed = K.guard_timed[e] if K.n_machines > 0 else 0
+    if (abs(value) <= doubt and timed >= 2) or (timed % 2 == 1 and begins_now(K, e)):
         value = -1.0  # a timer that is due
     elif abs(value) <= doubt:
         value = rate if abs(rate) * K.step > doubt else 0.0

@@ -156,8 +156,10 @@ def set_side(run: RunData, e: int, guards: Vector) -> None:
     n_contacts, n_guards = run.kernel.n_contacts, run.kernel.n_guards
     value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
     doubt = run.stepper.guard_round_off(e)
-    if abs(value) <= doubt and run.manager.guards[e].is_timer:
-        value = -1.0  # it is due
+    v, timed = run.kernel, int(run.kernel.guard_timed[e]) if run.manager.machines else 0
+    begins = timed % 2 == 1 and v.anchors[v.machine_start[v.guard_machine[e]] + 1] == v.time  # with this state
+    if (abs(value) <= doubt and timed >= 2) or begins:
+        value = -1.0  # a timer that is due
     elif abs(value) <= doubt:
         value = rate if abs(rate) * run.kernel.step > doubt else 0.0
     run.kernel.side[e] = float(np.sign(value))
