@@ -105,7 +105,7 @@ def _search(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> N
     for _ in range(30):
         if not isinstance(found, Measured):
             assert found is not None
-            point.outcome = map_.explained(point.state, found, values)
+            point.outcome = _since(map_, map_.explained(point.state, found, values), 0)
             return
         point.found, point.gap = found, _gap(map_, point, np.zeros(point.chart.size), found, values)
         point.residual = float(np.max(np.abs(point.gap), initial=0.0))
@@ -123,6 +123,15 @@ def _search(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> N
                 break
             found = _walked(map_, point, values)
     _give_up(map_, point, values, tol)
+
+
+def _since(map_: ReturnMap, outcome: Outcome, returns: int) -> Outcome:
+    """A fall with what its time counts from: the section, which is not the start of the search."""
+    since = f" after {map_.section!r}"
+    if outcome.kind != "falls" or since in outcome.text:
+        return outcome
+    later = f", in return {returns + 1} from where the search has come to" if returns else ""
+    return replace(outcome, text=f"{outcome.text}{since}{later}")
 
 
 def _energies(map_: ReturnMap, point: FixedPoint, start: State, values: Values, wanted: float) -> str:
@@ -284,12 +293,12 @@ def _moved(map_: ReturnMap, point: FixedPoint, c: Vector, found: Measured, value
 def _walked(map_: ReturnMap, point: FixedPoint, values: Values) -> Measured | Outcome:
     """Walk on for some steps."""
     state = point.state
-    for _ in range(WALKS):
+    for number in range(WALKS):
         arrival = map_(state, values)
         outcome = map_.against(point.chart.section, arrival)
         if not outcome.good:
             point.attempts.append(outcome)
-            return map_.explained(state, outcome, values)
+            return _since(map_, map_.explained(state, outcome, values), number)
         state = arrival.state
     parameters = map_.vector(values)
     chart = Chart(point.chart.section, state, parameters)

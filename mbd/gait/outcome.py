@@ -23,8 +23,8 @@ class Outcome:
     kind : 'walks', 'arrives' (at the section), 'falls', 'scuffs', 'other event', 'misses' (the section is not reached),
         'wrong contacts', 'other states' (of modes), 'rests', 'not on the section', 'does not converge',
         'numerical error'
-    text : 'falls backward at 0.41 s'
-    time : when [s]
+    text : 'falls backward at 0.41 s'; of a fall after the first return 'falls backward at 0.41 s after 'right foot''
+    time : when [s], since the start, or since the return began that the text names
     """
 
     kind: str

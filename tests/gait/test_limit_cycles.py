@@ -12,6 +12,7 @@ import pytest
 import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.gait.mirror import mirror_of
+from mbd.gait.outcome import fall_of
 from mbd.gait.section import Chart
 from mbd.sensitivity.derivative import final_state_derivative
 from tests.cases.walkers import compass, kneed, standing
@@ -212,6 +213,18 @@ def test_a_walk_that_falls_scuffs_or_never_strikes_says_so():
     assert outcome(0.2187, -0.3234, -0.5, -0.2).startswith("falls backward at ")
     assert outcome(0.2187, -0.3234, -0.1, 0.0).startswith("falls backward at ")  # and strikes when it is down
     assert outcome(0.2187, -0.3234, -2.5, -0.3).startswith("falls forward at ")
+    text = outcome(0.2187, -0.3234, -0.9, -0.3)  # it makes a step and more before; the time counts from a later strike
+    assert text.startswith("falls forward at ") and " s after 'right foot', in return " in text
+    first = outcome(0.2187, -0.3234, -1.6, -0.3)  # it falls before its first strike
+    start = standing(model, (0.2187, -0.3234, -1.6, -0.3), slope)
+    with pytest.warns(mbd.MbdWarning, match="pulled"):
+        run = mbd.simulate(
+            model, replace(start, parameters={}), mbd.HHT(), dt=1e-3, until=("right foot", 5.0), parameters=plain,
+            on_failure="return",
+        )  # fmt: skip
+    fall = fall_of(run, "left foot")
+    assert fall is not None and "after" not in first
+    assert float(first.split()[3]) == pytest.approx(fall.time, abs=2e-3)
     assert "does not happen within 0.1 s" in outcome(0.2187, -0.3234, -1.1, -0.4, longest=0.1)
 
 
