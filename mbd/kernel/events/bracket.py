@@ -30,6 +30,9 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         K.event_after = high
         return 0
     d_high = guard_rate(K, kind, index)
+    if kind == SLIP:  # the direction of the pull, which may be none yet at the near end
+        for g in range(K.leader[index], K.leader[index] + K.group_size[index]):
+            K.lean[g] = K.impulse[K.friction_row[g]]
     # the near end, further on where the guard begins at the root of its last event
     status = candidate_at(K, low)
     if status != 0:

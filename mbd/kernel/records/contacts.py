@@ -61,7 +61,9 @@ class Frictions(Contacts):
     slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding; of a group the cosines of its direction
     hold: Reals = reals(lambda s: s.n_frictions, kept=True)  # how much of these counts: see `mbd.kernel.contact.cones`
     own_hold: Reals = reals(lambda s: s.n_frictions)  # the same of a step whose directions are found by continuation
-    lean: Reals = reals(lambda s: s.n_frictions, kept=True)  # the direction in which each slid last
+    lean: Reals = reals(
+        lambda s: s.n_frictions, kept=True
+    )  # along which each slid last, or pulls as its slip is located
     across: Reals = reals(lambda s: s.n_frictions)  # γ left across directions that are held, over ‖γ‖ before the step
     limit: Reals = reals(lambda s: s.n_frictions)  # largest friction
     base_limit: Reals = reals(lambda s: s.n_frictions)  # the same at zero multipliers
