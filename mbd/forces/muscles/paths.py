@@ -20,7 +20,7 @@ from mbd.bodies.values import number, shown, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of, joint_of
-from mbd.forces.muscles.wrapping import WrappingSurface, taut
+from mbd.forces.muscles.wrapping import InBody, WrappingSurface, taut
 from mbd.forces.quantities import (
     Mention,
     QuantityTriple,
@@ -151,7 +151,11 @@ class PointPath(Path):
             if last is None:
                 last, before = place, still
                 continue
-            if over:
+            bodies = {id(each.body) for each in (before, still, *(surface.frame for _, surface in over)) if each}
+            if over and before is not None and still is not None and len(bodies) == 1:  # whatever the posture
+                ends = before.placement(scope)[1], still.placement(scope)[1]
+                piece, over = taut(InBody(scope), owner, *ends, over), []
+            elif over:
                 piece, over = taut(scope, owner, last, place, over), []
             elif before is not None and still is not None and before.body is still.body:  # whatever the posture
                 piece = norm(difference(still.placement(scope)[1], before.placement(scope)[1]))

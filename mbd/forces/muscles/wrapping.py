@@ -6,11 +6,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import reduce
 from operator import and_
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbd.bodies.algebra import Triple, cross, difference, dot, norm, rotate, scaled, total, transpose
+from mbd.bodies.algebra import Rotation, Triple, cross, difference, dot, norm, rotate, scaled, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.scope import Scope
@@ -22,7 +22,7 @@ from mbd.forces.quantities import Mention
 from mbd.tape.functions import atan2, clip, cos, maximum, minimum, sign, sin, sqrt, where
 from mbd.tape.node import Scalar
 
-__all__ = ["WrappingCylinder", "WrappingEllipsoid", "WrappingSphere", "WrappingSurface", "taut"]
+__all__ = ["InBody", "WrappingCylinder", "WrappingEllipsoid", "WrappingSphere", "WrappingSurface", "bends", "taut"]
 
 MIN_TANGENT = 1e-15
 """Square of the tangent to a surface, in radii, below which a point counts as lying on it: round-off of a² − r² [-]."""
@@ -91,7 +91,9 @@ class WrappingSurface(ABC):
         """Sizes are positive."""
         return {f"{owner}.{name}": positive(unit="m") for name in self.sizes}
 
-    def around(self, scope: Scope, owner: str, first: Triple, last: Triple, toward: Triple | None = None) -> _Around:
+    def around(
+        self, scope: Scope | InBody, owner: str, first: Triple, last: Triple, toward: Triple | None = None
+    ) -> _Around:
         """The way from one point to another, both in ground axes, as are its entry and its exit."""
         motion = scope.frame(self.frame)
         R = transpose(motion.rotation)
@@ -396,7 +398,38 @@ def _wrapped(
     return _Around(touches, where(touches, bent, straight), bent * (way / across), entry, leave)
 
 
-def taut(scope: Scope, owner: str, first: Triple, last: Triple, over: Sequence[tuple[int, WrappingSurface]]) -> Scalar:
+class InBody:
+    """Frames of one body in the axes of that body, with the parameters of a scope or the values they have."""
+
+    def __init__(self, scope: Scope | None = None) -> None:
+        self.scope = scope
+
+    def parameter(self, owner: str, field: str, value: float) -> Any:
+        """The parameter in the scope, or its value."""
+        return value if self.scope is None else self.scope.parameter(owner, field, value)
+
+    def frame(self, frame: Frame) -> _Placed:
+        """Where a frame is in its body."""
+        return _Placed(*frame.placement(self))
+
+
+class _Placed(NamedTuple):
+    """A frame in axes of its body."""
+
+    rotation: Rotation
+    position: Triple
+
+
+def bends(first: Frame, last: Frame, surface: WrappingSurface) -> bool:
+    """Whether a surface bends the line between two points of its own body."""
+    values = InBody()
+    start, end = (frame.placement(values)[1] for frame in (first, last))
+    return bool(surface.around(values, "", start, end).touches)
+
+
+def taut(
+    scope: Scope | InBody, owner: str, first: Triple, last: Triple, over: Sequence[tuple[int, WrappingSurface]]
+) -> Scalar:
     """Length of the path from one point to another around surfaces, one after another [m].
 
     Between two surfaces the path runs from the exit of one to the entry of the next one. Both follow from each other:

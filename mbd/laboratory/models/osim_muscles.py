@@ -66,8 +66,7 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
             others.append(name)
         try:
             points = list(_points(file, path, name))
-            bodies = [(point.frame if isinstance(point, ViaPoint) else point).body for point in points]
-            between = [*surfaces.between(path, name, bodies), []]
+            between = [*surfaces.between(path, name, points), []]
             whole = [part for point, over in zip(points, between, strict=True) for part in (point, *over)]
             found[name] = _muscle(file, element, name, whole, slow)
         except ModelError as error:

@@ -10,7 +10,14 @@ import numpy as np
 
 from mbd.bodies.base import Body, Frame
 from mbd.dataclass import dataclass
-from mbd.forces.muscles.wrapping import WrappingCylinder, WrappingEllipsoid, WrappingSphere, WrappingSurface
+from mbd.forces.muscles.paths import ViaPoint
+from mbd.forces.muscles.wrapping import (
+    WrappingCylinder,
+    WrappingEllipsoid,
+    WrappingSphere,
+    WrappingSurface,
+    bends,
+)
 from mbd.laboratory.models.osim_elements import flag_of, number_of, numbers_of, objects_in, plain, text_of
 from mbd.laboratory.models.osim_file import OsimFile, framed
 from mbd.laboratory.models.osim_joints import turned
@@ -39,15 +46,16 @@ class Surfaces:
     used: set[str] = field(default_factory=set)
     """Names of those that paths pass."""
 
-    def between(self, path: Element, muscle: str, bodies: Sequence[Body]) -> list[list[WrappingSurface]]:
+    def between(self, path: Element, muscle: str, points: Sequence[Frame | ViaPoint]) -> list[list[WrappingSurface]]:
         """Surfaces after each point of a path but the last, in the order in which the path meets them.
 
         Parameters
         ----------
         path : <GeometryPath>
         muscle : its name
-        bodies : that carry the points, from origin to insertion
+        points : from origin to insertion
         """
+        bodies = [(point.frame if isinstance(point, ViaPoint) else point).body for point in points]
         found: list[list[WrappingSurface]] = [[] for _ in bodies[1:]]
         for element in objects_in(path, "PathWrapSet"):
             name = text_of(element, "wrap_object")
@@ -60,9 +68,14 @@ class Surfaces:
             surface = self.known[name]
             first, last = (int(value) for value in numbers_of(element, "range", 2, (-1.0, -1.0)))
             reach = range(max(first, 1) - 1, min(last if last >= 1 else len(bodies), len(bodies)) - 1)
-            # what moves with the surface does not come to touch it
-            moving = [k for k in reach if not bodies[k] is bodies[k + 1] is surface.frame.body]
+            # what moves with the surface is bent by it in each posture or in none
+            still = [k for k in reach if bodies[k] is bodies[k + 1] is surface.frame.body]
+            bent = [k for k in still if _bends(points[k], points[k + 1], surface)]
+            for k in bent:
+                found[k].append(surface)
+                self.used.add(name)
             # a surface bends one piece of the path: of several those that the fewest joints are between
+            moving = [] if bent else [k for k in reach if k not in still]
             apart = {k: sum(self._joints_to(surface, bodies[end]) for end in (k, k + 1)) for k in moving}
             for k in moving:
                 if apart[k] == min(apart.values()):
@@ -95,6 +108,13 @@ def _joints_between(a: list[Body], b: list[Body]) -> int:
     """Joints from the first body of a chain to that of another."""
     common = next((k for k, body in enumerate(a) if any(body is other for other in b)), len(a))
     return common + (next(k for k, other in enumerate(b) if other is a[common]) if common < len(a) else len(b))
+
+
+def _bends(first: Frame | ViaPoint, last: Frame | ViaPoint, surface: WrappingSurface) -> bool:
+    """Whether a surface bends the line between two points of its own body that do not move there."""
+    start, end = (point.frame if isinstance(point, ViaPoint) else point for point in (first, last))
+    moves = any(isinstance(point, ViaPoint) and point.place is not None for point in (first, last))
+    return not moves and bends(start, end, surface)
 
 
 def surfaces_of(file: OsimFile) -> Surfaces:
