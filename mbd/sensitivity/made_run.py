@@ -74,8 +74,9 @@ class MadeRun(TangentRun):
         return self
 
     def _rows(self) -> RunRows:
-        """The first row, as far as it is there."""
-        return RunRows(Trajectory(record_of(self, self.table[:1])))
+        """The first row, of zeros before it is there."""
+        first = self.table[:1] if self.stored else np.zeros_like(self.table[:1])
+        return RunRows(Trajectory(record_of(self, first)))
 
     def complete(self) -> tuple[Trajectory, str]:
         """The same state; a run that continues from the end needs no derivatives."""
