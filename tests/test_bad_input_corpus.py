@@ -83,6 +83,7 @@ EXAMPLES: dict[str, Any] = {
     "penetration": 1e-3,
     "pitch": 0.1,
     "point": END,
+    "radii": (0.1, 0.1, 0.1),
     "radius": 0.1,
     "ranges": {"upper.mass": (1.0, 2.0)},
     "rate": (-1.0, 0.0, 1.0),
