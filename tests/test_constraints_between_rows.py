@@ -53,6 +53,22 @@ def test_between_rows_constraints_hold_as_at_rows(kind, seed, name):
     assert np.max(rate) <= np.max(fastest) + ROUND_OFF
 
 
+@pytest.mark.parametrize("lightest", [1e-3, 1e-6, 1e-8])
+def test_between_rows_constraints_hold_at_both_ends_of_a_light_link(lightest):
+    """In the metric of inertia the rows at its two ends depend on each other along it, in no singular pose."""
+    model, end, position = mbd.Model("light chain", cut="all"), None, {}
+    for k, mass in enumerate((2.0, lightest, 3.0)):
+        link = mbd.Link(f"link {k}", mass, 0.4, 0.2, 0.015 * mass)
+        joint = mbd.Revolute(f"joint {k}", model.ground.origin if end is None else end, link.start)
+        model.connect(joint)
+        position[f"joint {k}.angle"], end = 0.5 - 0.3 * k, link.end
+    run = mbd.simulate(model, mbd.assemble(model, position=position), dt=0.01, until=0.1)
+    there = run.columns.between(run.columns.grid.places(some_times(run, 1)))
+    (h, rate), (most, fastest) = missed(run, there), missed(run, run.columns.rows)
+    assert np.max(h) <= np.max(most) + ROUND_OFF
+    assert np.max(rate) <= np.max(fastest) + ROUND_OFF
+
+
 def driven_chain(seed: int, cut: str) -> tuple[mbd.Model, mbd.State, dict[str, mbd.Samples]]:
     """Two links whose joints repeat cycles of few samples; the seed odd, one of them has dry friction."""
     rng = random.Random(seed)

@@ -14,12 +14,11 @@ state stays as it was.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.results.balance import Balance, Flags, saddle, weights
+from mbd.results.balance import Balance, Flags, saddle
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
 from mbd.results.record import Rows
@@ -27,7 +26,10 @@ from mbd.results.record import Rows
 __all__ = ["Projection"]
 
 MIN_SINGULAR_VALUE = 0.05
-"""Least singular value of rows, each over its largest length in the metric of inertia, from which they are followed."""
+"""Least singular value from which rows are followed: of B over sizes of its columns, then lengths of rows, in the run.
+
+Inertia is no part of it: in its metric the rows at the two ends of a light link depend on each other.
+"""
 CORRECTION_RTOL = 1e-12
 """Correction, of coordinates of size 1, that is no matter whatever the next one is [-]."""
 
@@ -38,7 +40,7 @@ class Projection:
     def __init__(self, balance: Balance) -> None:
         self.balance, self.equations = balance, balance.equations
         self.charts = Charts.of(balance.equations)
-        self._longest: dict[tuple[int, ...], Vector] = {}
+        self._largest: dict[tuple[int, ...], Matrix] = {}
 
     @classmethod
     def of(cls, balance: Balance) -> Projection | None:
@@ -80,23 +82,22 @@ class Projection:
 
     def _has_rank(self, kept: list[int], rows: Rows) -> Flags:
         """Whether the rows are far from vanishing, and from depending on each other, at each state."""
-        scaled = self._scaled(kept, rows) / self._lengths(kept)[:, None]
-        return np.asarray(np.linalg.svd(np.nan_to_num(scaled), compute_uv=False)[:, -1] > MIN_SINGULAR_VALUE)
+        scaled = self._rows_at(kept, rows) / self._sizes(kept)
+        return np.asarray(np.linalg.svd(scaled, compute_uv=False)[:, -1] > MIN_SINGULAR_VALUE)
 
-    def _scaled(self, kept: list[int], rows: Rows) -> Any:
-        """B (k, kept, n) in the metric of inertia."""
-        M, _, _, B, *_ = self.balance.terms_at(rows)
-        return B[:, kept] / weights(M)
+    def _rows_at(self, kept: list[int], rows: Rows) -> Matrix:
+        """B (k, kept, n)."""
+        return np.asarray(np.nan_to_num(self.balance.terms_at(rows)[3][:, kept]))
 
-    def _lengths(self, kept: list[int]) -> Vector:
-        """The largest length of each row in the run, from rows spread over it."""
+    def _sizes(self, kept: list[int]) -> Matrix:
+        """Lengths of rows times sizes of columns, the largest in the run, from rows spread over it (kept, n)."""
         key = tuple(kept)
-        if key not in self._longest:
+        if key not in self._largest:
             every = self.balance.states.rows
-            spread = every.part(np.unique(np.linspace(0, len(every) - 1, 64).astype(np.intp)))
-            lengths = np.max(np.linalg.norm(np.nan_to_num(self._scaled(kept, spread)), axis=2), axis=0)
-            self._longest[key] = np.where(lengths > 0.0, lengths, 1.0)
-        return self._longest[key]
+            B = self._rows_at(kept, every.part(np.unique(np.linspace(0, len(every) - 1, 64).astype(np.intp))))
+            columns = _positive(np.max(np.abs(B / _positive(np.max(np.abs(B), axis=(0, 2)))[:, None]), axis=(0, 1)))
+            self._largest[key] = _positive(np.max(np.linalg.norm(B / columns, axis=2), axis=0))[:, None] * columns
+        return self._largest[key]
 
     def _missed(self, kept: list[int], rows: Rows, lower: Index, ends: Index) -> tuple[Matrix, Matrix]:
         """h and ḣ at the ends of intervals, in the mode of the interval."""
@@ -116,3 +117,8 @@ class Projection:
 
     def _moved(self, q: Matrix, x: Matrix) -> Matrix:
         return q + x if self.charts is None else self.charts.composed(q, x)
+
+
+def _positive(sizes: Vector) -> Vector:
+    """The same, but 1 where they vanish."""
+    return np.where(sizes > 0.0, sizes, 1.0)
