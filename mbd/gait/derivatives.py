@@ -176,35 +176,42 @@ def _of_largest_multiplier(gait: Any, name: str) -> float:
     """The derivative of the largest modulus |λ|, with wᴴ P = λ wᴴ, P u = λ u: ``dλ/dp = wᴴ (dP/dp) u / wᴴ u``.
 
     dP/dp along the branch follows from central differences at ``c ± h dc/dp, p ± h``, which are off the branch by h²
-    on both sides alike.
+    on both sides alike. Beside a bound of the parameter, such as a damping of 0, they lie on the side that is allowed.
 
     Raises
     ------
     GaitError
-        where two multipliers meet, and where the events of the walk change too near for a difference.
+        where two multipliers meet, where all are 0 beside others that are not, and where the events of the walk change
+        too near for a difference.
     """
-    if not len(gait.stability_of.values):
+    stability = gait.stability_of
+    if not gait.chart.size or (not len(stability.values) and "energy" in stability.trivial):
         return 0.0
-    change_of, natural = _multiplier_change(gait)
+    P = gait.map_derivative.matrix[: gait.chart.size]
+    change_of, natural = _multiplier_change(gait, P)
     value, (move, numbers) = parameter_value(gait, name), motion_of(gait, name)
     swing = float(max(np.nanmax(np.abs(numbers), initial=0.0), np.max(np.abs(move), initial=0.0)))
     h = BESIDE / swing if swing > 0.0 else gait.map.parameter_steps.get(name, BESIDE * (abs(value) or 1.0))
     best, error, why = 0.0, np.inf, ""
     for _ in range(TRIES):
         slopes: list[float] = []
-        for level in range(LEVELS):
+        faults = [gait.map.faults(_beside(gait, name, value + sign * 2.0 ** (LEVELS - 1) * h)) for sign in (1, -1)]
+        sides = [0.0 if fault else sign for sign, fault in zip((1.0, -1.0), faults, strict=True)]
+        why = "" if any(sides) else f"on both sides {faults[0][0]}"
+        for level in range(0 if why else LEVELS):
             step = 2.0**level * h
-            ends = [_slope_beside(gait, sign * step * move, _beside(gait, name, value + sign * step))
-                    for sign in (1, -1)]  # fmt: skip
+            ends = [_slope_beside(gait, sign * step * move, _beside(gait, name, value + sign * step)) if sign else P
+                    for sign in sides]  # fmt: skip
             why = next((end for end in ends if isinstance(end, str)), "")
             if why:
                 break
-            slopes.append(change_of((ends[0] - ends[1]) / (2.0 * step)))  # type: ignore[operator]
+            slopes.append(change_of((ends[0] - ends[1]) / ((sides[0] - sides[1]) * step)))  # type: ignore[operator]
         if not why:
-            found, doubt = (float(part[0]) for part in extrapolated([np.array([slope]) for slope in slopes]))
+            errors = 4.0 if all(sides) else 2.0  # of order h², h⁴ or h, h²
+            found, doubt = (float(part[0]) for part in extrapolated([np.array([slope]) for slope in slopes], errors))
             best, error = (found, doubt) if doubt < error else (best, error)
             if error <= SURE * max(abs(best), natural * swing):
-                return best
+                break
         h *= CLOSER
     if not error <= DOUBTFUL * max(abs(best), natural * swing):
         reason = f"beside the gait {why}" if not np.isfinite(error) else (
@@ -212,12 +219,18 @@ def _of_largest_multiplier(gait: Any, name: str) -> float:
             "change too near beside it"
         )  # fmt: skip
         raise GaitError(f"no derivative of the largest multiplier by {name!r}: {reason}", gait)
+    if not natural and all(sides) and best > DOUBTFUL * swing:
+        raise GaitError(
+            f"the largest multiplier has a derivative by {name!r} on one side only: all multipliers are 0 here, and "
+            f"beside it {best:.6g} of the change of the parameter", gait,
+        )  # fmt: skip
     return best
 
 
-def _multiplier_change(gait: Any) -> tuple[Callable[[Matrix], float], float]:
-    """What a change of P makes of the largest modulus, and that modulus."""
-    P = gait.map_derivative.matrix[: gait.chart.size]
+def _multiplier_change(gait: Any, P: Matrix) -> tuple[Callable[[Matrix], float], float]:
+    """What a change of P makes of the largest modulus, and that modulus; a change of P = 0 is itself the new P."""
+    if not len(gait.stability_of.values):
+        return lambda of: float(np.max(np.abs(np.linalg.eigvals(of)))), 0.0
     values, left, right = eig(P, left=True, right=True)
     k = int(np.argmin(np.abs(values - gait.stability_of.values[0])))
     w, u, size = left[:, k], right[:, k], float(abs(values[k]))

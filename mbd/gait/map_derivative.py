@@ -228,14 +228,17 @@ def _beside(
     ]
 
 
-def extrapolated(slopes: Sequence[Vector]) -> tuple[Vector, Vector]:
-    """Richardson's table of central differences of h, 2h, 4h: for each number the entry of least error estimate."""
+def extrapolated(slopes: Sequence[Vector], errors: float = 4.0) -> tuple[Vector, Vector]:
+    """Richardson's table of differences of h, 2h, 4h: for each number the entry of least error estimate.
+
+    errors : by which an error of leading order grows from h to 2h: 4 of central differences, 2 of those to one side
+    """
     if len(slopes) == 1:
         return slopes[0], np.full(len(slopes[0]), np.nan)
     best, error = slopes[0], np.abs(slopes[0] - slopes[1])
     table = list(slopes)
     for order in range(1, len(slopes)):
-        power = 4.0**order
+        power = errors**order
         table = [(power * fine - coarse) / (power - 1.0) for fine, coarse in pairwise(table)]
         doubt = np.abs(table[0] - best)
         better = doubt <= error

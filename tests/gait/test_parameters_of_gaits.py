@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import sympy
 
 import mbd
 from tests.cases.walkers import compass
@@ -42,6 +43,24 @@ def test_the_derivative_of_a_multiplier_stops_before_other_events():
         p = (0.55 - beside) ** 2
         found = parabola(p, 1.0, 0.0, model).derivatives["largest multiplier", "s"]
         assert math.isclose(found, 1.0 / math.sqrt(p), rel_tol=1e-6), beside
+
+
+def test_beside_a_bound_the_derivative_of_a_multiplier_comes_from_the_side_that_is_allowed():
+    """A hopper that leaves with v = e v⁻² + k has the multiplier 1 − √(1 − 4 e k); e ≥ 0 where that is said."""
+    y, (mass, g, e, k) = mbd.Coordinate("y", unit="m"), sympy.symbols("mass g e k")
+    for bound, value in (True, 0.0), (True, 1e-9), (True, 1e-3), (False, 1e-3), (False, 0.0):
+        hopper = mbd.Lagrangian(
+            "hopper", [y], mass * y.v**2 / 2, mass * g * y.q, parameters={mass: 1.0, g: 9.81, e: value, k: 1.31},
+            domains={e: mbd.Domain(low=0.0)} if bound else {}, tunable=["e"],
+        )  # fmt: skip
+        hopper.constrain(mbd.Event("floor", y.q, direction=-1, reset={y.v: e * y.v**2 + k}))
+        gait = mbd.limit_cycle(hopper, mbd.assemble(hopper, {"y": 1e-9}, {"y": 1.3}), section="floor")
+        if bound or value:
+            right = 2.62 / math.sqrt(1.0 - 5.24 * value)
+            assert math.isclose(gait.derivatives["largest multiplier", "e"], right, rel_tol=1e-8)
+        else:
+            with pytest.raises(mbd.GaitError, match="on one side only: all multipliers are 0 here, and beside it 2.62"):
+                gait.derivatives["largest multiplier", "e"]
 
 
 def test_at_a_fold_a_gait_has_no_derivative():
