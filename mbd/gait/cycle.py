@@ -13,8 +13,9 @@ from mbd.arrays import ComplexArray, Vector
 from mbd.bodies.values import named_number_faults
 from mbd.dataclass import dataclass
 from mbd.errors import GaitError, ModelError
-from mbd.gait.derivatives import Derivatives
+from mbd.gait.derivatives import Derivatives, require_member
 from mbd.gait.energies import cost_of_transport, energy_by_cause
+from mbd.gait.family import energy_of
 from mbd.gait.floquet import Multipliers
 from mbd.gait.map_derivative import MapDerivative, Measured, measured
 from mbd.gait.outcome import Outcome
@@ -141,7 +142,7 @@ class LimitCycle:
         ------
         ModelError
             for values that are no finite numbers or that the model does not allow, or of one side alone where the gait
-            has a mirror.
+            has a mirror; for a gait with neighbours of other energy, none of which was asked for.
         GaitError
             where the walk is lost.
         """
@@ -153,6 +154,7 @@ class LimitCycle:
         self.map.require_free(parameters, values)
         self.map.require(values)
         near = on_section(self.chart.section, self.state, self.map.vector(values))
+        require_member(self)
         if self.given is None or near is None:
             raise GaitError(f"no gait to go on from: {self.outcome}", self)
         known = None if self.map_derivative is None else self.map_derivative.matrix[: self.chart.size]
@@ -261,6 +263,8 @@ class LimitCycle:
             found["speed"] = f"{self.speed:.5g} m/s"
         if np.isfinite(self.cost_of_transport):
             found["cost of transport"] = f"{self.cost_of_transport:.4g}"
+        if "energy" in self.trivial and self.given.member is None:
+            found["one of a family, energy"] = f"{energy_of(self.map, [self.state], self.parameters)[0]:.6g} J"
         worst = max(self.residual.values(), default=0.0)
         found["largest multiplier"] = f"{self.largest_multiplier:.6f} ({self.stability}{self._lasting(worst)})"
         found["residual"] = f"{worst:.1g}"

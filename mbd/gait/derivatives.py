@@ -231,7 +231,7 @@ def _multiplier_change(gait: Any, P: Matrix) -> tuple[Callable[[Matrix], float],
     """What a change of P makes of the largest modulus, and that modulus; a change of P = 0 is itself the new P."""
     if not len(gait.stability_of.values):
         return lambda of: float(np.max(np.abs(np.linalg.eigvals(of)))), 0.0
-    values, left, right = eig(P, left=True, right=True)
+    values, left, right = eig(P, left=True, right=True)  # type: ignore[misc]
     k = int(np.argmin(np.abs(values - gait.stability_of.values[0])))
     w, u, size = left[:, k], right[:, k], float(abs(values[k]))
     rivals = [z for j, z in enumerate(values) if j != k and abs(z - values[k].conj()) > MULTIPLIER_GAP * size]

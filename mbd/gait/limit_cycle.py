@@ -14,16 +14,18 @@ from mbd.errors import GaitError, ModelError
 from mbd.gait.alike import require_alike
 from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
 from mbd.gait.cycle import LimitCycle
-from mbd.gait.family import Member, member_of
+from mbd.gait.family import UNIT_MULTIPLIER_ATOL, Member, energy_of, member_of
 from mbd.gait.floquet import Multipliers
 from mbd.gait.heading import heading_of
 from mbd.gait.machines import counted_from
 from mbd.gait.mirror import mirror_of
+from mbd.gait.newton import ENERGY_RTOL
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, fallen_first, first_found, first_return
 from mbd.gait.section import Chart, section_of
 from mbd.gait.unmoved import depends_on_time, moving_on, reset_names
 from mbd.integrators import Integrator, RungeKutta853
+from mbd.notes import doubt
 from mbd.simulation.capabilities import refusals
 from mbd.state import State
 
@@ -31,6 +33,8 @@ __all__ = ["limit_cycle", "map_of"]
 
 FIRST_STEP = 1e-2
 """Step of the first return where none is given [s]; later ones follow from its length."""
+DRIFT_RTOL = 1e-3
+"""Relative change of the energy from the start to a gait of a family above which it is not the one meant [-]."""
 MAX_PASSING_RETURNS = 3
 """Returns after which states of modes repeat that begin in one that no gait comes back to [-]."""
 
@@ -112,6 +116,8 @@ def limit_cycle(
     if len(start.anchors):
         start = replace(start, anchors=counted_from(map_.mechanism.equations, start.anchors, begun))
     gait = _found(map_, start, dt, tol, member)
+    if member is None:
+        gait = _of_family(gait, start)
     if not gait.success and on_failure == "raise":
         raise GaitError(f"{gait.name}: {gait.outcome}", gait)
     if gait.success:
@@ -181,6 +187,33 @@ def _found(map_: ReturnMap, start: State, dt: float | None, tol: float, member: 
         section, states = again
         later = first_found(Search(map_, section, tol, member), states, map_.values, dt)
     return later if later.success else fallen_first(found, start, map_.values)
+
+
+def _of_family(gait: LimitCycle, start: State) -> LimitCycle:
+    """A gait that is one of a family, of which no member was asked for, with what picks one in its outcome or a doubt.
+
+    It is one where a return keeps the energy of the start, which is no gait: Newton's method then goes along the family
+    as far as it must, and has no reason to stay near.
+    """
+    map_, values = gait.map, gait.parameters
+    beside = np.min(np.abs(gait.multipliers - 1.0), initial=1.0) <= UNIT_MULTIPLIER_ATOL
+    if gait.success and not beside and "energy" not in gait.trivial:
+        return gait
+    arrival = map_(start, values, strides=1)
+    if not arrival.outcome.good:
+        return gait
+    begun, later, found = energy_of(map_, [start, arrival.state, gait.state], values)
+    if not abs(later - begun) <= ENERGY_RTOL * max(abs(begun), abs(later)):
+        return gait
+    family = (
+        "nothing takes or gives energy, so that gaits form a family: energy= in J (T + V of the start is "
+        f"{begun:.6g} J) or speed= in m/s of mbd.limit_cycle picks one"
+    )
+    if not gait.success:
+        return replace(gait, outcome=replace(gait.outcome, text=f"{gait.outcome.text}; {family}"))
+    if abs(found - begun) > DRIFT_RTOL * abs(begun):
+        doubt(f"{gait.name}: {family}; that which was found has {found:.6g} J")
+    return gait
 
 
 def _none(map_: ReturnMap, failed: Failed) -> LimitCycle:

@@ -158,8 +158,14 @@ def test_a_ball_on_a_spring_bounces_with_the_energy_asked_for(section: str) -> N
 
 def test_what_a_family_keeps_must_be_told() -> None:
     model, start = runner()
-    gait = mbd.limit_cycle(model, start, section="apex")
+    with pytest.warns(mbd.MbdWarning, match=r"form a family: .* of the start is 1784.8 J\) .* 1739.98 J"):
+        gait = mbd.limit_cycle(model, start, section="apex")
+    assert "one of a family, energy 1739.98 J" in str(gait)
+    slow = mbd.assemble(model, {"place.y": 1.0}, {"place.x": 3.0, "place.y": 0.0})
+    with pytest.raises(mbd.GaitError, match=r"it has fallen; .* form a family: .* of the start is 1144.8"):
+        mbd.limit_cycle(model, slow, section="apex")
     for asked in (
+        lambda: gait.at({"leg.stiffness": 21e3}),
         lambda: gait.derivatives["speed", "leg.stiffness"],
         lambda: mbd.branch(gait, "leg.stiffness", to=21e3),
     ):
