@@ -10,6 +10,7 @@ from mbd.errors import AssemblyError
 from mbd.hardcases.redundant_rows import bricard, parallel_cranks
 from mbd.testing.mechanisms import random_loop, random_tree
 from tests.equations.mechanisms import furnished
+from tests.fuzz.spatial_structures import turned_four_bar
 from tests.space_scenes import JOINTS, scene
 
 __all__ = ["KINDS"]
@@ -35,8 +36,15 @@ def loop(seed: int) -> tuple[mbd.Model, mbd.State]:
 
 
 def redundant(seed: int) -> tuple[mbd.Model, mbd.State]:
-    """Parallel cranks with one or two too many, or Bricard's mechanism, in tree coordinates or with all joints cut."""
+    """Parallel cranks with one or two too many, or Bricard's mechanism, in tree coordinates or with all joints cut.
+
+    Every third one a four-bar that lies somewhere in space, all of its joints cut.
+    """
     rng = random.Random(seed)
+    if seed % 3 == 2:
+        model, angles = turned_four_bar(rng)
+        model.cut = "all"
+        return model, mbd.assemble(model, position=angles, velocity={"joint 0.angle": 2.0}, project=True)
     cut = rng.choice(["auto", "all"])
     if seed % 3 == 0:
         return bricard()

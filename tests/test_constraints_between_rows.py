@@ -42,7 +42,7 @@ def missed(run: mbd.Trajectory, rows) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("name", SCHEMES)
 @pytest.mark.parametrize(
-    ("kind", "seed"), [("loop", 1), ("redundant", 1), ("standing", 2), ("turning", 1), ("turning", 5)]
+    ("kind", "seed"), [("loop", 1), ("redundant", 1), ("redundant", 2), ("standing", 2), ("turning", 1), ("turning", 5)]
 )
 def test_between_rows_constraints_hold_as_at_rows(kind, seed, name):
     model, start = KINDS[kind](seed)

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.results.balance import Balance, Flags, saddle
+from mbd.results.balance import Balance, Flags, Held, saddle
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
 from mbd.results.record import Rows
@@ -40,7 +40,7 @@ class Projection:
     def __init__(self, balance: Balance) -> None:
         self.balance, self.equations = balance, balance.equations
         self.charts = Charts.of(balance.equations)
-        self._largest: dict[tuple[int, ...], Matrix] = {}
+        self._bases: dict[tuple[int, ...], tuple[list[int], Matrix]] = {}
 
     @classmethod
     def of(cls, balance: Balance) -> Projection | None:
@@ -57,18 +57,19 @@ class Projection:
         inside = places.step > 0.0
         patterns, group = np.unique(modes, axis=0, return_inverse=True)
         for number, mode in enumerate(patterns):
-            kept = self.balance.rows_in(mode).kept
+            held = self.balance.rows_in(mode)
             mine = np.flatnonzero(inside & (group.ravel() == number))
-            if kept and len(mine):
-                q[mine], v[mine] = self._led(kept, rows, places.part(mine), found.part(mine))
+            if held.kept and len(mine):
+                q[mine], v[mine] = self._led(*self._basis(held), rows, places.part(mine), found.part(mine))
         return replace(found, q=q, v=v)
 
-    def _led(self, kept: list[int], rows: Rows, places: Places, found: Rows) -> tuple[Matrix, Matrix]:
-        """q and v on the rows `kept`, in one mode."""
+    def _led(self, kept: list[int], sizes: Matrix, rows: Rows, places: Places, found: Rows) -> tuple[Matrix, Matrix]:
+        """q and v on the rows `kept` of one mode, where these are far from vanishing and from being dependent."""
         theta = places.theta[:, None]
         first, last = (self._missed(kept, rows, places.lower, ends) for ends in (places.lower, places.upper))
         aim, aim_rate = ((1.0 - theta) * a + theta * b for a, b in zip(first, last, strict=True))
-        led, good, before = found, self._has_rank(kept, found), np.full(len(found), np.inf)
+        least = np.linalg.svd(self._rows_at(kept, found) / sizes, compute_uv=False)[:, -1]
+        led, good, before = found, least > MIN_SINGULAR_VALUE, np.full(len(found), np.inf)
         for _ in range(3):  # an error of 0.01 is round-off after the third
             x, sound = self._correction(kept, led, aim)
             size = np.max(np.abs(x), axis=1, initial=0.0)
@@ -80,24 +81,32 @@ class Projection:
         good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)
         return np.where(good[:, None], led.q, found.q), np.where(good[:, None], found.v + change, found.v)
 
-    def _has_rank(self, kept: list[int], rows: Rows) -> Flags:
-        """Whether the rows are far from vanishing, and from depending on each other, at each state."""
-        scaled = self._rows_at(kept, rows) / self._sizes(kept)
-        return np.asarray(np.linalg.svd(scaled, compute_uv=False)[:, -1] > MIN_SINGULAR_VALUE)
+    def _basis(self, held: Held) -> tuple[list[int], Matrix]:
+        """Rows that are independent, and their lengths times the sizes of columns, the largest in the run (kept, n).
+
+        Where rows depend on others, those that are longest beside the ones before (QR with pivoting) at states all
+        over the run: the first ones that are independent at all may be far worse conditioned than the mechanism.
+        """
+        key = tuple(held.every)
+        if key not in self._bases:
+            rows, count = self.balance.states.rows, len(held.kept)
+            chosen = held.every if held.depend else held.kept
+            B = self._rows_at(chosen, rows.part(np.unique(np.linspace(0, len(rows) - 1, 64).astype(np.intp))))
+            columns = _positive(np.max(np.abs(B / _positive(np.max(np.abs(B), axis=(0, 2)))[:, None]), axis=(0, 1)))
+            lengths = _positive(np.max(np.linalg.norm(B / columns, axis=2), axis=0))
+            left, picked = B / columns / lengths[:, None], list(range(count))
+            for k in range(count if held.depend else 0):
+                picked[k] = int(np.argmax(np.sum(left**2, axis=(0, 2))))
+                along = left[:, picked[k]]
+                along = along / _positive(np.linalg.norm(along, axis=1))[:, None]
+                left = left - np.einsum("kmn,kn->km", left, along)[:, :, None] * along[:, None, :]
+            picked.sort()
+            self._bases[key] = [chosen[k] for k in picked], lengths[picked, None] * columns
+        return self._bases[key]
 
     def _rows_at(self, kept: list[int], rows: Rows) -> Matrix:
         """B (k, kept, n)."""
         return np.asarray(np.nan_to_num(self.balance.terms_at(rows)[3][:, kept]))
-
-    def _sizes(self, kept: list[int]) -> Matrix:
-        """Lengths of rows times sizes of columns, the largest in the run, from rows spread over it (kept, n)."""
-        key = tuple(kept)
-        if key not in self._largest:
-            every = self.balance.states.rows
-            B = self._rows_at(kept, every.part(np.unique(np.linspace(0, len(every) - 1, 64).astype(np.intp))))
-            columns = _positive(np.max(np.abs(B / _positive(np.max(np.abs(B), axis=(0, 2)))[:, None]), axis=(0, 1)))
-            self._largest[key] = _positive(np.max(np.linalg.norm(B / columns, axis=2), axis=0))[:, None] * columns
-        return self._largest[key]
 
     def _missed(self, kept: list[int], rows: Rows, lower: Index, ends: Index) -> tuple[Matrix, Matrix]:
         """h and ḣ at the ends of intervals, in the mode of the interval."""

@@ -13,7 +13,7 @@ import mbd
 from tests.fuzz.parts import add_loads, any_axis, any_body, any_frame, any_joint
 from tests.fuzz.tree_poses import close_loop, pose
 
-__all__ = ["SPATIAL_KINDS"]
+__all__ = ["SPATIAL_KINDS", "turned_four_bar"]
 
 Made = tuple[mbd.Model, dict[str, Any]]
 
@@ -126,7 +126,7 @@ def _loop(rng: random.Random) -> Made:
     return model, position
 
 
-def _redundant(rng: random.Random) -> Made:
+def turned_four_bar(rng: random.Random) -> Made:
     """A planar four-bar, somewhere in space: three of its rows follow from the others; some bars are thin rods."""
     a, b, c, d = 0.5, 1.2, 0.9, 1.1
     crank = rng.uniform(0.4, 2.6)
@@ -269,7 +269,7 @@ def _light(rng: random.Random) -> Made:
 SPATIAL_KINDS: dict[str, tuple[Callable[[random.Random], Made], bool]] = {
     "free tree": (_tree, False),
     "free loop": (_loop, True),
-    "redundant loop": (_redundant, True),
+    "redundant loop": (turned_four_bar, True),
     "stops of balls": (_stops, False),
     "feet in space": (_feet, False),
     "balls and disks": (_round, False),
