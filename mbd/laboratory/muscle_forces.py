@@ -12,11 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.domains import Domain
+from mbd.bodies.scope import Scope
 from mbd.bodies.values import is_number, named_number_faults, number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.forces.base import Action, Force, Result
 from mbd.forces.muscles import Muscle
+from mbd.forces.quantities import Mention
 from mbd.forces.samples import Samples
 from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate
@@ -219,6 +223,40 @@ def _rigid(muscles: list[Muscle], time: Vector | None = None, activation: Matrix
     return [replace(each, excitation=e, **without) for each, e in zip(muscles, excitations, strict=True)]
 
 
+@dataclass(frozen=True)
+class _Idle(Force):
+    """A muscle that does not pull: its results, and none of its force in the equations of motion."""
+
+    name: str
+    muscle: Muscle
+
+    @property
+    def kind(self) -> str:
+        """'applied'."""
+        return self.muscle.kind
+
+    def act(self, scope: Scope) -> Action:
+        """Nothing; what the muscle would do declares its parameters."""
+        self.muscle.act(scope)
+        return Action()
+
+    def mentions(self) -> list[Mention]:
+        """Those of the muscle."""
+        return self.muscle.mentions()
+
+    def parameters(self) -> dict[str, float]:
+        """Those of the muscle."""
+        return self.muscle.parameters()
+
+    def domains(self) -> dict[str, Domain]:
+        """Those of the muscle."""
+        return self.muscle.domains()
+
+    def results(self) -> dict[str, Result]:
+        """Those of the muscle."""
+        return self.muscle.results()
+
+
 @dataclass(frozen=True, eq=False)
 class _Crossed:
     """What muscles can do: arms (R, n_v, m) [m], strength and passive force (R, m) [N], length (R, m) [m]."""
@@ -231,10 +269,10 @@ class _Crossed:
 
 
 def _crossed(bare: Any, muscles: list[Muscle], moments: InverseDynamics, changed: Mapping[str, float]) -> _Crossed:
-    """Paths and curves at the frames, by the equations of the model with muscles whose tendons are rigid."""
+    """Paths and curves at the frames, as results of muscles whose tendons are rigid and which do not pull."""
     rigid = _rigid(muscles)
     loaded = copy.copy(bare)
-    loaded.forces = [*bare.forces, *rigid]
+    loaded.forces = [*bare.forces, *(_Idle(muscle.name, muscle) for muscle in rigid)]
     own = {name for muscle in rigid for name in muscle.parameters()}
     known = {name for muscle in muscles for name in muscle.parameters()}
     values = {k: v for k, v in changed.items() if k not in known or k in own}
