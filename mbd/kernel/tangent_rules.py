@@ -9,8 +9,8 @@ from mbd.kernel.records import Equations, Kernel, Reals, Steps
 
 __all__ = [
     "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
-    "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections", "is_differentiated",
-    "note_matrix", "note_solution", "note_step", "takes_part",
+    "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections", "held_at_end",
+    "is_differentiated", "note_matrix", "note_solution", "note_step", "takes_part",
 ]  # fmt: skip
 
 NOT_FOLLOWED = -3
@@ -24,6 +24,11 @@ def is_differentiated() -> bool:
 
 def note_step(K: Kernel) -> None:
     """A step begins: what `follow_candidate` needs to take it once more."""
+
+
+def held_at_end(K: Kernel, t1: float) -> float:
+    """The end of a step, which does not move where the run ends there by a given time."""
+    return t1
 
 
 def follow_candidate(K: Kernel, h: float, t1: float) -> int:

@@ -47,7 +47,7 @@ class MadeRun(TangentRun):
     ready : what it carries; None where its first row does not come at once, so that it has to be made again
     """
 
-    ends_exactly = repeats = False
+    repeats = False
     rows_at_once = 512  # of which few have derivatives
     ways: Ways
     ready: Ready | None = None

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.values import is_number
 from mbd.equations.equations import Guard
 from mbd.equations.switching_times import instant_slopes
 from mbd.errors import CapabilityError
@@ -103,8 +102,6 @@ def tangent_run(
         there = f", with closed={event.name!r}" if event.kind == "closed" else ", with the velocities of the first row"
         raise sided(f"{event.name!r} happens as the run starts", f"start where it has happened{there}")
     charted, layout, count = Charted(programs), rows.mechanism.layout, len(start.t)
-    if made is not None and _ends_with_a_moving_step(rows, made):
-        made = None
     runs, states = list[tuple[TangentRun, int]](), list[dict[str, tuple[Any, Matrix]]]()
     for first in range(0, count, DIRECTIONS):
         some = slice(first, min(first + DIRECTIONS, count))
@@ -157,14 +154,6 @@ def tangent_run(
         for row, trigger in zip(sorted(rows.events), fired, strict=True)
     ]  # fmt: skip
     return Passed(end[0], last, end[1], instants)
-
-
-def _ends_with_a_moving_step(rows: RunRows, made: TangentRun) -> bool:
-    """Whether a run to a given time ends with a whole step, which would move with the instant of an event before it.
-
-    Its neighbours end with a step that is cut, or with one more: the end does not move. The run made again cuts it.
-    """
-    return is_number(rows.record.settings["until"]) and bool(made.at_state()["clock"][1].any())
 
 
 def seed(

@@ -181,7 +181,7 @@ class TangentRun(Run):
 
     stepper_kind = TangentStepper
     stepper: TangentStepper
-    ends_exactly = repeats = True
+    repeats = True
     rows_at_once = 256  # derivatives of more would not stay in the caches of processors
     every_row = False
     moved_with_jump: Callable[[], Matrix | None]
@@ -199,6 +199,7 @@ class TangentRun(Run):
 
     def begin_tangents(self, places: Sequence[int]) -> None:
         """Before the start is put into the kernel's arrays: which parameters are differentiated by."""
+        self.kernel.last_time, self.kernel.near_end = self.end, self.boundaries.near
         self.of_times: list[Lanes] = []
         self.of_rows: dict[int, Lanes] = {}
         self.stepper.differentiate_by(places)

@@ -28,7 +28,7 @@ from mbd.kernel.stepping.judge_step import MAX_SHORTENINGS, end_timer, judge_ste
 from mbd.kernel.stepping.observe import is_awaited, store_row
 from mbd.kernel.stepping.starting import find_mode, restart
 from mbd.kernel.stepping.step_retry import is_shortened, part_end, step_end, tried_step
-from mbd.kernel.tangent_rules import note_step
+from mbd.kernel.tangent_rules import held_at_end, note_step
 
 __all__ = ["advance"]
 
@@ -91,8 +91,7 @@ def take_step(K: Kernel) -> int:
     cut = t1 > K.until - 1e-6 * K.step
     if cut and K.until >= K.end:  # the caller decides: a step of the grid as in a longer run, or one cut
         return LAST
-    if cut:
-        t1 = K.until
+    t1 = K.until if cut else held_at_end(K, t1)
     # shorter where a joint turns far, sliding comes to rest or a timer is due
     wanted = t1
     if K.vector == 0:

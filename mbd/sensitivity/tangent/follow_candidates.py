@@ -22,7 +22,7 @@ from mbd.sensitivity.tangent.words import (
     without_tangent,
 )
 
-__all__ = ["follow_candidate", "follow_event", "follows_rows", "note_step"]
+__all__ = ["follow_candidate", "follow_event", "follows_rows", "held_at_end", "note_step"]
 
 
 def follows_rows(K: Kernel) -> bool:
@@ -33,6 +33,11 @@ def follows_rows(K: Kernel) -> bool:
 def note_step(K: Kernel) -> None:
     """Whether a singular configuration is near as the step begins."""
     K.starts[step_place(K)] = float(K.near_singular)
+
+
+def held_at_end(K: Kernel, t1: float) -> float:
+    """The end of a step: a given time to which the run goes does not move with the instant of an event before it."""
+    return without_tangent(t1) if abs(t1 - K.last_time) <= K.near_end else t1
 
 
 def keep_candidate(K: Kernel) -> None:

@@ -102,8 +102,6 @@ class RunData:
     stepper_kind: type[Stepper] = Stepper
     rows_at_once = 1 << 14
     """Rows of results that the kernel may fill before it hands them over."""
-    ends_exactly = False
-    """Whether a last step of the grid that ends with the run, but for round-off, ends there exactly."""
     repeats = False
     """Whether the same run has been made before, so that its parameters need not be judged."""
     interrupted = False

@@ -33,8 +33,7 @@ def advance(run: RunData, target: float, due: bool) -> int:
     if may_go_on_unlocated(run, status):  # as a longer run would
         return status
     near = run.boundaries.near
-    there = run.ends_exactly and status == codes.PAUSE and run.now >= target - near
-    if status in (codes.PAUSE, codes.EVENT, codes.NEW_MODE) and run.now <= target + near and not there:
+    if status in (codes.PAUSE, codes.EVENT, codes.NEW_MODE) and run.now <= target + near:
         return codes.DONE if status == codes.PAUSE and run.now >= target - near else status
     restore(run, before)
     v.counts[:] = counts
