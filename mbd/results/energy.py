@@ -172,8 +172,8 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     """Work of a penalty contact: ∫ p ġ dt of the impacts whose rows tell it, else −U(g) and what was lost.
 
     ∫ p ġ dt is the more accurate where rows resolve an impact, as they balance forces; of a few rows it may be
-    anything. What a contact still holds as it opens is lost, what it holds as it closes it owes: neither is given to
-    the mechanism.
+    anything. What a contact still holds as it opens, and what it holds as it closes, as rubber that was struck before,
+    is its own: neither is given to the mechanism at that instant.
     """
     time, closed = columns.record.time, columns.record.closed[:, lost.contact].astype(bool)
     nodes = [node for node in (lost.elastic, lost.value, lost.rate) if node is not None]
@@ -183,7 +183,7 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     work = never_giving(work, power, _trapezoid(time, power))
     held = np.where(closed, elastic, 0.0)
     steps = -np.diff(held)
-    steps[closed[:-1] & ~closed[1:]] = 0.0
+    steps[closed[:-1] != closed[1:]] = 0.0
     # what a mode or an event puts into it at an instant, as it moves the rest of a leg, comes from outside
     put_in = np.where((np.diff(time) <= 0.0) & closed[:-1] & closed[1:], np.diff(held), 0.0)
     steps += put_in + np.diff(work)
@@ -197,7 +197,7 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     np.maximum.at(gain, episode, since)
     np.add.at(doubt, episode[1:], unsure)
     allowed = ROUND_OFF_RTOL * size
-    allowed[0] += held[0]
+    allowed += held[begins]
     np.add.at(allowed, episode[1:], np.maximum(put_in, 0.0))
     is_known = (doubt <= MAX_WORK_ERROR * size) & (gain <= allowed)
     return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]], np.diff(direct), steps))])
