@@ -30,12 +30,15 @@ from mbd.tape.node import Scalar
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["HEIGHT", "PLACE", "Shape", "drawn", "offer_shapes", "shapes_of"]
+__all__ = ["HEIGHT", "NUMBERS", "PLACE", "Shape", "drawn", "offer_shapes", "shapes_of"]
 
 PLACE = "place"
 """Kind of the inputs x (number 0) and z (number 1) of a height function that is drawn."""
 
 HEIGHT = "height"
+
+NUMBERS = {"plane": 4, "cone": 1, "solid": 7, "limb": 7}
+"""How many numbers a shape of each kind has; of all others none."""
 
 Offer = Callable[[str, str, Callable[[], Triple]], None]
 
@@ -73,6 +76,9 @@ class Shape:
     numbers: tuple[float, ...] = ()
     across: str = ""
     form: str = ""
+
+    def __post_init__(self) -> None:
+        assert len(self.numbers) == NUMBERS.get(self.kind, 0), self.kind  # files are refused otherwise
 
 
 def shapes_of(model: Description) -> tuple[Shape, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 from mbd.bodies.rigid_body import FORMS
 from mbd.bodies.values import among, printable
 from mbd.equations.held import HELD_BY
+from mbd.equations.shapes import NUMBERS
 from mbd.integrators.extension import EXTENSIONS, HERMITE
 from mbd.joints.anatomy import ANATOMY
 from mbd.results.archive import Head, Members, Unreadable
@@ -132,7 +133,7 @@ def _shape(shape: Mapping[str, Any]) -> None:
     contacts, points = (_list(shape[word], str, "'shapes'") for word in ("contacts", "points"))
     expect(len(contacts) == len(points), "'shapes'")
     numbers = _list(shape["numbers"], (int, float), "'shapes'")
-    expect(len(numbers) == {"plane": 4, "solid": 7, "limb": 7}.get(shape["kind"], 0), "'shapes'")
+    expect(len(numbers) == NUMBERS.get(shape["kind"], 0), "'shapes'")
 
 
 def _columns(meta: Mapping[str, Any], members: Members, heads: Mapping[str, Head], count: int) -> set[str]:

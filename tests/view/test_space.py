@@ -313,10 +313,24 @@ def test_between_the_pictures_that_are_kept_nothing_is_missed_by_more_than_the_t
     assert set(twice) | set(twice + 1) <= set(found)
 
 
-def test_a_file_keeps_solids_and_hinges(tmp_path):
-    run = pendulum()
+def stopped() -> mbd.Trajectory:
+    """A ball joint with a stop of directions."""
+    model, body = mbd.Model("hip"), mbd.RigidBody("thigh", 1.0, (0.1, 0.1, 0.1), center=(0.0, -0.2, 0.0))
+    hip = mbd.Spherical("hip", model.ground.origin, body.origin)
+    model.connect(hip)
+    model.constrain(mbd.Unilateral("stop", mbd.cone(hip, 0.4)))
+    return mbd.simulate(model, mbd.assemble(model), dt=1e-2, until=0.05)
+
+
+@pytest.mark.parametrize("make", [pendulum, stopped])
+def test_a_file_keeps_solids_hinges_and_stops(make, tmp_path):
+    run = make()
     loaded = mbd.load(run.save(tmp_path / "run"))
     assert loaded.page(tmp_path / "loaded.html").read_bytes() == run.page(tmp_path / "run.html").read_bytes()
+
+
+def test_a_file_of_chosen_names_has_no_solids(tmp_path):
+    run = pendulum()
     few = scene(mbd.load(run.save(tmp_path / "few", names=["shoulder.first"])), 10)
     assert not few.points and not few.spatial
 
