@@ -19,6 +19,8 @@ __all__ = ["assign_plates"]
 
 MAX_PRESSURE_DISTANCE = 0.35
 """Farthest that a center of pressure lies from a point of the foot that stands there, along the ground [m]."""
+MIN_DISTANCE_RATIO = 1.25
+"""Times as far as the nearest foot from the center of pressure that another foot is, to have no part in the load."""
 MIN_LOAD_TIME = 0.03
 """Loads that last less are taken for noise [s]."""
 
@@ -30,7 +32,7 @@ def assign_plates(
 
     Each span in which a plate is loaded belongs to the foot whose point is nearest to the center of pressure, on
     average over the span. What was found is logged, as ``plate 1 from 0.21 to 0.93 s: left foot``. Spans in which two
-    feet take turns, or none is near, are doubted by a warning: a plate under two feet at once cannot be told apart.
+    feet are as near, or none is, are doubted by a warning: a plate under two feet at once cannot be told apart.
 
     Parameters
     ----------
@@ -77,11 +79,12 @@ def assign_plates(
             if mean[best] > MAX_PRESSURE_DISTANCE:
                 doubt(f"{title}: no foot is nearer than {mean[best]:.2g} m to the center of pressure; left out")
                 continue
-            nearest = np.argmin(np.where(np.isnan(distance), np.inf, distance), axis=0)
-            other = float(np.mean(nearest != best))
+            near = np.where(np.isnan(distance), np.inf, distance)
+            others = np.delete(near, best, axis=0).min(axis=0, initial=np.inf)
+            other = float(np.mean(others <= MIN_DISTANCE_RATIO * near[best]))
             if other > 0.2:
                 doubt(
-                    f"{title}: another foot than {feet[best].body.name!r} is nearer during {100 * other:.0f} % of it; "
+                    f"{title}: another foot than {feet[best].body.name!r} is as near during {100 * other:.0f} % of it; "
                     "two feet on one plate cannot be told apart, and all of it is given to the one"
                 )
             note(f"{title}: {feet[best].body.name!r}")

@@ -11,7 +11,8 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError
 from mbd.laboratory.plates_by_column import plates_by_column
 from mbd.laboratory.recording import Recording
-from mbd.laboratory.text import NUMBER, Lines, numbers_of, read_lines
+from mbd.laboratory.storage import read_storage
+from mbd.laboratory.text import MAX_HEADER, NUMBER, Lines, numbers_of, read_lines
 from mbd.laboratory.units import factor_of, is_length, split_unit
 
 __all__ = ["read_csv", "write_csv"]
@@ -34,6 +35,8 @@ def read_csv(path: Path) -> Recording:
         for a file without a column of times, and for cells that are no numbers, with the line.
     """
     source = read_lines(path)
+    if any(line.strip(", \t").lower() == "endheader" for line in source.lines[:MAX_HEADER]):
+        return read_storage(path)  # with commas between the cells, as OpenSim writes it too
     first = next((k for k, line in enumerate(source.lines) if line.strip() and not line.startswith("#")), None)
     if first is None:
         raise source.refused("the file is empty")

@@ -28,6 +28,8 @@ MAX_STATIC_FLEXION = 12.0
 """Angle between thigh and shank of a static trial from which a knee counts as bent [°]."""
 PLAUSIBLE = (0.7, 1.4)
 """Factors of length outside of which a measured length is in doubt [-]."""
+PLAUSIBLE_MASS = (0.1, 5.0)
+"""Factors of the whole mass outside of which a mass is in doubt: children to adults [-]."""
 MAX_RIGID_SCATTER = 0.02
 """Scatter of the distance of two markers beyond which they do not lie on one rigid body [m]."""
 
@@ -92,6 +94,8 @@ def scale(
     if total <= foreign:
         raise ModelError(f"mass of scale: {total:g} kg are less than the bodies of your own have, {foreign:g} kg")
     share = (total - foreign) / sum(weights.values())
+    if not PLAUSIBLE_MASS[0] <= share <= PLAUSIBLE_MASS[1]:
+        doubt(f"scale: {total:g} kg are {share:.3g} times the mass of before; is the mass in kilograms?")
     for name, segment in segments.items():
         if not isinstance(segment, Segment):
             kept.append(name)

@@ -133,8 +133,10 @@ def _of_vectors(
     table = numbers_of(source, wide, 1 + 3 * (len(labels) - 1))
     time = _times(source, table[:, 0], rows)
     factor = 1e-3 if header.get("units", "m").lower() in ("mm", "millimeters") else 1.0
+    unit = "m" if factor == 1.0 else "mm"
+    note = f"{len(labels) - 1} columns of three numbers are markers in {unit}, whatever they hold"
     markers = {label: factor * table[:, 1 + 3 * k : 4 + 3 * k] for k, label in enumerate(labels[1:])}
-    return Recording(time, markers, name=source.path.stem)
+    return Recording(time, markers, name=source.path.stem, notes=(note,))
 
 
 def write_storage_text(recording: Recording, target: Path) -> str:

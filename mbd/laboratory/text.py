@@ -14,8 +14,10 @@ from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 from mbd.free_memory import available
 
-__all__ = ["Lines", "numbers_of", "read_lines", "with_tabs"]
+__all__ = ["MAX_HEADER", "Lines", "numbers_of", "read_lines", "with_tabs"]
 
+MAX_HEADER = 100
+"""Lines within which the header of a storage file ends."""
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d{1,4})?$")
 GAPS = {"", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "-nan(ind)", "missing"}
 """What stands for a value that was not measured."""
@@ -68,9 +70,10 @@ def read_lines(path: Path) -> Lines:
 
 
 def with_tabs(source: Lines) -> Lines:
-    """A file with tabs between its cells, also where a spreadsheet has saved it with commas, which end lines too."""
+    """A file with tabs between its cells, also where a spreadsheet or OpenSim has saved it with commas."""
     first = source.lines[0].rstrip().lower() if source.lines else ""
-    if not first.endswith(",,") and not first.startswith("pathfiletype,"):
+    labelled = any(line.lower().startswith("time,") for line in source.lines[:MAX_HEADER])
+    if not labelled and not first.endswith(",,") and not first.startswith("pathfiletype,"):
         return source
     return replace(source, lines=tuple(line.replace(",", "\t") for line in source.lines))
 

@@ -155,12 +155,16 @@ def test_plates_that_are_never_loaded_and_gaps_of_plates_are_told(recwarn):
     assert len(repr(right)) < 100 and "101 samples from 0 to 1 s" in repr(right)
 
 
-def test_two_feet_on_one_plate_are_doubted():
+@pytest.mark.parametrize("way", [0.2, 0.0])
+def test_two_feet_on_one_plate_are_doubted(way):
+    """The center of pressure goes from one to the other, or rests midway between them."""
     model, feet, motion, time, plate = steps()
     there = plate("plate 1", 0.4, 0.0, 0.1, 0.9)
-    moving = np.column_stack([np.linspace(0.2, 0.6, 101), 0 * time, np.linspace(-0.1, 0.1, 101)])
-    there = mbd.PlateRecord.at("plate 1", time, there.force, moving)
     moved = mbd.inverse_dynamics(model, motion).run
+    middle = np.mean([moved[f"{foot.name}.origin"].mean(axis=0) for foot in feet], axis=0)
+    along = np.linspace(-1.0, 1.0, 101)
+    moving = np.column_stack([middle[0] + way * along, 0 * time, middle[2] + 0.5 * way * along])
+    there = mbd.PlateRecord.at("plate 1", time, there.force, moving)
     with pytest.warns(mbd.MbdWarning, match="two feet on one plate"):
         mbd.assign_plates(moved, mbd.Recording(time, plates=(there,)), [foot.origin for foot in feet])
 

@@ -101,6 +101,14 @@ def test_channels_are_read_from_every_spelling_of_a_storage_file(tmp_path, varia
     assert found["ground_force_vy"] == pytest.approx([700.0, 710.0, 720.0])
 
 
+@pytest.mark.parametrize("end", [".sto", ".csv"])
+def test_a_storage_file_with_commas_between_its_cells_is_read(tmp_path, end):
+    """As the CSV writer of OpenSim makes it."""
+    found = mbd.read(written(tmp_path, f"gait{end}", STO.replace("\t", ",").replace("gait\n", "")))
+    assert found["knee_angle_r"] == pytest.approx([math.pi / 2, math.pi / 4, 0.0])
+    assert found["pelvis_tx"] == pytest.approx([1.5, 1.6, 1.7])
+
+
 CSV_VARIANTS = {
     "as it is": CSV,
     "semicolons and commas": CSV.replace(",", ";").replace(".1;", ",1;").replace("0.2;", "0,2;"),

@@ -64,9 +64,11 @@ def test_what_does_not_fit_is_named(lengths, more, words):
         mbd.scale(mbd.human(75.0, 1.80), lengths, **more)
 
 
-def test_lengths_in_millimeters_are_doubted():
+def test_lengths_in_millimeters_and_a_mass_in_grams_are_doubted():
     with pytest.warns(mbd.MbdWarning, match="are the lengths in meters"):
         mbd.scale(mbd.human(75.0, 1.80), {"left thigh": 430.0})
+    with pytest.warns(mbd.MbdWarning, match="907 times the mass of before; is the mass in kilograms"):
+        mbd.scale(mbd.human(75.0, 1.80), {"left thigh": 0.43}, mass=68e3)
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.5])
