@@ -16,6 +16,7 @@ from mbd.equations.lagrangian_words import described, parts, word_faults
 from mbd.errors import ModelError, nearest
 from mbd.forces.quantities import INCREMENT_PREFIX
 from mbd.notebook import Faults, Text
+from mbd.topology.check import machine_faults
 from mbd.topology.describe import in_html
 
 __all__ = ["Lagrangian"]
@@ -70,7 +71,8 @@ class Lagrangian(EnergyDescription):
         if faults:
             return faults
         lowering = Lowering(self)
-        return lowering.faults or word_faults(self, lowering.scope)
+        found = lowering.faults or word_faults(self, lowering.scope)
+        return found or machine_faults(self, Lagrangian.parameter_check)
 
     def require_valid(self) -> None:
         """Raise a `ModelError` with every fault, if there is one."""

@@ -162,13 +162,16 @@ class ParameterCheck:
             return found
         owners = {id(self._owner[name]): self._owner[name] for name in names if name in self._owner}
         for number, word in owners.items():
-            own = {name: changed.get(name, self._values.get(name, 0.0)) for name in self._names[number]}
-            found += word.value_faults(own)
+            found += word.value_faults(self._own(number, changed))
         for name in names:
             other = self._stands_for.get(name, "")
             if word_of := self._owner.get(other):
-                there = {each: self._values[each] for each in self._names[id(word_of)]} | {other: changed[name]}
+                there = self._own(id(word_of), {other: changed[name]})
                 found += [f"{name!r}: {fault}" for fault in word_of.value_faults(there)]
         if not self._decisive.isdisjoint(names):
             found += self._whole({**self._values, **changed})
         return list(dict.fromkeys(found))
+
+    def _own(self, number: int, changed: Mapping[str, float]) -> dict[str, float]:
+        """Values of the parameters of a word; one that the model has no number of is 0, as the rest of no spring."""
+        return {name: changed.get(name, self._values.get(name, 0.0)) for name in self._names[number]}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from mbd.bodies.algebra import ZERO
@@ -25,9 +25,10 @@ from mbd.topology.plan import cut_names, is_planar, plan
 if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
     from mbd.constraints.controller import Controller
+    from mbd.constraints.machine import Machine
     from mbd.topology.description import Description
 
-__all__ = ["faults", "parameter_check", "quantities", "require_valid", "rule_faults"]
+__all__ = ["faults", "machine_faults", "parameter_check", "quantities", "require_valid", "rule_faults"]
 
 
 def faults(model: Description) -> list[str]:
@@ -46,7 +47,9 @@ def faults(model: Description) -> list[str]:
     found += reach_faults(model)
     found += mention_faults(model)
     found += rule_faults(model)
-    found += machine_faults(model)
+    geometry = {name for body in model.bodies.values() for name in body.parameters()}
+    geometry |= {name for frame in model.points() for name in frame.parameters()}
+    found += machine_faults(model, parameter_check, {*geometry, *(f"gravity.{axis}" for axis in "xyz")})
     found += choice_faults(model)
     found += massless_faults(model, model.parameters)
     found += tilted_faults(model)
@@ -298,6 +301,16 @@ class Ruled(Protocol):
     def controllers(self) -> Sequence[Controller]: ...
 
 
+class Machined(Protocol):
+    """What has modes and sampled laws."""
+
+    @property
+    def machines(self) -> Sequence[Machine]: ...
+
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
+
+
 def rule_faults(model: Ruled) -> list[str]:
     """Names in When, only_while and the controllers' on= and writes= that do not exist."""
     contacts = [word.name for word in model.contacts]
@@ -319,13 +332,16 @@ def rule_faults(model: Ruled) -> list[str]:
     return found
 
 
-def machine_faults(model: Description) -> list[str]:
-    """Parameters that modes and sampled laws set, and that do not exist or belong to bodies."""
-    found = []
-    geometry = {name for body in model.bodies.values() for name in body.parameters()}
-    geometry |= {name for frame in model.points() for name in frame.parameters()}
-    geometry |= {f"gravity.{axis}" for axis in "xyz"}
-    parameters = model.parameters if model.machines else {}
+def machine_faults(
+    model: Machined, check: Callable[[Any], ParameterCheck], geometry: Collection[str] = ()
+) -> list[str]:  # fmt: skip
+    """Parameters that modes and sampled laws set, and that do not exist, belong to bodies or may not have the value.
+
+    check : of the model's parameters; geometry : names of those that bodies are made of
+    """
+    if not model.machines:
+        return []
+    found, parameters = [], model.parameters
     words = {name.rpartition(".")[0] for name in parameters}
     for word in model.machines:
         for name in getattr(word, "own_outputs", ()):
@@ -344,7 +360,7 @@ def machine_faults(model: Description) -> list[str]:
                     f"'{word.name}' sets {name!r}, which bodies are made of; only parameters of forces, losses, "
                     "contacts and measures change at instants"
                 )
-    return found or (parameter_check(model).stand_in_faults() if model.machines else [])
+    return found or check(model).stand_in_faults()
 
 
 def choice_faults(model: Description) -> list[str]:

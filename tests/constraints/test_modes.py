@@ -122,6 +122,19 @@ def test_a_lagrangian_has_modes_too() -> None:
     assert set(run["phase"]) == {"swing", "pull", "brake"}
 
 
+@pytest.mark.parametrize(("name", "value", "message"), [
+    ("stop.stifness", 1.0, "no parameter named 'stop.stifness'; did you mean 'stop.stiffness'"),
+    ("stop.stiffness", -1.0, "'stop.stiffness.b': .*-1 does not push"),
+    ("stop.restitution", 0.5, "no parameter named 'stop.restitution'"),
+])  # fmt: skip
+def test_what_a_mode_of_a_lagrangian_sets_is_checked(name: str, value: float, message: str) -> None:
+    x = mbd.Coordinate("x", unit="m")
+    model = mbd.Lagrangian("ball", [x], kinetic=0.5 * x.v**2, potential=9.81 * x.q)
+    model.constrain(mbd.Penalty("stop", x.q, stiffness=1e3), mode(sets={name: {"b": value}}))
+    with pytest.raises(ModelError, match=message):
+        model.require_valid()
+
+
 def test_schemes_keep_their_order_across_transitions() -> None:
     model = knee()
     start = mbd.assemble(model, {"knee.angle": 0.8})
@@ -204,6 +217,16 @@ def test_effects_of_a_machine_are_left_out_with_what_it_sets_of_them() -> None:
     assert bare.check() == [] and model.check() == []
     assert "knee loss.coefficient.pull" not in bare.parameters
     assert {"drive", "knee loss"} <= set(map(str, model.cost().effects))
+
+
+def test_a_mode_sets_the_loss_of_an_ankle_that_a_motor_drives_through_a_spring() -> None:
+    """The spring is a word of its own, and has no rest."""
+    model, foot = mbd.Model("leg"), mbd.RigidBody("foot", 0.8, 0.003)
+    size = {"stiffness": 300.0, "inertia": 0.05, "mass": 0.3, "loss": mbd.Viscous(0.2)}
+    mbd.parts.series_elastic_ankle(model, "ankle", model.ground.origin, foot.origin, torque=0.0, **size)
+    changes = [mbd.Transition("a", "b", after=1.0)]
+    model.apply(mbd.Mode("m", ("a", "b"), transitions=changes, sets={"ankle loss.coefficient": {"b": 1.0}}))
+    assert model.check() == []
 
 
 def test_a_run_that_goes_on_or_was_saved_is_the_same_to_the_bit(tmp_path: Any) -> None:
