@@ -5,12 +5,12 @@ The tangent pass (`mbd.sensitivity.tangent`) translates the kernel with other fu
 
 from __future__ import annotations
 
-from mbd.kernel.records import Equations, Kernel, Reals, Steps
+from mbd.kernel.records import Equations, Integers, Kernel, Reals, Steps
 
 __all__ = [
     "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
     "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections", "held_at_end",
-    "is_differentiated", "note_matrix", "note_solution", "note_step", "takes_part",
+    "is_differentiated", "note_matrix", "note_solution", "note_step", "solve_plain", "takes_part",
 ]  # fmt: skip
 
 NOT_FOLLOWED = -3
@@ -84,6 +84,10 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
 
 def follow_matrix(K: Steps, m: int, x: Reals, whole: bool) -> None:
     """A correction x follows its matrix; `whole`: x is all that positions are corrected by, not a change of it."""
+
+
+def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
+    """b ← A⁻¹ b with factors that have no derivatives."""
 
 
 def takes_part(value: float) -> bool:

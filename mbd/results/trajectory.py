@@ -242,7 +242,11 @@ class Trajectory:
         """Names and units of the model."""
         if self._archive is not None:
             return self._archive.facts
-        return Facts.of(self._model_columns.equations)
+        equations = self._model_columns.equations
+        known: Facts | None = equations.memory.get("facts")
+        if known is None:
+            known = equations.memory["facts"] = Facts.of(equations)
+        return known
 
     @property
     def name(self) -> str:

@@ -195,9 +195,12 @@ def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any
     _check_controllers(getattr(model, "controllers", ()), controllers, {*single, *grouped})
     mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
     inputs = {parameter.name for parameter in mechanism.equations.parameters}
-    folded = getattr(model, "parameters", {})
     own = {coordinate.name for coordinate in mechanism.equations.coordinates}
-    known = {*inputs, *folded, *start_names(mechanism.equations), *restitution_names(mechanism.equations)}
+    start = start_names(mechanism.equations)
+    if inputs.union(own, start).issuperset((*single, *grouped)):
+        return model
+    folded = getattr(model, "parameters", {})
+    known = {*inputs, *folded, *start, *restitution_names(mechanism.equations)}
     whole = whole_names(mechanism.equations)
     for name in (*single, *grouped):
         if name not in known and not (name in whole and name in single):

@@ -18,6 +18,8 @@ __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
 
 RESULT_RTOL = 1e-7
 """Difference of a result from that of the run, over its size, that is round-off [-]."""
+MOST_ROWS = 64
+"""Rows from which the size of a result is known."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]
 
 
 def _at_rows(rows: RunRows, found: Passed, names: Sequence[str]) -> dict[str, Vector]:
-    """Named results at all rows of the run, evaluated together."""
+    """Named results at some rows of the run and the last one, evaluated together."""
     single, columns = list[str](), rows.run.columns
     for name in names:
         try:
@@ -102,7 +104,10 @@ def _at_rows(rows: RunRows, found: Passed, names: Sequence[str]) -> dict[str, Ve
         if len(parts) > 1:
             raise UnknownNameError(f"of: {name!r} has three components; ask for {name + '.x'!r}, '.y' or '.z'")
         single += parts
-    return dict(zip(names, columns.at_rows(single), strict=True))
+    stored, count = rows.stored, len(rows.record.time)
+    some = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(np.intp))
+    nodes = [stored.node(part) for part in single]
+    return dict(zip(names, stored.evaluate(nodes, stored.part(some, nodes)), strict=True))
 
 
 def _require_found_again(name: str, value: float, wanted: Vector) -> None:

@@ -131,7 +131,7 @@ def tangent_run(
 
     def at_row(row: int) -> tuple[Motion, Rates]:
         numbers = np.concatenate(
-            [[rows.ends[row]], rows.record.q[row], rows.y[row], rows.rate[row], rows.record.lam[row]]
+            [[rows.ends[row]], rows.record.q[row], rows.y(row), rows.rate(row), rows.record.lam[row]]
         )
         lanes = joined([run.of_rows[row] for run, _ in runs])
         found = {
@@ -270,7 +270,7 @@ def _moved_with_jump(rows: RunRows, programs: Programs, of_p: Matrix, run: Tange
             f"forces jump at t = {time[row]:.9g} s for several reasons, whose instants parameters move apart: the run "
             "has a derivative on one side only"
         )
-    return np.outer(rows.rate[row] - rows.rate[row + 1], slopes[0] @ of_p)
+    return np.outer(rows.rate(row) - rows.rate(row + 1), slopes[0] @ of_p)
 
 
 def _reset(rows: RunRows, programs: Programs, charted: Charted, of_p: Matrix, run: TangentRun) -> Any:

@@ -17,8 +17,8 @@ from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, OneSidedError
 from mbd.integrators.base import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
-from mbd.results.stored_states import StoredStates
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode
 
@@ -102,9 +102,9 @@ class RunRows:
         return _integrator_of(str(self.record.settings["integrator"]))
 
     @cached_property
-    def stored(self) -> StoredStates:
+    def stored(self) -> ModelColumns:
         """The states at its rows, as its results know them."""
-        return cast(StoredStates, self.run.columns)
+        return cast(ModelColumns, self.run.columns)
 
     @cached_property
     def ends(self) -> Vector:
@@ -112,13 +112,11 @@ class RunRows:
         found = self.stored.times_beside_jumps
         return self.record.time if found is None else found
 
-    @cached_property
-    def y(self) -> Matrix:
-        return np.hstack([self.record.v, self.record.z])
+    def y(self, row: int) -> Vector:
+        return np.concatenate([self.record.v[row], self.record.z[row]])
 
-    @cached_property
-    def rate(self) -> Matrix:
-        return np.hstack([self.record.a, self.record.s])
+    def rate(self, row: int) -> Vector:
+        return np.concatenate([self.record.a[row], self.record.s[row]])
 
     @cached_property
     def events(self) -> dict[int, list[EventRecord]]:

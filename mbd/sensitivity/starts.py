@@ -136,7 +136,7 @@ def start_tangent(
             p[programs.places.index(names.index(name)), k] = rate
     tangent = Tangent(np.zeros(count), q, y, np.zeros((c.anchors, count)), p)
     record = rows.record
-    motion = Motion(float(rows.ends[0]), np.array(record.q[0]), rows.y[0], rows.start_anchors(), tangent)
+    motion = Motion(float(rows.ends[0]), np.array(record.q[0]), rows.y(0), rows.start_anchors(), tangent)
     fixed = directions(rows, list(held))
     free_q, free_v = np.ones(c.n_v, dtype=bool), np.ones(c.n_v, dtype=bool)
     free_q[[each.q for each in fixed if each.q >= 0]] = False

@@ -23,7 +23,7 @@ def test_a_complex_system_is_solved(n):
     exact = rng.normal(size=n) + 1j * rng.normal(size=n)
     places, o_pivots, o_b = laid_out(matrix, matrix @ exact)
     assert factor_complex(places, 3, n, o_pivots) == 0
-    solve_complex(places, 3, n, o_pivots, o_b)
+    solve_complex(places, 3, n, o_pivots, places, o_b)
     np.testing.assert_allclose(places[o_b : o_b + n] + 1j * places[o_b + n :], exact, rtol=0, atol=1e-12 * n)
 
 

@@ -57,31 +57,31 @@ def factor_complex(A: Reals, o: int, n: int, o_pivots: int) -> int:
     return 0
 
 
-def solve_complex(A: Reals, o: int, n: int, o_pivots: int, o_b: int) -> None:
-    """b ← A⁻¹ b with the factors of `factor_complex`; b is at A[o_b:], n real parts and n imaginary ones."""
+def solve_complex(plain_A: Reals, o: int, n: int, o_pivots: int, b: Reals, o_b: int) -> None:
+    """b ← A⁻¹ b with the factors of `factor_complex`; b is at b[o_b:], n real parts and n imaginary ones."""
     o_im = o + n * n
     b_im = o_b + n
     for k in range(n):
-        p = int(A[o_pivots + k])
+        p = int(plain_A[o_pivots + k])
         if p != k:
-            swap = A[o_b + k]
-            A[o_b + k] = A[o_b + p]
-            A[o_b + p] = swap
-            swap = A[b_im + k]
-            A[b_im + k] = A[b_im + p]
-            A[b_im + p] = swap
+            swap = b[o_b + k]
+            b[o_b + k] = b[o_b + p]
+            b[o_b + p] = swap
+            swap = b[b_im + k]
+            b[b_im + k] = b[b_im + p]
+            b[b_im + p] = swap
     for k in range(n):
-        re = A[o_b + k]
-        im = A[b_im + k]
+        re = b[o_b + k]
+        im = b[b_im + k]
         for i in range(k + 1, n):
-            A[o_b + i] -= A[o + i * n + k] * re - A[o_im + i * n + k] * im
-            A[b_im + i] -= A[o + i * n + k] * im + A[o_im + i * n + k] * re
+            b[o_b + i] -= plain_A[o + i * n + k] * re - plain_A[o_im + i * n + k] * im
+            b[b_im + i] -= plain_A[o + i * n + k] * im + plain_A[o_im + i * n + k] * re
     for turn in range(n):
         k = n - 1 - turn
-        re = A[o_b + k] * A[o + k * n + k] - A[b_im + k] * A[o_im + k * n + k]
-        im = A[o_b + k] * A[o_im + k * n + k] + A[b_im + k] * A[o + k * n + k]
-        A[o_b + k] = re
-        A[b_im + k] = im
+        re = b[o_b + k] * plain_A[o + k * n + k] - b[b_im + k] * plain_A[o_im + k * n + k]
+        im = b[o_b + k] * plain_A[o_im + k * n + k] + b[b_im + k] * plain_A[o + k * n + k]
+        b[o_b + k] = re
+        b[b_im + k] = im
         for i in range(k):
-            A[o_b + i] -= A[o + i * n + k] * re - A[o_im + i * n + k] * im
-            A[b_im + i] -= A[o + i * n + k] * im + A[o_im + i * n + k] * re
+            b[o_b + i] -= plain_A[o + i * n + k] * re - plain_A[o_im + i * n + k] * im
+            b[b_im + i] -= plain_A[o + i * n + k] * im + plain_A[o_im + i * n + k] * re

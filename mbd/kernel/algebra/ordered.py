@@ -11,11 +11,11 @@ from __future__ import annotations
 from mbd.compile.orders import HEADER_SIZE
 from mbd.kernel.algebra.linear import solve
 from mbd.kernel.records import Equations, Model, Motion, Reals
-from mbd.kernel.tangent_rules import takes_part
+from mbd.kernel.tangent_rules import is_differentiated, solve_plain, takes_part
 
 __all__ = [
     "HEADER_SIZE", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "clear_tangent", "columns_at", "factor_ordered",
-    "order_at", "solve_kkt", "solve_ordered", "weakest_pivot",
+    "order_at", "solve_held", "solve_kkt", "solve_ordered", "weakest_pivot",
 ]  # fmt: skip
 
 OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)
@@ -163,3 +163,11 @@ def solve_kkt(K: Equations, size: int, b: Reals) -> None:
         solve_ordered(K, b)
     else:
         solve(K.kkt, size, K.pivots, b)
+
+
+def solve_held(K: Equations, size: int, b: Reals) -> None:
+    """The same with a matrix that is held: one of Newton's method, whose corrections vanish at the solution."""
+    if is_differentiated() and K.order_start == 0:
+        solve_plain(K.kkt, size, K.pivots, b)
+    else:
+        solve_kkt(K, size, b)

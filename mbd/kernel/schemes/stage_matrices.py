@@ -15,7 +15,7 @@ from mbd.kernel.algebra.ordered import (
     clear_tangent,
     factor_ordered,
     order_at,
-    solve_kkt,
+    solve_held,
 )
 from mbd.kernel.algebra.ordered_complex import factor_pair_ordered, solve_pair_ordered
 from mbd.kernel.algebra.redundancy import sharing
@@ -144,7 +144,7 @@ def solve_real(K: Steps, m: int, h: float) -> None:
         for i in range(3):
             total -= S[S_REAL + i] * S[o_r + i * size + j]
         K.rhs[j] = total if j < K.n else total * inverse
-    solve_kkt(K, size, K.rhs)
+    solve_held(K, size, K.rhs)
 
 
 def solve_pair(K: Steps, m: int, h: float) -> None:
@@ -170,4 +170,4 @@ def solve_pair(K: Steps, m: int, h: float) -> None:
     if S[o_P] < 0.0:
         solve_pair_ordered(K, stage_place(K, PAIR), int(-S[o_P]), o_b)
     else:
-        solve_complex(S, stage_place(K, PAIR), size, o_P, o_b)
+        solve_complex(S, stage_place(K, PAIR), size, o_P, S, o_b)

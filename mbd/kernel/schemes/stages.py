@@ -14,7 +14,7 @@ held over the step. Newton's matrices are those of `stage_matrices`.
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import solve_kkt
+from mbd.kernel.algebra.ordered import solve_held
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, INCREMENT_RATES
 from mbd.kernel.contact.cones import fill_slips
@@ -220,7 +220,7 @@ def correct_positions_of_stages(K: Steps, m: int, h: float, whole: bool) -> None
     for i in range(3):
         K.work[:n] = 0.0
         K.work[n : n + m] = S[o_h + i * m : o_h + i * m + m]
-        solve_kkt(K, size, K.work)
+        solve_held(K, size, K.work)
         for j in range(n_v):
             before = S[o_U + i * n_v + j]
             S[o_U + i * n_v + j] = K.work[j] if whole else before + K.work[j]

@@ -10,9 +10,8 @@ from mbd.kernel.records import Integers, Kernel, Reals
 from mbd.kernel.schemes.iteration import finish
 from mbd.kernel.tangent_rules import NOT_FOLLOWED
 from mbd.sensitivity.tangent.words import (
-    CORRECTION_RTOL,
-    MAX_CONTRACTION,
     MAX_CORRECTIONS,
+    are_corrected,
     derivative_of,
     is_differentiated,
     largest_derivative,
@@ -116,7 +115,7 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
                 largest = max(largest, largest_derivative(K.block[K.o_a + i]))
         for k in range(m):
             K.block[K.o_lam + K.rows[k]] += K.rhs[n + k]
-        if exact or change_of <= CORRECTION_RTOL * largest or change_of > MAX_CONTRACTION * before:
+        if exact or are_corrected(change_of, before, largest):
             break
         before = change_of
     finish(K, h)

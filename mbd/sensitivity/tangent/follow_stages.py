@@ -18,9 +18,8 @@ from mbd.kernel.schemes.stages import (
 )
 from mbd.kernel.tangent_rules import NOT_FOLLOWED
 from mbd.sensitivity.tangent.words import (
-    CORRECTION_RTOL,
-    MAX_CONTRACTION,
     MAX_CORRECTIONS,
+    are_corrected,
     derivative_of,
     largest_derivative,
     metric_place,
@@ -127,7 +126,7 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
             for j in range(n):
                 change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
                 largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
-        if change <= CORRECTION_RTOL * largest or change > MAX_CONTRACTION * before:
+        if are_corrected(change, before, largest):
             break
         before = change
     status = complete(K, h, t1, m, False, False)

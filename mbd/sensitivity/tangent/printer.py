@@ -42,7 +42,7 @@ HELD_ARRAYS = frozenset(
     (
         "scale", "known", "weight", "blurs", "typical", "largest", "error", "closing_gap", "deepest", "sinking",
         "contact_step", "closing_rate", "largest_rate", "contact_steps", "least_contact_step", "doubt", "seen",
-        "row_bounds", "tableau",
+        "row_bounds", "tableau", "turning",
     )
 )  # fmt: skip
 """Arrays whose numbers have no derivatives: what only decides, and sizes of steps by their error."""
@@ -73,6 +73,22 @@ def stored(name: str, address: str) -> str:
     return place + "\n" + each(f"store {VECTOR} %{name}.#, ptr %{name}.to.#, align 8")
 
 
+def entry(name: str, number: str, to: str) -> str:
+    """Lines that add an entry times the derivatives of its input, to two sums that do not wait for each other."""
+    return f"""\
+  %column.at.{name} = getelementptr i64, ptr %columns, i64 %{number}
+  %column.{name} = load i64, ptr %column.at.{name}
+  %input.at.{name} = getelementptr ptr, ptr %found, i64 %column.{name}
+  %input.{name} = load ptr, ptr %input.at.{name}
+  %entry.at.{name} = getelementptr double, ptr %numbers, i64 %{number}
+  %number.{name} = load double, ptr %entry.at.{name}
+{loaded(f"of.{name}", f"input.{name}")}
+  %only.{name} = insertelement {VECTOR} poison, double %number.{name}, i64 0
+  %factor.{name} = shufflevector {VECTOR} %only.{name}, {VECTOR} poison, <{WIDTH} x i32> zeroinitializer
+{each(f"%part.{name}.# = fmul contract {VECTOR} %factor.{name}, %of.{name}.#")}
+{each(f"%sum.{name}.# = fadd contract {VECTOR} %{to}.#, %part.{name}.#")}"""
+
+
 PRODUCT = f"""\
 define internal void @product(
   ptr %program, ptr %block, ptr %params, ptr %of.block, ptr %of.params, ptr %of.out
@@ -95,6 +111,8 @@ entry:
   %others = load ptr, ptr %others.at
   %room.at = getelementptr i64, ptr %program, i64 8
   %room = load ptr, ptr %room.at
+  %found.list = getelementptr i64, ptr %program, i64 9
+  %found = load ptr, ptr %found.list
   %there = icmp ne ptr %code, null
   br i1 %there, label %evaluate, label %inputs
 evaluate:
@@ -112,20 +130,22 @@ input:
   %number.of = select i1 %of.state, i64 %place, i64 %parameter
   %array = select i1 %of.state, ptr %of.block, ptr %of.params
   %source = getelementptr {ROOM}, ptr %array, i64 %number.of
-{loaded("first", "source")}
   %other.at = getelementptr i64, ptr %others, i64 %i
   %other = load i64, ptr %other.at
   %pair = icmp sge i64 %other, 0
   br i1 %pair, label %both, label %keep
 both:
+{loaded("first", "source")}
   %second.at = getelementptr {ROOM}, ptr %of.block, i64 %other
 {loaded("second", "second.at")}
-{each(f"%together.# = fadd {VECTOR} %first.#, %second.#")}
-  br label %keep
-keep:
-{each(f"%whole.# = phi {VECTOR} [ %first.#, %input ], [ %together.#, %both ]")}
+{each(f"%whole.# = fadd {VECTOR} %first.#, %second.#")}
   %kept.at = getelementptr {ROOM}, ptr %room, i64 %i
 {stored("whole", "kept.at")}
+  br label %keep
+keep:
+  %whole = phi ptr [ %source, %input ], [ %kept.at, %both ]
+  %found.at = getelementptr ptr, ptr %found, i64 %i
+  store ptr %whole, ptr %found.at
   %i.next = add i64 %i, 1
   br label %inputs
 lines:
@@ -138,26 +158,26 @@ line:
   %last = load i64, ptr %end.at
   br label %entries
 entries:
-  %e = phi i64 [ %begin, %line ], [ %e.next, %add ]
-{each(f"%even.# = phi {VECTOR} [ zeroinitializer, %line ], [ %odd.#, %add ]")}
-{each(f"%odd.# = phi {VECTOR} [ zeroinitializer, %line ], [ %total.#, %add ]")}
-  %left = icmp slt i64 %e, %last
-  br i1 %left, label %add, label %store
-add:
-  %column.at = getelementptr i64, ptr %columns, i64 %e
-  %column = load i64, ptr %column.at
-  %entry.at = getelementptr double, ptr %numbers, i64 %e
-  %number = load double, ptr %entry.at
-  %input.at = getelementptr {ROOM}, ptr %room, i64 %column
-{loaded("input.of", "input.at")}
-  %only = insertelement {VECTOR} poison, double %number, i64 0
-  %factor = shufflevector {VECTOR} %only, {VECTOR} poison, <{WIDTH} x i32> zeroinitializer
-{each(f"%part.# = fmul contract {VECTOR} %factor, %input.of.#")}
-{each(f"%total.# = fadd contract {VECTOR} %even.#, %part.#")}
-  %e.next = add i64 %e, 1
+  %e = phi i64 [ %begin, %line ], [ %e.next, %pairs ]
+{each(f"%even.# = phi {VECTOR} [ zeroinitializer, %line ], [ %sum.a.#, %pairs ]")}
+{each(f"%odd.# = phi {VECTOR} [ zeroinitializer, %line ], [ %sum.b.#, %pairs ]")}
+  %e.next = add i64 %e, 2
+  %whole.pair = icmp sle i64 %e.next, %last
+  br i1 %whole.pair, label %pairs, label %rest
+pairs:
+{entry("a", "e", "even")}
+  %e.second = add i64 %e, 1
+{entry("b", "e.second", "odd")}
   br label %entries
+rest:
+  %left = icmp slt i64 %e, %last
+  br i1 %left, label %single, label %store
+single:
+{entry("c", "e", "even")}
+  br label %store
 store:
-{each(f"%sum.# = fadd {VECTOR} %even.#, %odd.#")}
+{each(f"%own.# = phi {VECTOR} [ %even.#, %rest ], [ %sum.c.#, %single ]")}
+{each(f"%sum.# = fadd {VECTOR} %own.#, %odd.#")}
   %out.at = getelementptr {ROOM}, ptr %of.out, i64 %k
 {stored("sum", "out.at")}
   %k.next = add i64 %k, 1
@@ -197,9 +217,11 @@ def tangent_text(functions: Sequence[tree.Function], entry: str, held: Collectio
     texts = [body.text(calls[_name(body)] == 1) for body in (*plain, *bodies) if _name(body) in needed]
     head = HEAD + "declare double @log(double) nounwind nobuiltin willreturn memory(none)\n"
     head += f"declare {VECTOR} @llvm.fabs.v{WIDTH}f64({VECTOR})\n"
-    head += f"declare double @llvm.vector.reduce.fmax.v{WIDTH}f64({VECTOR})\n"
-    whole = "\n".join([head, tags(), PRODUCT, *texts])
-    return whole.replace(f"internal i64 @{functions[-1].symbol}.d(", f"i64 @{entry}(")
+    whole = f"<{WIDTH} x i64>"
+    head += f"declare {whole} @llvm.umax.v{WIDTH}i64({whole}, {whole})\n"
+    head += f"declare i64 @llvm.vector.reduce.umax.v{WIDTH}i64({whole})\n"
+    text = "\n".join([head, tags(), PRODUCT, *texts])
+    return text.replace(f"internal i64 @{functions[-1].symbol}.d(", f"i64 @{entry}(")
 
 
 def _name(body: Body) -> str:
@@ -501,19 +523,13 @@ class TangentBody(Body):
         """The largest size of the derivatives."""
         if of(value) == ZERO:
             return "0.0"
-        largest = [
-            self.emit(
-                f"call double @llvm.vector.reduce.fmax.v{WIDTH}f64({VECTOR} "
-                f"{self.emit(f'call {VECTOR} @llvm.fabs.v{WIDTH}f64({VECTOR} {part})')})"
-            )
-            for part in of(value)
-        ]
-        found = largest[0]
-        for other in largest[1:]:
-            found = self.emit(
-                f"select i1 {self.emit(f'fcmp ogt double {other}, {found}')}, double {other}, double {found}"
-            )
-        return found
+        whole = f"<{WIDTH} x i64>"
+        sizes = [self.emit(f"call {VECTOR} @llvm.fabs.v{WIDTH}f64({VECTOR} {part})") for part in of(value)]
+        found, *others = (self.emit(f"bitcast {VECTOR} {size} to {whole}") for size in sizes)
+        for other in others:  # bits of sizes are ordered as they are
+            found = self.emit(f"call {whole} @llvm.umax.v{WIDTH}i64({whole} {found}, {whole} {other})")
+        bits = self.emit(f"call i64 @llvm.vector.reduce.umax.v{WIDTH}i64({whole} {found})")
+        return self.emit(f"bitcast i64 {bits} to double")
 
     def _Evaluate(self, node: tree.Evaluate) -> str:
         table, number = self.value(node.kernel)[0], self.as_kind(node.number, "int")

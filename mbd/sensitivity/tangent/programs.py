@@ -38,9 +38,9 @@ class Derivative:
 
     Attributes
     ----------
-    address : of ``[code, outputs, ends of their lines, columns, numbers, inputs, places, second places, room]``, with
-        the best code that there is now, as `printer.PRODUCT` reads it: columns are numbers of inputs, whose derivatives
-        come into the room first
+    address : of ``[code, outputs, ends of their lines, columns, numbers, inputs, places, second places, room,
+        found]``, with the best code that there is now, as `printer.PRODUCT` reads it: columns are numbers of inputs;
+        where their derivatives are is found first, of sums of two places in the room
     """
 
     def __init__(
@@ -62,11 +62,10 @@ class Derivative:
         self._known, self._size, self._lines = known, first + count, known.lines + first
         self._ends = np.searchsorted(self._lines, np.arange(self._size), side="right")
         self._numbers, self._room = np.zeros(max(len(known.lines), 1)), lanes(len(known.inputs))
-        ends, columns, numbers, inputs, others, room = (
-            each.ctypes.data
-            for each in (self._ends, known.columns, self._numbers, known.inputs, known.others, self._room)
-        )
-        words = [0, self._size, ends, columns, numbers, len(known.inputs), inputs, others, room]
+        self._found = np.zeros(max(len(known.inputs), 1), dtype=np.int64)
+        arrays = self._ends, known.columns, self._numbers, known.inputs, known.others, self._room, self._found
+        ends, columns, numbers, inputs, *others = (each.ctypes.data for each in arrays)
+        words = [0, self._size, ends, columns, numbers, len(known.inputs), inputs, *others]
         self._words = np.array(words, dtype=np.int64)
         self._address = int(self._words.ctypes.data)
 

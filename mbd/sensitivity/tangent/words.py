@@ -9,8 +9,8 @@ from __future__ import annotations
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
-    "CORRECTION_RTOL", "MAX_CONTRACTION", "MAX_CORRECTIONS", "at_root", "derivative_of", "every_row_place",
-    "is_differentiated", "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
+    "MAX_CORRECTIONS", "are_corrected", "at_root", "derivative_of", "every_row_place", "is_differentiated",
+    "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
     "solution_place", "solve_plain", "step_place", "takes_part", "without_tangent",
 ]  # fmt: skip
 
@@ -18,8 +18,20 @@ CORRECTION_RTOL = 1e-12
 """Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
 MAX_CONTRACTION = 0.9
 """Part of the last correction of derivatives above which the next one is round-off [-]."""
+SAFETY = 0.1
+"""Part of `CORRECTION_RTOL` that a correction must be expected to stay below if it is not made [-]."""
 MAX_CORRECTIONS = 12
 """Corrections of derivatives with matrices that are not quite those of the solution [-]."""
+
+
+def are_corrected(change: float, before: float, largest: float) -> bool:
+    """Whether a correction of derivatives was round-off, or the next one will be if it shrinks like this one.
+
+    before : the last one; largest : of the rates
+    """
+    if change <= CORRECTION_RTOL * largest or change > MAX_CONTRACTION * before:
+        return True
+    return before < 1e300 and change * change <= SAFETY * CORRECTION_RTOL * largest * before
 
 
 def is_differentiated() -> bool:
@@ -68,34 +80,42 @@ def derivative_of(value: float) -> float:
 
 
 def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
-    """b ← A⁻¹ b with the factors of `mbd.kernel.algebra.linear.factor`, which have no derivatives here."""
+    """b ← A⁻¹ b with the factors of `mbd.kernel.algebra.linear.factor`, which have no derivatives here.
+
+    By rows, so that sums of vectors stay in registers, and two at once, which read the same entries of b.
+    """
     for k in range(n):
         p = pivots[k]
         if p != k:
             swap = b[k]
             b[k] = b[p]
             b[p] = swap
-    for i in range(1, n):  # by rows: sums of vectors stay in registers, two, which do not wait for each other
-        total = row_times(plain_A, i * n, b, 0, i)
-        b[i] -= total
-    for c in range(n):
-        i = n - 1 - c
-        total = row_times(plain_A, i * n, b, i + 1, n)
-        b[i] = (b[i] - total) * plain_A[i * n + i]
-
-
-def row_times(plain_A: Reals, o: int, b: Reals, first: int, last: int) -> float:
-    """Σ A[o + k] b[k] over some places, of A that has no derivatives."""
-    even = 0.0
-    odd = 0.0
-    k = first
-    while k + 1 < last:
-        even += plain_A[o + k] * b[k]
-        odd += plain_A[o + k + 1] * b[k + 1]
-        k += 2
-    if k < last:
-        even += plain_A[o + k] * b[k]
-    return even + odd
+    i = 0
+    while i < n:
+        o = i * n
+        o_next = o + n if i + 1 < n else o
+        own = 0.0
+        following = 0.0
+        for k in range(i):
+            own += plain_A[o + k] * b[k]
+            following += plain_A[o_next + k] * b[k]
+        b[i] -= own
+        if i + 1 < n:
+            b[i + 1] -= following + plain_A[o_next + i] * b[i]
+        i += 2
+    i = n - 1
+    while i >= 0:
+        o = i * n
+        o_next = o - n if i > 0 else o
+        own = 0.0
+        following = 0.0
+        for k in range(i + 1, n):
+            own += plain_A[o + k] * b[k]
+            following += plain_A[o_next + k] * b[k]
+        b[i] = (b[i] - own) * plain_A[o + i]
+        if i > 0:
+            b[i - 1] = (b[i - 1] - following - plain_A[o_next + i] * b[i]) * plain_A[o_next + i - 1]
+        i -= 2
 
 
 def n_inputs(K: Kernel) -> int:
