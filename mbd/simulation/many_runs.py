@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from mbd.simulation.run.plain import PlainScheme
 from mbd.state import State
 
 __all__ = ["Ends", "ManyRuns", "may_be_many", "start_line"]
+
+MIN_STEPS, CALL_TIME = 20_000, 0.2
+"""Least steps of a call of the kernel, and its time [s], after which somebody may interrupt."""
 
 
 def may_be_many(run: Run, late_resets: bool = False) -> str:
@@ -151,10 +155,9 @@ class ManyRuns:
         else:
             v.params[: len(self.run.first_parameters)] = self.run.first_parameters
         v.run, v.n_runs, v.begun = 0, count, 0
-        self.interrupted, done = False, False
+        self.interrupted, done, steps = False, False, MIN_STEPS
         while not done:
-            # steps of a call of the kernel, some 0.2 to 2 s, between which somebody may interrupt
-            v.steps_left = 1_000_000
+            v.steps_left, begun = steps, perf_counter()
             try:
                 status = stepper.march_many()
                 if status == codes.NEW_MODE:
@@ -164,6 +167,7 @@ class ManyRuns:
                 self._leave()
             except KeyboardInterrupt:
                 self.interrupted = done = True
+            steps = max(MIN_STEPS, min(2 * steps, int(steps * CALL_TIME / max(perf_counter() - begun, 1e-6))))
         return self._ends(int(v.run), lines)
 
     def none(self) -> Ends:

@@ -98,6 +98,27 @@ def test_a_study_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         study(10, file=path, workers=2)
 
 
+def test_an_interrupted_study_keeps_what_is_decided(monkeypatch):
+    """Ctrl-C in the third return of all starts: those that the first two decided keep their outcomes."""
+    from mbd.gait.basin.walks import Walks
+
+    whole, caught, calls = study(10), Walks._caught, []
+
+    def interrupted(self, *given):
+        calls.append(1)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+        return caught(self, *given)
+
+    monkeypatch.setattr(Walks, "_caught", interrupted)
+    study.cache_clear()
+    found = study(10)
+    study.cache_clear()
+    done = found.outcome != "not decided"
+    assert not found.complete and 0 < np.count_nonzero(done) < done.size
+    assert np.array_equal(found.outcome[done], whole.outcome[done]) and found.steps.max() == 3
+
+
 def _counted(made):
     from mbd.gait.basin.store import Store
 

@@ -162,20 +162,18 @@ def _head(made: Made, grid: Grid, steps: int) -> dict[str, Any]:
 
 
 def _decided(made: Made, steps: int, store: Store | None, bar: Any) -> tuple[Decided, bool]:
-    """All starts, block by block; those that the file has are taken from it."""
+    """All starts, block by block; those that the file has are taken from it. An interruption keeps what is decided."""
     total = len(made.study.grid)
     found = Decided.of(total)
     complete = True
     try:
         for first in range(0, total, BLOCK_SIZE):
             last = min(first + BLOCK_SIZE, total)
-            block = None if store is None else store.block(first, last - first)
-            if block is None:
-                block = made.block(np.arange(first, last), steps)
+            block = found.part(first, last)
+            if store is None or not store.fill(first, block):
+                made.decide(np.arange(first, last), steps, block)
                 if store is not None:
                     store.keep(first, block)
-            for name in ("kind", "attractor", "steps", "time"):
-                getattr(found, name)[first:last] = getattr(block, name)
             if bar is not None:
                 bar(last, total)
     except KeyboardInterrupt:

@@ -163,10 +163,10 @@ class Made:
         good = self._onto(*self.walks.parts(lines), changes.all_vectors(len(runs)))
         return lines, good, changes, which, [self.balls[tuple(values.values())] for values in kinds]
 
-    def block(self, runs: Any, steps: int) -> Decided:
-        """What becomes of the starts with these numbers."""
+    def decide(self, runs: Any, steps: int, found: Decided) -> None:
+        """Note what becomes of the starts with these numbers."""
         lines, good, changes, which, balls = self.lines(runs)
-        return self.walks.decide(lines, good, changes, which, balls, steps)
+        self.walks.decide(lines, good, changes, which, balls, steps, found)
 
     def start(self, number: int) -> State:
         """The start of a number."""

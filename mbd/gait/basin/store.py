@@ -39,14 +39,14 @@ class Store:
         self.file = StudyFile(path, "basin", head)
         self._blocks = {line["first"]: line for line in self.file.parts}
 
-    def block(self, first: int, count: int) -> Decided | None:
-        """A block of starts, if the file has it."""
+    def fill(self, first: int, block: Decided) -> bool:
+        """Note what became of a block of starts, and whether the file has it."""
         line = self._blocks.get(first)
-        if line is None or len(line["kinds"]) != count:
-            return None
-        kinds = np.array([LETTERS.index(letter) for letter in line["kinds"]], dtype=np.int64)
-        attractor, steps = (np.array(line[name], dtype=np.int64) for name in ("attractors", "steps"))
-        return Decided(kinds, attractor, steps, np.array(line["times"], dtype=float))
+        if line is None or len(line["kinds"]) != len(block.kind):
+            return False
+        block.kind[:] = [LETTERS.index(letter) for letter in line["kinds"]]
+        block.attractor[:], block.steps[:], block.time[:] = line["attractors"], line["steps"], line["times"]
+        return True
 
     def keep(self, first: int, block: Decided) -> None:
         """Add a block that is decided."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import field
 
 import numpy as np
@@ -40,6 +40,10 @@ class Decided:
         """Nothing is decided yet."""
         undecided = np.full(count, NUMBER["not decided"])
         return cls(undecided, np.full(count, -1), np.zeros(count, dtype=np.int64), np.zeros(count))
+
+    def part(self, first: int, last: int) -> Decided:
+        """That of some starts; what is noted there is noted here."""
+        return Decided(*(getattr(self, name)[first:last] for name in ("kind", "attractor", "steps", "time")))
 
 
 @dataclass(eq=False)
@@ -99,9 +103,9 @@ class Walks:
 
     def decide(
         self, lines: Matrix, good: NDArray[np.bool_], changes: Changes, which: Numbers,
-        balls: Sequence[Sequence[tuple[int, Ball]]], steps: int, halted: Callable[[], None] | None = None,
-    ) -> Decided:  # fmt: skip
-        """What becomes of starts.
+        balls: Sequence[Sequence[tuple[int, Ball]]], steps: int, found: Decided,
+    ) -> None:  # fmt: skip
+        """Note in `found`, return by return, what becomes of starts that are not decided yet.
 
         Parameters
         ----------
@@ -109,7 +113,6 @@ class Walks:
         changes : parameters of each; which : number of its set among `balls`, which has (attractor, ball) for each
         steps : returns at most
         """
-        found = Decided.of(len(lines))
         found.kind[~good] = NUMBER["not on the section"]
         left = np.flatnonzero(good)
         lines = lines[left]
@@ -129,9 +132,6 @@ class Walks:
             following = self.following(ends)
             left, lines = left[on], following[on]
             left, lines = self._caught(found, left, lines, which, balls)
-            if halted is not None:
-                halted()
-        return found
 
     def _caught(
         self, found: Decided, left: Numbers, lines: Matrix, which: Numbers, balls: Sequence[Sequence[tuple[int, Ball]]]
