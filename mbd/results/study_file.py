@@ -135,7 +135,7 @@ def _begun(path: Path) -> bool:
 
 
 def _lines(path: Path) -> Iterator[dict[str, Any] | None]:
-    """The lines of a file, None for one that is no JSON; a last one that was cut short is taken out of the file."""
+    """The lines of a file, None for one that is no JSON; a last one of several that was cut short is taken out."""
     whole = 0
     with path.open("rb") as file:
         for raw in file:
@@ -147,5 +147,5 @@ def _lines(path: Path) -> Iterator[dict[str, Any] | None]:
             except (ValueError, RecursionError):
                 line = None
             yield line if isinstance(line, dict) else None
-    if whole < path.stat().st_size:
+    if 0 < whole < path.stat().st_size:
         os.truncate(path, whole)

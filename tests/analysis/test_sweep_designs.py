@@ -127,10 +127,11 @@ def test_a_file_of_another_sweep_or_of_none_is_refused(tmp_path):
     with pytest.raises(mbd.ModelError, match="another sweep, with other names, settings"):
         swept({"gravity.y": [-9.0]}, file=path, dt=2e-2)
     other = tmp_path / "notes.jsonl"
-    other.write_text("shopping\n")
-    with pytest.raises(mbd.ModelError, match="no file of a sweep"):
-        swept({"ball.mass": [1.0]}, file=other)
-    assert other.read_text() == "shopping\n"
+    for text in "shopping\n", "shopping", "shopping\nmore":
+        other.write_text(text)
+        with pytest.raises(mbd.ModelError, match="no file of a sweep"):
+            swept({"ball.mass": [1.0]}, file=other)
+        assert other.read_text() == text
 
 
 @pytest.mark.parametrize(
