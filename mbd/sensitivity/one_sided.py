@@ -119,14 +119,14 @@ def refuse_sided_start(rows: RunRows, programs: Programs, motion: Motion, mode: 
 def refuse_sided_end(
     rows: RunRows, programs: Programs, motion: Motion, mode: Mode, rates: Rates, instants: Sequence[tuple[str, Motion]]
 ) -> None:  # fmt: skip
-    """Raise a `OneSidedError` where an event happens as the run ends at a given time, or would just after it.
+    """Raise a `OneSidedError` where an event happens at the given or latest time of a run, or would just after it.
 
     motion, mode, rates : at the last row; instants : (name, motion before it) of the events of the run
     """
-    until: Any
     until, end = rows.record.settings.get("until"), float(rows.record.time[-1])
+    latest: Any = until[-1] if isinstance(until, tuple | list) else until
     within = END_RTOL * _duration(rows)
-    if not is_number(until) or end < float(until) - within or not _is_any(programs):
+    if not is_number(latest) or end < float(latest) - within or not _is_any(programs):
         return
     names = [name for name, before in instants if end - before.t <= within and np.any(before.tangent.t != 0.0)]
     if not names:

@@ -58,10 +58,28 @@ def test_a_run_that_ends_as_a_body_strikes_has_two_derivatives_and_one_that_ends
             mbd.sensitivities(model, start(model, 0.5, 0.1), mbd.RungeKutta853(), 0.01,
                               until=until + math.atan(0.1 / root / 0.5) / root, wrt=[RATE], of=[RATE])  # fmt: skip
         assert len(caught.value.sides) == 1
+    latest = strike + math.atan(0.1 / root / 0.5) / root
+    assert len(sides_of(model, 0.5, 0.1, RATE, RATE, ("wall", latest))) == 2
     for until in (0.9 * strike, 1.1 * strike):
         found = mbd.sensitivities(model, start(model, 0.5, 0.1), mbd.RungeKutta853(), 0.01, until=until, wrt=[RATE],
                                   of=[RATE])  # fmt: skip
         assert np.isfinite(found[RATE, RATE])
+
+
+@pytest.mark.parametrize("scheme", [mbd.RungeKutta853(), mbd.RungeKutta4(), mbd.HHT(), mbd.GeneralizedAlpha(0.8)])
+def test_a_slide_that_ends_as_a_step_does_has_the_derivative_of_one_that_ends_beside_it(scheme):
+    """A cart slides to a stop in t = m v/F, and a free block on it keeps its velocity: du/dv = T − t."""
+    model = mbd.Model("cart", gravity=(0.0, 0.0, 0.0))
+    cart, block = mbd.PointMass("cart", 1.3), mbd.PointMass("block", 0.5)
+    loss = mbd.Coulomb(2.5)
+    model.connect(mbd.Prismatic("x", model.ground.origin, cart.origin, loss=loss))
+    model.connect(mbd.Prismatic("u", cart.origin, block.origin))
+    for steps, dt in (20, 0.013), (26, 0.01), (25.5, 0.01):
+        time = steps * dt
+        begin = mbd.assemble(model, velocity={PLACE: time * 2.5 / 1.3, "u.displacement": 0.7})
+        of = [PLACE, "u.displacement"]
+        found = mbd.sensitivities(model, begin, scheme, dt, until=0.5, wrt=[RATE], of=of)
+        np.testing.assert_allclose([found[name, RATE] for name in of], [time, 0.5 - time], atol=1e-9)
 
 
 def test_a_start_on_an_event_that_changes_something_is_refused_and_one_that_leaves_it_is_not():

@@ -88,7 +88,8 @@ def follow_event(K: Kernel) -> int:
     """
     h = without_tangent(K.event_after)
     kind = K.event_kind
-    if h <= 0.0 and kind != CLOSE and kind != CROSS and kind != CROSS_BACK:
+    if h <= 0.0 and kind != CLOSE and kind != CROSS and kind != CROSS_BACK and kind != STICK:
+        event_at_start(K)
         K.event_after = h
         return 0
     keep_candidate(K)
