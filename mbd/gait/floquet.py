@@ -55,8 +55,9 @@ def multipliers_of(P: Matrix, error: Matrix, energy: Matrix | None = None) -> Mu
     """The multipliers of P (size, size), whose entries have estimated errors.
 
     Directions that the map forgets, as a reset or an impact does, are multipliers of 0 that are left out: P is
-    restricted to its range, whose eigenvalues are the others. `energy` is ∇E along the section where the cycle loses
-    and gains none; it is then a left eigenvector, of multiplier 1, and is split off.
+    restricted to its range, with the basis U. What of the range is shorter than errors may be adds
+    ``y* P (1 − U Uᵀ) P x/λ`` to an eigenvalue λ with the eigenvectors y* and x, y* x = 1. `energy` is ∇E along the
+    section where the cycle loses and gains none; it is then a left eigenvector, of multiplier 1, and is split off.
     """
     size = len(P)
     if not size:
@@ -67,7 +68,10 @@ def multipliers_of(P: Matrix, error: Matrix, energy: Matrix | None = None) -> Mu
     rank = int(np.sum(sizes > np.maximum(RANK_RTOL * min(float(sizes[0]), MAX_RANK_SCALE), 10.0 * doubts)))
     basis = U[:, :rank]
     values, vectors = np.linalg.eig(basis.T @ P @ basis)
-    modes = basis @ vectors
+    modes, shorter = basis @ vectors, U[:, rank:]
+    beyond = np.einsum("kr,rk->k", np.linalg.pinv(vectors) @ basis.T @ P @ shorter, shorter.T @ P @ modes)
+    beyond = np.where(values.imag == 0.0, beyond.real, beyond)
+    values = values + np.divide(beyond, values, out=np.zeros_like(beyond), where=np.abs(beyond) < np.abs(values) ** 2)
     trivial: dict[str, tuple[float, ...]] = {}
     if rank < size:
         trivial["forgotten"] = (0.0,) * (size - rank)

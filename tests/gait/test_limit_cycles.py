@@ -11,6 +11,7 @@ import pytest
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
+from mbd.gait.floquet import multipliers_of
 from mbd.gait.mirror import mirror_of
 from mbd.gait.outcome import fall_of
 from mbd.gait.section import Chart
@@ -164,6 +165,19 @@ def test_multipliers_of_two_mirrored_steps_are_squares_and_do_not_depend_on_the_
         stride = mbd.limit_cycle(one.map.model, one.state, section=section, parameters=one.map.plain(one.parameters))
         assert spread(one.multipliers**2, stride.multipliers) < MULTIPLIERS
     assert abs(two.period - 2.0 * one.period) < 1e-9
+
+
+@pytest.mark.parametrize("short", [0.0, 1e-9, 3e-7, 5e-6])
+def test_multipliers_know_of_directions_that_the_map_nearly_forgets(short):
+    """Eigenvalues above 0.04 of random maps, whose range has five directions and a short sixth."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        others = np.linalg.qr(rng.standard_normal((7, 7)))[0]
+        P = rng.standard_normal((7, 5)) @ rng.standard_normal((5, 7)) * 0.5 + short * np.outer(others[0], others[1])
+        found = multipliers_of(P, np.full(P.shape, 1e-13))
+        exact = np.linalg.eigvals(P)
+        for value in found.values[np.abs(found.values) > 0.04]:
+            assert np.min(np.abs(exact - value)) < 1e-9
 
 
 def test_multipliers_do_not_depend_on_an_event_within_the_step_at_which_the_section_is():
