@@ -13,9 +13,9 @@ from collections.abc import Callable
 from operator import attrgetter
 from reprlib import recursive_repr
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-__all__ = ["dataclass"]
+__all__ = ["LateFields", "dataclass", "found_late", "makes_late"]
 
 
 class _Factory:
@@ -153,6 +153,41 @@ def _initializer(owner: Any, frozen: bool) -> Any:
     types = {field.name: field.type for field in dataclasses.fields(owner) if field.init}
     made.__annotations__ = {**types, "return": None}
     return made
+
+
+class LateFields:
+    """An object of which `found_late` may find out fields as somebody first looks at them."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            make = vars(self).get("_late", {}).get(name)
+            if make is None:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+            vars(self)[name] = value = make()
+            vars(self)["_late"].pop(name, None)
+            return value
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies and files have the values themselves."""
+        for name in [*vars(self).get("_late", ())]:
+            getattr(self, name)
+        return {name: value for name, value in vars(self).items() if name != "_late"}
+
+
+Late = TypeVar("Late", bound=LateFields)
+
+
+def found_late(one: Late, name: str, make: Callable[[], Any]) -> Late:
+    """An object that was just made, a field of which, one with a `default_factory`, is made when it is looked at."""
+    del vars(one)[name]
+    vars(one).setdefault("_late", {})[name] = make
+    return one
+
+
+def makes_late(one: LateFields, name: str) -> Any:
+    """What finds out a field that nobody has looked at; None of others."""
+    return vars(one).get("_late", {}).get(name)
 
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from weakref import ReferenceType, WeakKeyDictionary, ref
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.dataclass import dataclass
+from mbd.dataclass import LateFields, dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.later import later
 from mbd.notebook import table
@@ -24,6 +24,10 @@ __all__ = ["Memory", "Mode", "State", "are_names", "malformed", "of_model"]
 
 def _empty() -> Vector:
     return np.zeros(0)
+
+
+def _nothing() -> Memory | None:
+    return None
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,7 @@ class Memory:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(LateFields):
     """Where a mechanism is and how it moves.
 
     Attributes
@@ -109,7 +113,7 @@ class State:
     velocity_names: tuple[str, ...] = ()
     moved: Mapping[str, float] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
-    memory: Memory | None = field(default=None, repr=False)
+    memory: Memory | None = field(default_factory=_nothing, repr=False)
 
     def __getitem__(self, name: str) -> Any:
         """A coordinate ('left hip.angle') or a rate ('left hip.angle.rate', 'left hip.rate').
@@ -264,8 +268,9 @@ def malformed(state: State) -> list[str]:
             faults.append(f"{name} of the start must be a tuple of names, not {_shown(value)}")
     if not isinstance(state.parameters, Mapping):
         faults.append(f"parameters of the start must map names to numbers, not {_shown(state.parameters)}")
-    if state.memory is not None and not isinstance(state.memory, Memory):
-        faults.append(f"memory of the start must be that of a run, or None, not {_shown(state.memory)}")
+    memory = vars(state).get("memory")
+    if memory is not None and not isinstance(memory, Memory):
+        faults.append(f"memory of the start must be that of a run, or None, not {_shown(memory)}")
     return faults
 
 

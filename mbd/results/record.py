@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector, read_only
-from mbd.dataclass import dataclass
+from mbd.dataclass import LateFields, dataclass
 from mbd.integrators.extension import HERMITE, Extension, extension_of
 from mbd.notebook import table
 
@@ -135,7 +135,7 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Record(LateFields):
     """A run as numbers; `Trajectory` gives it names.
 
     Rows just before and just after a switch are both stored, with equal times.

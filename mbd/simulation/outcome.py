@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
+from mbd.dataclass import found_late
 from mbd.kernel.records import TABLE
 from mbd.results.trajectory import Trajectory
-from mbd.simulation.diagnostics.notes import notes_of
+from mbd.simulation.diagnostics.notes import Note, notes_of
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import ended_record
 from mbd.state import State
@@ -28,15 +30,14 @@ COUNTS = {
 def trajectory_of(run: RunData, problem: str, message: str, final: State) -> Trajectory:
     """The run by name; `problem` is '' if it went as far as it was asked to. Its message tells what is in doubt."""
     record = ended_record(run)
-    notes, doubts = notes_of(run, record)
-    text = problem or "; but ".join([message, *doubts])
-    ended = record.concluded(
-        success=not problem, message=text, failure=run.failure, final=final, stats=_statistics(run, notes)
-    )
-    return Trajectory(ended)
+    notes, run.doubts = notes_of(run, record)
+    text = problem or "; but ".join([message, *run.doubts])
+    ended = record.concluded(success=not problem, message=text, failure=run.failure, final=final)
+    return Trajectory(found_late(ended, "stats", _statistics(run, notes)))
 
 
-def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
+def _statistics(run: RunData, notes: Sequence[Note]) -> Callable[[], dict[str, Any]]:
+    """What gives counts and notes."""
     counts = run.kernel.counts.tolist()
     numbers: dict[str, Any] = {name: counts[place] for name, place in COUNTS.items()}
     if run.kernel.adaptive:
@@ -49,6 +50,11 @@ def _statistics(run: RunData, notes: list[str]) -> dict[str, Any]:
     numbers["compiled"] = run.stepper.compiled
     numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional
     numbers["derive_and_compile_seconds"] = run.mechanism.seconds
-    numbers["notes"] = notes
+    numbers["notes"] = []
     numbers["wall_seconds"] = perf_counter() - run.began
-    return numbers
+
+    def statistics() -> dict[str, Any]:
+        numbers["notes"] = [one for note in notes for one in ([note] if isinstance(note, str) else note())]
+        return numbers
+
+    return statistics

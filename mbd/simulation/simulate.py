@@ -150,7 +150,7 @@ def simulate(
     run, trajectory, problem = motion.run(dt) if dt is not None else motion.to_tolerance(float(tol or 0.0), tol_of)
     of_model(trajectory.final, model)
     if by_user:
-        _tell(trajectory)
+        _tell(trajectory, run.doubts)
     if problem and on_failure == "raise":
         raise _failure(problem, trajectory, run.cause)
     if asked is not None and not problem:
@@ -160,12 +160,12 @@ def simulate(
     return trajectory
 
 
-def _tell(trajectory: Trajectory) -> None:
-    """Notes of a run to the logger; those that put its results in doubt as warnings."""
-    for sentence in trajectory.stats["notes"]:
-        if trajectory.success and sentence in trajectory.message:
-            doubt(sentence)
-        elif is_heard():
+def _tell(trajectory: Trajectory, doubts: Sequence[str]) -> None:
+    """Doubts about a result as warnings; other notes of the run to the logger, where somebody listens."""
+    if trajectory.success:
+        doubt(*doubts)
+    for sentence in trajectory.stats["notes"] if is_heard() else ():
+        if not (trajectory.success and sentence in doubts):
             note(f"{trajectory.name or 'model'}: {sentence}")
 
 
@@ -218,6 +218,7 @@ class _Motion:
             trajectory = Trajectory(replace(trajectory.record, success=False, message=found.problem))
         elif found.doubt and trajectory.success:
             trajectory.stats["notes"].append(found.doubt)
+            found.trial.source.doubts.append(found.doubt)
             trajectory = Trajectory(replace(trajectory.record, message=f"{trajectory.message}; {found.doubt}"))
         return found.trial.source, trajectory, found.problem
 

@@ -127,9 +127,10 @@ def test_what_cannot_happen_at_a_singular_configuration_is_named(what, scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_no_note_calls_the_motion_unique_from_a_start_at_a_singular_configuration(scheme):
-    model, _ = platform((0.0, 1.3)).start
+    model, beside = platform((0.0, 1.3)).start
     flat = mbd.assemble(model, position={"base 0.angle": 0.5 * pi, "base 1.angle": 0.5 * pi, "top 0.angle": -0.5 * pi})
     run = mbd.simulate(model, flat, scheme, dt=1e-3, until=0.3, on_failure="return")
+    mbd.simulate(model, beside, scheme, dt=1e-3, until=1e-3)  # in the same arrays, before anybody reads the notes
     assert not run.success or any("not unique" in note for note in run.stats["notes"])
     assert not any("motion is unique" in note for note in run.stats["notes"])
 

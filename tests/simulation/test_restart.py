@@ -134,24 +134,33 @@ def restarted(model, state, scheme=None, dt=0.01, **more):
     return going_on.stats["restarts"]
 
 
-def test_a_memory_is_used_only_where_everything_is_as_it_was():
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_memory_is_used_only_where_everything_is_as_it_was(seen):
+    """Whether somebody has looked at it, so that it has a seal and is examined, or not."""
     model = pendulum(loss=mbd.Viscous(0.1))
-    final = run(model, {"hinge.angle": 1.0}, until=0.5).final
-    assert final.memory is not None and restarted(model, final) == 0
+
+    def end():
+        final = run(model, {"hinge.angle": 1.0}, until=0.5).final
+        assert not seen or final.memory is not None
+        return final
+
+    final = end()
+    assert restarted(model, final) == 0
+    assert ("memory" in vars(final)) == seen
     assert restarted(model, final, store=3, observers=[lambda t, state: None]) == 0
     assert restarted(model, final, parameters={"rod.mass": 1.0}) == 0, "the value that it has anyway"
     changed = {
-        "scheme": restarted(model, final, mbd.HHT(0.06)),
-        "formulation": restarted(model, final, mbd.HHT(0.05, formulation="index3")),
-        "tolerance": restarted(model, final, mbd.HHT(0.05, tolerance=1e-10)),
-        "step": restarted(model, final, dt=0.005),
-        "backend": restarted(model, final, backend="python"),
-        "option": restarted(model, final, rest_speed=1e-3),
-        "parameter": restarted(model, final, parameters={"hinge loss.coefficient": 0.2}),
-        "position": restarted(model, replace(final, q=final.q + 1e-16 + 1e-15)),
-        "velocity": restarted(model, replace(final, v=final.v * (1.0 + 1e-15))),
-        "time": restarted(model, replace(final, time=0.0)),
-        "no memory": restarted(model, replace(final, memory=None)),
+        "scheme": restarted(model, end(), mbd.HHT(0.06)),
+        "formulation": restarted(model, end(), mbd.HHT(0.05, formulation="index3")),
+        "tolerance": restarted(model, end(), mbd.HHT(0.05, tolerance=1e-10)),
+        "step": restarted(model, end(), dt=0.005),
+        "backend": restarted(model, end(), backend="python"),
+        "option": restarted(model, end(), rest_speed=1e-3),
+        "parameter": restarted(model, end(), parameters={"hinge loss.coefficient": 0.2}),
+        "position": restarted(model, replace(end(), q=final.q + 1e-16 + 1e-15)),
+        "velocity": restarted(model, replace(end(), v=final.v * (1.0 + 1e-15))),
+        "time": restarted(model, replace(end(), time=0.0)),
+        "no memory": restarted(model, replace(end(), memory=None)),
     }
     assert changed == dict.fromkeys(changed, 1)
 

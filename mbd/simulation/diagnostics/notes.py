@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -27,7 +28,10 @@ from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
 from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE, doubts
 
-__all__ = ["notes_of"]
+__all__ = ["Note", "notes_of"]
+
+Note: TypeAlias = str | Callable[[], list[str]]
+"""A sentence, or what finds sentences when somebody reads them, after the run's arrays serve another run."""
 
 RESOLVED_STEPS = 10.0
 """Steps that a penalty contact must last to be resolved at all."""
@@ -96,16 +100,16 @@ MAX_ENERGY_SHARE = 0.5
 """Share of the energy that a scheme has given or taken above which a run is in doubt [-]."""
 
 
-def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
-    """The notes of a run that is over, in sentences, and those of them that put its result in doubt."""
+def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
+    """The notes of a run that is over, and those of them that put its result in doubt."""
     equations = run.mechanism.equations
-    notes = [*_doubts(run)]
+    notes: list[Note] = [*_doubts(run)]
     if np.max(np.abs(run.start.q), initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
-        notes = degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))) + notes
+        notes = [*degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))), *notes]
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
-    notes += [_redundancy(run, record)] if run.stepper.dependent else singular_start(run)
+    notes.append(_redundancy(run, record) if run.stepper.dependent else singular_start(run))
     notes += [DAMAGED.format(run.damage)] if run.damage else []
-    if run.start.memory is not None and not run.carried and run.boundaries.controllers:
+    if run.boundaries.controllers and not run.carried and run.start.memory is not None:
         notes.append(RESTARTED)
     stalled = int(run.kernel.n_shortened - run.kernel.n_sized - run.kernel.n_halved)
     counts = [(stalled if name == STALLED else int(getattr(run.kernel, name)), text) for name, text in COUNTED]
@@ -131,7 +135,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
     columns = ModelColumns(record, equations)
     notes += idle_modes(run, record, columns)
     turned = half_turns(columns)
-    notes, doubts = notes + turned, doubts + turned
+    notes, doubts = [*notes, *turned], doubts + turned
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
         notes += _ignored(run, number, contact)
@@ -140,10 +144,10 @@ def notes_of(run: RunData, record: Record) -> tuple[list[str], list[str]]:
         notes += short
         if run.kernel.row_bounds[1 + number] > 0.0:
             held = _pulled(record, number, contact)
-            notes, doubts = notes + held, doubts + held
+            notes, doubts = [*notes, *held], doubts + held
         doubts += blind
     slack, short = _pushing(run, columns)
-    return notes + slack + short, doubts + short
+    return [*notes, *slack, *short], doubts + short
 
 
 def _redundancy(run: RunData, record: Record) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,25 +137,30 @@ def _nearest(run: RunData) -> tuple[float, int] | None:
     return (float(place), row) if size < SINGULAR_RTOL * max(sizes) else None
 
 
-def singular_start(run: RunData) -> list[str]:
-    """A note where the run started at a singular configuration, or so close to one that round-off chose the branch."""
-    v, start = run.kernel, run.start
+def singular_start(run: RunData) -> Callable[[], list[str]]:
+    """What tells, if asked, that the run started at a singular configuration, or so close to one that round-off chose
+    the branch."""
+    v, start, mechanism = run.kernel, run.start, run.mechanism
     acting = run.manager.active_rows(run.manager.flags(start.mode.closed))
     rows = [row for row in acting if not v.dropped[row]]
     if not 0 < len(rows) <= 200 or run.resumed or len(start.anchors) != v.n_anchors:
-        return []
-    y = np.concatenate([start.v, start.z])
-    terms = run.mechanism.acceleration_terms(start.time, start.q, y, run.first_parameters, start.anchors)
-    if _is_clearly_regular(terms, rows):
-        return []
-    found = _part_left(terms, rows)
-    if not found[0] < SINGULAR_START * found[2]:
-        return []
-    title = run.mechanism.equations.rows[rows[found[1]]].title
-    return [
-        f"the start lies at a singular configuration, where {title} depends on other constraints and branches of "
-        "motions cross: the motion from there is not unique; start beside it"
-    ]
+        return list
+    at = start.time, start.q.copy(), np.concatenate([start.v, start.z]), run.first_parameters, start.anchors.copy()
+
+    def sentences() -> list[str]:
+        terms = mechanism.acceleration_terms(*at)
+        if _is_clearly_regular(terms, rows):
+            return []
+        found = _part_left(terms, rows)
+        if not found[0] < SINGULAR_START * found[2]:
+            return []
+        title = mechanism.equations.rows[rows[found[1]]].title
+        return [
+            f"the start lies at a singular configuration, where {title} depends on other constraints and branches of "
+            "motions cross: the motion from there is not unique; start beside it"
+        ]
+
+    return sentences
 
 
 def _smallest(run: RunData, ahead: float) -> tuple[float, int]:

@@ -129,8 +129,6 @@ class RunData:
         self.model = model
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
         self.asked, self.changed, self.dt = settings, dict(changed), dt
-        forces: list[Force] = getattr(model, "applied", getattr(model, "forces", []))
-        self.places = {force.name: _places(force) for force in forces}
         rows = int(min(self.rows_at_once, (end - start.time) / dt / options.get("store", 1) + 64))
         parameters = self._parameters()
         self.first_parameters = parameters.copy()
@@ -141,7 +139,6 @@ class RunData:
         width, capacity = self.kernel.width, self.kernel.capacity
         expected = 1.25 * (end - start.time) / dt / options.get("store", 1) + 1024
         self.table = _first_table(max(int(min(expected, FIRST_TABLE / (8 * width))), 3 * capacity), width)
-        self.log = EventLog(manager)
         self.events: list[EventRecord] = []
         self.parameter_changes: list[tuple[int, Vector]] = []
         self.stored = 0
@@ -161,6 +158,7 @@ class RunData:
         self.begins_behind_jump = False
         self._find_breaks(start.time)
         self.damage = ""  # of the memory of the start
+        self.doubts: list[str] = []  # about the result, in sentences
         self.resumed = self.carried = False
 
     @property
@@ -222,6 +220,17 @@ class RunData:
             table = np.empty((self.stored + count, self.kernel.width))
         table[: self.stored] = self.table[: self.stored]
         self.table = table
+
+    @cached_property
+    def log(self) -> EventLog:
+        """What names the events of the kernel."""
+        return EventLog(self.manager)
+
+    @cached_property
+    def places(self) -> dict[str, str]:
+        """The frames and joints of each force, for messages."""
+        forces: list[Force] = getattr(self.model, "applied", getattr(self.model, "forces", []))
+        return {force.name: _places(force) for force in forces}
 
     @cached_property
     def parameter_check(self) -> ParameterCheck:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mbd.dataclass import found_late
 from mbd.errors import SimulationError
 from mbd.kernel import codes
 from mbd.simulation.run.data import RunData
@@ -64,7 +65,7 @@ def close(run: RunData, settled: bool) -> State:
     if not settled:  # not even the scheme's start succeeded
         return run.start
     final = run.state()
-    final = replace(final, memory=memory_of(run, final.time))
+    found_late(final, "memory", memory_of(run, final.time))
     run.stepper.keep_row()
     run.collect()
     if run.label is not None and run.label != run.now:  # round-off of the sum of steps

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import makes_late
 from mbd.kernel.records import TABLE
 from mbd.results.record import EventRecord
 from mbd.simulation.run.data import RunData
@@ -20,7 +22,21 @@ OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "re
 """Settings that a memory depends on."""
 
 
-def memory_of(run: RunData, time: float) -> Memory:
+class Unseen:
+    """A memory as its run has left it, which has a digest and a seal from when somebody looks at it.
+
+    Until then nobody can have changed it, so that a run of the same mechanism takes it up unexamined.
+    """
+
+    def __init__(self, memory: Memory, mechanism: Mechanism, block: Vector) -> None:
+        self.memory, self.mechanism, self.block = memory, mechanism, block
+
+    def __call__(self) -> Memory:
+        vars(self.memory)["digest"] = _digest(self.mechanism, self.block, self.memory.parameters)
+        return sealed(self.memory)
+
+
+def memory_of(run: RunData, time: float) -> Unseen:
     """The memory of the accepted state, which must be settled; `time` is what its state says."""
     stepper = run.stepper
     run.count_turns()
@@ -28,12 +44,13 @@ def memory_of(run: RunData, time: float) -> Memory:
     place = _place(run)
     for array in (parameters, reals, integers, place):
         array.flags.writeable = False
-    return sealed(Memory(
-        belongs(run), digest(run), time, parameters, reals, integers, stepper.scheme.memory,
+    memory = Memory(
+        belongs(run), "", time, parameters, reals, integers, stepper.scheme.memory,
         run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending), place,
         run.manager.mode(run.kernel.closed[: run.kernel.n_contacts]),
         run.kernel.anchors[: run.kernel.n_anchors].copy(),
-    ))  # fmt: skip
+    )  # fmt: skip
+    return Unseen(memory, run.mechanism, _block(run))
 
 
 def _place(run: RunData) -> Vector:
@@ -65,39 +82,46 @@ def _controllers(run: RunData) -> tuple[str, ...]:
     return tuple(f"{c.name} {c.period!r} {c.on!r}" for c in run.boundaries.controllers)
 
 
-def digest(run: RunData) -> str:
-    """Of masses, forces, rows and guards at the accepted state: a model that was changed there has another one."""
-    v, mechanism = run.kernel, run.mechanism
+def _block(run: RunData) -> Vector:
+    """The inputs of the equations at the accepted state."""
+    v = run.kernel
     acting = run.manager.penalties(v.closed[: v.n_contacts])
-    block = mechanism.block(run.now, v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors], acting)
+    return run.mechanism.block(run.now, v.q[: v.n_q], v.y[: v.n], v.anchors[: v.n_anchors], acting)
+
+
+def _digest(mechanism: Mechanism, block: Vector, parameters: Vector) -> str:
+    """Of masses, forces, rows and guards at a state: a model that was changed there has another one."""
     digest = hashlib.sha256()
     for name in ("accelerations", "guards"):
         out = np.zeros(max(mechanism.sizes[name], 1))
         if mechanism.sizes[name]:
-            mechanism.common[name](block, v.params, out)
+            mechanism.common[name](block, parameters, out)
         digest.update(out.tobytes())
     return digest.hexdigest()
 
 
 def take_up(run: RunData, start: State) -> bool:
     """Go on from the memory of a state, if it is one of this run; whether it was."""
-    memory = start.memory
+    unseen = makes_late(start, "memory")
+    known = unseen is not None and unseen.mechanism is run.mechanism
+    memory = unseen.memory if known else start.memory
     if memory is None:
         return False
-    run.damage = damage(memory)
+    run.damage = "" if known else damage(memory)
     if run.damage or len(memory.parameters) != len(run.kernel.params):
         return False  # other values of parameters may make other run-time inputs, which is no damage
     unlocated = bool(run.kernel.auto) and memory.belongs == belongs(run, "nonsmooth")
     if memory.belongs != belongs(run) and not unlocated:
         return False
-    run.damage = out_of_range(run, memory)
+    run.damage = "" if known else out_of_range(run, memory)
     if run.damage:
         return False
     stepper, v = run.stepper, run.kernel
     fresh = stepper.reals.copy(), stepper.integers.copy()
     stepper.reals[:], stepper.integers[:] = memory.reals, memory.integers
     taken = not unlocated or run.kernel.fallback > 0  # it came to them by itself
-    if not (taken and _is_of(run, memory, start) and memory.digest == digest(run)):
+    same = taken and _is_of(run, memory, start)
+    if not (same and (known or memory.digest == _digest(run.mechanism, _block(run), run.kernel.params))):
         stepper.reals[:], stepper.integers[:] = fresh
         return False
     stepper.scheme.memory = memory.scheme
@@ -126,8 +150,9 @@ def carry_on(run: RunData, start: State) -> bool:
     What they keep belongs to the mechanism, not to how it is integrated: another dt, or the trial runs of a tolerance,
     must not make another motion.
     """
-    memory, own = start.memory, _controllers(run)
-    if memory is None or run.damage or not own or memory.belongs[-len(own) :] != own:
+    own = _controllers(run)
+    memory = start.memory if own else None
+    if memory is None or run.damage or memory.belongs[-len(own) :] != own:
         return False
     if set(memory.controllers["samples"]) != set(run.boundaries.samples):
         return False
