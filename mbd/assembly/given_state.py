@@ -96,7 +96,7 @@ def _bad_values(start: State, equations: Equations) -> list[str]:
     """Numbers of a state that are not finite, or that no posture has."""
     bad = (
         []
-        if all(np.isfinite(part).all() for part in (start.q, start.v, start.z, start.anchors))
+        if np.isfinite(np.concatenate([start.q, start.v, start.z, start.anchors])).all()
         else _not_finite(start, equations)
     )
     bad += [f"the start has {fault}; take whole turns away" for fault in beyond_angles(equations, start.q)]

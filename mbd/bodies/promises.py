@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from mbd.bodies.domains import Domain
@@ -22,10 +22,10 @@ __all__ = ["called", "function_of", "line_of_user", "promise_faults", "scalar", 
 def promise_faults(word: object) -> list[str]:
     """What a word, and the measures and losses that it holds, break of the promises of their bases, a sentence each."""
     fields = getattr(word, "__dict__", {})
-    several = [word]
+    several: list[Any] = [word]
     for value in fields.values():
         several += value.values() if isinstance(value, Mapping) else [value]
-    return [fault for each in several if _is_of_a_user(type(each)) for fault in _faults(each, word)]
+    return [fault for each in several if _is_of_a_user(each.__class__) for fault in _faults(each, word)]
 
 
 def title_of(word: object) -> str:
@@ -132,6 +132,7 @@ def _is_ours(module: str) -> bool:
     return module == "mbd" or module.startswith("mbd.")
 
 
+@lru_cache
 def _is_of_a_user(kind: type) -> bool:
     """Whether a class was not written here, but stands for one that was."""
     return not _is_ours(kind.__module__) and any(_is_ours(base.__module__) for base in kind.__mro__)

@@ -36,7 +36,7 @@ DERIVATIVE_ATOL = 1e-6
 class _Last:
     """What was found last: values of the parameters on which rows depend, with trivial rows and faults."""
 
-    found: tuple[Vector, tuple[frozenset[int], list[str]]] | None = None
+    found: tuple[bytes, tuple[frozenset[int], list[str]]] | None = None
 
 
 def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:
@@ -50,10 +50,10 @@ def trivial_rows(mechanism: Mechanism, parameters: Vector) -> frozenset[int]:
     if not mechanism.equations.rows:
         return frozenset()
     places = mechanism.kept(_places, lambda: _places(mechanism))
-    values = np.array(parameters[places])
+    values = parameters[places].tobytes()
     last = mechanism.kept(_Last, _Last)
     known = last.found
-    if known is None or not np.array_equal(known[0], values):
+    if known is None or known[0] != values:
         known = last.found = values, _found(mechanism, parameters)
     _, (rows, faults) = known
     if faults:

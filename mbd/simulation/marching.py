@@ -143,9 +143,10 @@ class Run(RunData):
         if not self.carried:
             begin_controllers(self)
         save(self, self.pending)
-        ended = self._react(self.pending)
-        self.pending = ()
-        save(self)
+        ended = ""
+        if self.pending:
+            ended, self.pending = self._react(self.pending), ()
+            save(self)
         while not ended:
             known = len(self.events)
             target, due = self.boundaries.next(self.end)

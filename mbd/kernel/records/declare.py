@@ -76,9 +76,12 @@ def formula(value: Callable[[Any], int]) -> Any:
 class Record:
     """Numbers and arrays by name; one put together from others has their fields, in the order of declaration.
 
-    A name that none of them declares is an error, as it is to the translator.
+    A name that none of them declares is an error, as it is to the translator. `renewed` has the names whose arrays were
+    set since somebody cleared it.
     """
 
+    __slots__ = ("__dict__", "__weakref__", "renewed")
+    renewed: set[str]
     declared: ClassVar[list[type[Record]]] = []
     _names: ClassVar[frozenset[str]] = frozenset()
 
@@ -87,6 +90,7 @@ class Record:
         cls._names = frozenset(name for owner in cls.__mro__ for name in vars(owner).get("__annotations__", {}))
 
     def __init__(self, **fields: Any) -> None:
+        object.__setattr__(self, "renewed", set())
         for name, value in fields.items():
             setattr(self, name, value)
 
@@ -98,6 +102,8 @@ class Record:
         def __setattr__(self, name: str, value: Any) -> None:
             if name not in self._names:
                 raise AttributeError(nearest(name, self._names, "field of the kernel", "There are"))
+            if value.__class__ is np.ndarray:
+                self.renewed.add(name)
             object.__setattr__(self, name, value)
 
 

@@ -32,7 +32,7 @@ from mbd.dataclass import dataclass
 from mbd.equations.equations import Contact
 from mbd.results.columns import ModelColumns
 from mbd.results.energy import doubted_ledger, kinds_of_work
-from mbd.simulation.run.stored import record_of, rows_of, whole_record
+from mbd.simulation.run.stored import inputs_of, record_of, whole_record
 
 if TYPE_CHECKING:
     from mbd.results.ledger import Ledger
@@ -196,8 +196,7 @@ class EnergyWatch(EnergyFindings):
         if run.parameter_changes:
             parameters = record_of(run, table).parameters_at(chosen)
         self.rows += len(chosen)
-        inputs = ModelColumns.inputs(rows_of(run, table, chosen))
-        kinetic, potential = run.mechanism.energies(inputs, parameters)
+        kinetic, potential = run.mechanism.energies(inputs_of(run, table), parameters)
         return kinetic, potential
 
     def _overflow(self, run: RunData) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from operator import is_, itemgetter
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ INTEGERS, REALS = struct.Struct(f"={len(TABLE.integers)}q"), struct.Struct(f"={l
 BOUND = slice(WHOLE.stop + len(TABLE.reals), WHOLE.stop + len(TABLE.reals) + len(ARRAYS))
 UNKNOWN: tuple[Sequence[Any], NDArray[np.int64]] = (None,) * len(ARRAYS), np.zeros(len(ARRAYS), dtype=np.int64)
 """Of arrays that are not known."""
-_whole, _real, _arrays = itemgetter(*TABLE.integers), itemgetter(*TABLE.reals), itemgetter(*ARRAYS)
+_whole, _real = itemgetter(*TABLE.integers), itemgetter(*TABLE.reals)
 
 
 class CallTable:
@@ -34,6 +34,10 @@ class CallTable:
     kernel : everything that the kernel reads and writes
     known : arrays in the order of `ARRAYS`, and their addresses, so that numpy, which takes microseconds for each,
         need not be asked; None in the place of those that are not known
+
+    Attributes
+    ----------
+    renewed : names of arrays that took the place of others; who puts these back says so in `kernel.renewed`
     """
 
     def __init__(
@@ -42,7 +46,10 @@ class CallTable:
         self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._bytes = self._words.data.cast("B")  # into which `struct` writes in a third of numpy's time
         self._code = np.zeros(0, dtype=np.int64)
-        self._bound, self._words[BOUND] = known
+        arrays, self._words[BOUND] = known
+        values = vars(kernel)
+        self.renewed = {name for name, array in zip(ARRAYS, arrays, strict=True) if values[name] is not array}
+        kernel.renewed.update(self.renewed)
         self.address = self._words.ctypes.data
         self.fill(functions, kernel)
 
@@ -58,12 +65,10 @@ class CallTable:
         except struct.error:  # a real in the place of an integer
             self._words[WHOLE] = _whole(values)
         REALS.pack_into(self._bytes, INTEGERS.size, *_real(values))
-        arrays = _arrays(values)
-        if not all(map(is_, arrays, self._bound)):
-            for place, (array, before) in enumerate(zip(arrays, self._bound, strict=True), BOUND.start):
-                if array is not before:
-                    self._words[place] = array.ctypes.data
-            self._bound = arrays
+        for name in kernel.renewed:
+            self._words[PLACES[name]] = values[name].ctypes.data
+        self.renewed |= kernel.renewed
+        kernel.renewed.clear()
         if len(functions) != len(self._code):
             self._code = np.array(
                 [0 if function is None else function.address for function in functions], dtype=np.int64

@@ -39,10 +39,10 @@ def stepper_of(
 
 def keep_idle(stepper: Stepper) -> None:
     """Keep the stepper of a run that is over, of whose arrays nobody holds a part any more."""
-    if stepper.key is None or not stepper.reusable:
+    if stepper.key is None or not stepper.max_idle:
         return
     idle = stepper.mechanism.idle
-    if len(idle) >= 8:
+    if len(idle) >= stepper.max_idle:
         idle.clear()
     idle[stepper.key] = stepper
 
@@ -54,7 +54,7 @@ def _key(
     if own_scheme(integrator) is NO_SCHEME:
         return None
     own = tuple(item for item in options.items() if item[0] != "end")
-    key = (kind, integrator, *sorted(integrator.numbers().items()), manager.trivial, dt, *own)
+    key = (kind, integrator, *integrator.numbers().items(), manager.trivial, dt, *own)
     try:
         hash(key)
     except TypeError:

@@ -31,6 +31,8 @@ __all__ = ["Stepper", "is_compiled"]
 
 EVENT_CAPACITY = 512
 """Events that the kernel may log before it hands them over, at least."""
+MAX_IDLE_SIZE = 1 << 22
+"""Numbers in arrays of a mechanism up to which they are kept for its next run, 32 MB."""
 LAWS = ("newton", "poisson", "sequential")
 """Impact laws in the order of their numbers in the kernel."""
 
@@ -59,12 +61,12 @@ def follows(equations: Equations) -> int:
 class InitialArrays:
     """The record and the arrays of a stepper before a run, of which only numbers other than 0 are kept.
 
-    is_small : whether the arrays are short enough to be worth it
+    size : how many numbers the arrays have
     """
 
     def __init__(self, kernel: Kernel, rooms: list[Any]) -> None:
-        self.is_small = sum(map(len, rooms)) <= (1 << 16)
-        if self.is_small:
+        self.size = sum(map(len, rooms))
+        if self.size <= MAX_IDLE_SIZE:
             self._values = dict(vars(kernel))
             self._places = [np.flatnonzero(room) for room in rooms]
             self._numbers = [room[places] for room, places in zip(rooms, self._places, strict=True)]
@@ -134,15 +136,16 @@ class Stepper:
         assert layout.n == self.kernel.n
 
     @property
-    def reusable(self) -> bool:
-        """Whether its arrays can be made as they were, for another run, in less time than new ones take."""
-        return self._fresh is not None and self._fresh.is_small
+    def max_idle(self) -> int:
+        """How many steppers of this size are kept for other runs; 0 where arrays cannot be made as they were."""
+        return 0 if self._fresh is None else min(8, MAX_IDLE_SIZE // self._fresh.size)
 
     def begin_again(self, parameters: Vector, end: float) -> None:
         """Make everything as it was before the run that is over, but for parameters and the end of the next one."""
         assert self._fresh is not None
         v = self.kernel
         self._fresh.restore(v, self.shelves.rooms)
+        v.renewed |= set() if self._table is None else self._table.renewed
         del self.functions[len(self.functions) - self._n_of_modes :]
         self._n_of_modes, self.modes, self.dependent = 0, [], {}
         v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
@@ -236,7 +239,7 @@ class Stepper:
         sticks, slip = v.sticks[: v.n_frictions], v.slip[: v.n_frictions]
         held = self.manager.active_rows(flags, sticks)
         rows = tuple(row for row in held if not dropped[row])
-        sliding = tuple(int(f) for f in np.flatnonzero(slip))
+        sliding = tuple(f for f, sign in enumerate(slip.tolist()) if sign)
         given_rows = tuple(row for row in held if dropped[row]) if sliding or v.loads_act else ()
         make = self._maker()
         try:
@@ -246,7 +249,7 @@ class Stepper:
                 raise
             raise MemoryLimitError(f"t = {float(v.time):.9g} s: {refused}") from refused  # what has run is kept
         count, width = int(v.n_modes), v.n_contacts + v.n_rows + v.n_frictions
-        phases = np.where(sticks == 1, 2, slip != 0.0)
+        phases = np.maximum(2 * (sticks == 1), slip != 0.0)
         if PROGRAMS * (count + 1) > len(v.mode_code):
             v.mode_key = np.concatenate([v.mode_key, np.zeros_like(v.mode_key)])
             v.mode_code = np.concatenate([v.mode_code, np.zeros_like(v.mode_code)])

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.results.balance import Balance
-from mbd.results.record import EventRecord, Record, Rows
+from mbd.results.record import EventRecord, Record
 from mbd.results.stored_states import StoredStates
 from mbd.simulation.run.data import RunData
 
-__all__ = ["ended_record", "record_of", "rows_of", "whole_record"]
+__all__ = ["ended_record", "inputs_of", "record_of", "whole_record"]
 
 BLOCK = 4096
 """Rows that are read together."""
@@ -23,18 +23,22 @@ BLOCK = 4096
 
 def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
     """Rows that the kernel has stored, (R, width), as a record without a verdict."""
-    equations = run.mechanism.equations
+    equations, parts = run.mechanism.equations, _parts(run, table)
+    parts |= {"closed": _bytes(parts["closed"], np.uint8), "phase": _bytes(parts["phase"], np.int8)}
     return Record(
         equations=equations, parameters=run.first_parameters,
-        parameter_names=[parameter.name for parameter in equations.parameters], **_parts(run, table),
+        parameter_names=[parameter.name for parameter in equations.parameters], **parts,
         events=events, settings=run.settings, parameter_changes=run.parameter_changes, start=run.start,
     )  # fmt: skip
 
 
-def rows_of(run: RunData, table: Matrix, source: NDArray[np.intp]) -> Rows:
-    """The same as states with the anchors of now, `source` being their numbers."""
+def inputs_of(run: RunData, table: Matrix) -> dict[str, Any]:
+    """Rows of the kernel as inputs of energies, with the anchors of now."""
+    parts = _parts(run, table)
+    phase = parts.pop("phase")
     anchors = run.kernel.anchors[: run.kernel.n_anchors].reshape(1, -1).repeat(len(table), axis=0)
-    return Rows(**_parts(run, table), anchors=anchors, source=source)
+    named = {"t": parts.pop("time"), "anchor": anchors, "switch": parts.pop("closed")}
+    return {**parts, **named, "slip": phase * (np.abs(phase) == 1.0)}
 
 
 def _parts(run: RunData, table: Matrix) -> dict[str, Any]:
@@ -47,12 +51,14 @@ def _parts(run: RunData, table: Matrix) -> dict[str, Any]:
     return {
         "time": table[:, 0], "q": table[:, 1:at_v], "v": table[:, at_v : at_v + n_v], "z": table[:, at_v + n_v : at_a],
         "a": table[:, at_a : at_a + n_v], "s": table[:, at_a + n_v : at_lam], "lam": table[:, at_lam:at_closed],
-        "closed": _bytes(table[:, at_closed:at_friction], np.uint8), "phase": _bytes(table[:, at_friction:], np.int8),
+        "closed": table[:, at_closed:at_friction], "phase": table[:, at_friction:],
     }  # fmt: skip
 
 
 def _bytes(values: Matrix, kind: Any) -> NDArray[Any]:
     """A few columns of a large table as small integers (R, C), column by column of rows that stay in the cache."""
+    if len(values) <= BLOCK:
+        return values.astype(kind)
     found = np.empty(values.shape, dtype=kind)
     for first in range(0, len(values), BLOCK):
         for column in range(values.shape[1]):
