@@ -78,11 +78,22 @@ class MarkerProgram:
 
     def at_all(self, time: Vector, q: Matrix, parameters: Vector) -> tuple[Matrix, NDArray[np.float64]]:
         """y (R, size) and its derivatives (R, size, n_v) at many states."""
-        layout = self.mechanism.layout
-        out = at_inputs(self.function, layout, {"t": time, "q": q}, parameters)
-        J = np.zeros((len(time), self.size, layout.n_v))
-        J[:, self.lines, self.columns] = out[:, self.size :]
-        return out[:, : self.size], J
+        y, entries = self.entries_at_all(time, q, parameters)
+        J = np.zeros((len(time), self.size, self.mechanism.layout.n_v))
+        J[:, self.lines, self.columns] = entries
+        return y, J
+
+    def entries_at_all(self, time: Vector, q: Matrix, parameters: Vector) -> tuple[Matrix, Matrix]:
+        """y (R, size) and the entries of its derivatives (R, E) at many states."""
+        out = at_inputs(self.function, self.mechanism.layout, {"t": time, "q": q}, parameters)
+        return out[:, : self.size], out[:, self.size :]
+
+    def transposed(self, entries: Matrix, r: Matrix) -> Matrix:
+        """``Jᵀ r`` (R, n_v) of the entries of J, which stand column by column."""
+        first = np.searchsorted(self.columns, np.arange(self.mechanism.layout.n_v + 1))
+        terms = entries * r[:, self.lines]
+        found = np.add.reduceat(np.pad(terms, ((0, 0), (0, 1))), first[:-1], axis=1)
+        return np.asarray(np.where(np.diff(first) > 0, found, 0.0))
 
 
 def marker_program(mechanism: Mechanism, points: Sequence[str], coordinates: Sequence[str], rows: Sequence[int],

@@ -15,10 +15,13 @@ from mbd.laboratory.marker_program import MarkerProgram
 
 __all__ = ["Postures", "Problem", "nearest_postures"]
 
-NEAR, CONVERGED = 0.03, 1e-10
-"""Largest step of a frame after which the next one begins, and error after which all frames are done [m, rad]."""
+NEAR, CHORD, CONVERGED = 0.03, 1e-3, 1e-10
+"""Largest step of a frame after which the next one begins, step of all frames below which JᵀWJ is kept, and error
+after which all frames are done [m, rad]."""
 MAX_STEPS, MAX_FIRST, MAX_POLISH, MAX_HALVINGS = 30, 300, 400, 12
 """Steps of a frame, of the first one, of all frames together; halvings of one."""
+BLOCK = 16
+"""Frames that are taken together."""
 MAX_TURN = 0.5
 """Largest turn of one step, so that no angle winds up by a whole turn [rad]."""
 DAMPING = 1e-12
@@ -43,6 +46,11 @@ class Problem:
     @property
     def components(self) -> int:
         return int(self.measured.shape[1])
+
+    @property
+    def held(self) -> int:
+        """How many rows and gaps there are."""
+        return self.rows + self.gaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +82,15 @@ def nearest_postures(
             total += used
     # all frames at once that are not done yet
     left, before = np.arange(count, dtype=np.intp), np.full(count, np.inf)
+    inverse = np.zeros((count, 0, 0))
     for _ in range(MAX_POLISH):
         own, stops = q[left], closed[left]
-        x, lam, _ = step.all(left, time, own, stops)
+        if not problem.held and before[left].max(initial=0.0) < CHORD:
+            if not inverse.size:
+                inverse = step.inverse(time, q)
+            x, lam = step.chord(left, time[left], own, inverse[left]), np.zeros((len(left), 0))
+        else:
+            x, lam, _ = step.all(left, time[left], own, stops)
         q[left] = own = step.composed(own, x)
         total += len(left)
         changed = step.stops(time[left], own, stops, lam)
@@ -91,7 +105,10 @@ def nearest_postures(
     if len(left) and before[left].max() > NEAR:
         worst = left[int(np.argmax(before[left]))]
         raise ModelError(f"t = {time[worst]:.6g} s: the nearest posture was not found; try another start=")
-    _, _, spread = step.all(np.arange(count, dtype=np.intp), time, q, closed, spread=True)
+    if problem.held:
+        _, _, spread = step.all(np.arange(count, dtype=np.intp), time, q, closed, spread=True)
+    else:
+        spread = step.inverse(time, q).diagonal(axis1=1, axis2=2)
     y, _ = problem.program.at_all(time, q, parameters)
     residual = problem.measured - y[:, : problem.components]
     return Postures(q, residual, spread, total, closed, step.unseen(time, q))
@@ -181,10 +198,18 @@ class _Step:
     def all(
         self, frames: NDArray[np.intp], time: Vector, q: Matrix, closed: NDArray[np.bool_], spread: bool = False
     ) -> tuple[Matrix, Matrix, Matrix]:
-        """Of some frames increments (R, n_v), multipliers of stops (R, gaps), diagonals of the inverse (R, n_v)."""
+        """Of some frames increments (R, n_v), multipliers of stops (R, gaps), diagonals of the inverse (R, n_v).
+
+        With `spread` the diagonals are found where rows or stops hold; see `inverse` for others.
+        """
         problem, n = self.problem, self.problem.components
         weight, count = problem.weight[frames], len(frames)
-        y, J = problem.program.at_all(time[frames], q, self.parameters)
+        if count > BLOCK:  # whose derivatives fit into the cache
+            blocks = [slice(k, k + BLOCK) for k in range(0, count, BLOCK)]
+            parts = [self.all(frames[each], time[each], q[each], closed[each], spread) for each in blocks]
+            x, lam, diagonal = (np.concatenate(each) for each in zip(*parts, strict=True))
+            return x, lam, diagonal
+        y, J = problem.program.at_all(time, q, self.parameters)
         WJ = weight[:, :, np.newaxis] * J[:, :n]
         H = WJ.transpose(0, 2, 1) @ WJ
         n_v = H.shape[1]
@@ -192,11 +217,9 @@ class _Step:
         H[:, range(n_v), range(n_v)] += DAMPING * size[:, np.newaxis]
         r = weight * (problem.measured[frames] - y[:, :n])
         g = (WJ.transpose(0, 2, 1) @ r[:, :, np.newaxis])[:, :, 0]
-        m = problem.rows + problem.gaps
+        m = problem.held
         if not m:
-            x = np.linalg.solve(H, g[:, :, np.newaxis])[:, :, 0]
-            diagonal = np.linalg.inv(H)[:, range(n_v), range(n_v)] if spread else x
-            return np.asarray(x), np.zeros((count, 0)), np.asarray(diagonal)
+            return np.linalg.solve(H, g[:, :, np.newaxis])[:, :, 0], np.zeros((count, 0)), g
         held = np.concatenate([np.ones((count, problem.rows), dtype=bool), closed], axis=1)
         B = J[:, n:] * held[:, :, np.newaxis] * size[:, np.newaxis, np.newaxis]
         h = y[:, n:] * held * size[:, np.newaxis]
@@ -206,6 +229,28 @@ class _Step:
         found = np.linalg.solve(K, np.concatenate([g, -h], axis=1)[:, :, np.newaxis])[:, :, 0]
         diagonal = np.linalg.inv(K)[:, range(n_v), range(n_v)] if spread else np.zeros((count, n_v))
         return found[:, :n_v], found[:, n_v + problem.rows :], np.asarray(diagonal)
+
+    def inverse(self, time: Vector, q: Matrix) -> NDArray[np.float64]:
+        """(JᵀWJ)⁻¹ of all frames (R, n_v, n_v)."""
+        n_v, found = self.mechanism.layout.n_v, []
+        for k in range(0, len(time), BLOCK):
+            own = slice(k, k + BLOCK)
+            WJ = (
+                self.problem.weight[own, :, np.newaxis]
+                * self.problem.program.at_all(time[own], q[own], self.parameters)[1]
+            )
+            H = WJ.transpose(0, 2, 1) @ WJ
+            H[:, range(n_v), range(n_v)] += DAMPING * H.max(axis=(1, 2), initial=1e-300)[:, np.newaxis]
+            found.append(np.linalg.inv(H))
+        return np.concatenate(found)
+
+    def chord(self, frames: NDArray[np.intp], time: Vector, q: Matrix, inverse: NDArray[np.float64]) -> Matrix:
+        """Increments of some frames (R, n_v), by the JᵀWJ of postures nearby and the gradient of these."""
+        problem = self.problem
+        y, entries = problem.program.entries_at_all(time, q, self.parameters)
+        r = problem.weight[frames] ** 2 * (problem.measured[frames] - y)
+        g = problem.program.transposed(entries, r)
+        return np.asarray((inverse @ g[:, :, np.newaxis])[:, :, 0])
 
     def stops(self, time: Vector, q: Matrix, closed: NDArray[np.bool_], lam: Matrix) -> NDArray[np.bool_]:
         """The same as for one frame; (R,) whether a stop changed."""
@@ -229,11 +274,11 @@ class _Step:
     def unseen(self, time: Vector, q: Matrix) -> NDArray[np.bool_]:
         """(n_v,) whether some frame does not determine an increment: what is measured and held leaves it free."""
         problem, n = self.problem, self.problem.components
-        _, J = problem.program.at_all(time, q, self.parameters)
-        found = np.zeros(self.mechanism.layout.n_v, dtype=bool)
         patterns = np.unique(problem.weight > 0.0, axis=0, return_index=True)[1]
-        for k in patterns:
-            A = np.concatenate([problem.weight[k][:, np.newaxis] * J[k, :n], J[k, n : n + problem.rows]])
+        _, J = problem.program.at_all(time[patterns], q[patterns], self.parameters)
+        found = np.zeros(self.mechanism.layout.n_v, dtype=bool)
+        for k, own in zip(patterns, J, strict=True):
+            A = np.concatenate([problem.weight[k][:, np.newaxis] * own[:n], own[n : n + problem.rows]])
             sizes, V = np.linalg.eigh(A.T @ A)
             null = V[:, sizes <= RANK_RTOL * max(sizes[-1], 1e-300)]
             found |= np.linalg.norm(null, axis=1) > 1e-3
