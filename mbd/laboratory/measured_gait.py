@@ -48,6 +48,7 @@ class MeasuredGait:
     place : where a foot stands (3,) at a time [m]
     columns : by word of a side, (subject, quantity, unit, values at times): 'knee', 'angle', '°'
     force : normal and forward force of a side at times [N]; None where no plate measured
+    without_strikes : what to try where strikes are missing
     """
 
     name: str
@@ -56,6 +57,7 @@ class MeasuredGait:
     place: Callable[[str, float], Vector]
     columns: Callable[[str], list[tuple[str, str, str, Callable[[Vector], Vector]]]]
     force: Callable[[str, Vector], tuple[Vector, Vector] | None]
+    without_strikes: str = ""
 
     def walk(self, title: str, words: Sequence[str], mass: float | None, strides: int | None) -> Walk:
         """Its strides, numbers and curves; energies are not known."""
@@ -78,7 +80,7 @@ class MeasuredGait:
                 raise TrajectoryError(
                     f"no whole stride of the side '{word}' in '{self.name}': a stride is from a strike to the next of "
                     f"the same side; strikes were {times}; they come from plates under each foot, or from events "
-                    "such as 'Left Foot Strike' and 'Left Foot Off'"
+                    f"such as 'Left Foot Strike' and 'Left Foot Off'{self.without_strikes}"
                 )
             found.append(Side(word, (), own, strides))
         return found
@@ -244,7 +246,8 @@ def gait_of_recording(recording: Any) -> MeasuredGait:
                         total[k] += np.interp(times, plate.time, values, left=0.0, right=0.0)
         return total[0], total[1]
 
-    return MeasuredGait(recording.name, ends, stances, place, columns, force)
+    hint = "; a model tells whose foot is on its plates: mbd gait FILE --model leg.osim" if recording.plates else ""
+    return MeasuredGait(recording.name, ends, stances, place, columns, force, hint)
 
 
 def _event(label: str) -> tuple[str, str]:

@@ -219,7 +219,7 @@ class _Step:
         g = (WJ.transpose(0, 2, 1) @ r[:, :, np.newaxis])[:, :, 0]
         m = problem.held
         if not m:
-            return np.linalg.solve(H, g[:, :, np.newaxis])[:, :, 0], np.zeros((count, 0)), g
+            return np.asarray(np.linalg.solve(H, g[:, :, np.newaxis])[:, :, 0]), np.zeros((count, 0)), g
         held = np.concatenate([np.ones((count, problem.rows), dtype=bool), closed], axis=1)
         B = J[:, n:] * held[:, :, np.newaxis] * size[:, np.newaxis, np.newaxis]
         h = y[:, n:] * held * size[:, np.newaxis]

@@ -405,9 +405,9 @@ def test_a_frame_of_a_person_takes_at_most_twenty_microseconds():
     mbd.inverse_dynamics(model, motion)
     times = []
     for _ in range(5):
-        started = time.perf_counter()
+        started = time.process_time()
         mbd.inverse_dynamics(model, motion)
-        times.append(time.perf_counter() - started)
+        times.append(time.process_time() - started)
     assert min(times) / 2000 < 20e-6
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -103,6 +104,8 @@ def test_a_recording_alone_reports_its_events_angles_and_plates():
     assert walk["normal impulse"]["left"] == pytest.approx(700.0 * 0.66, rel=0.02)
     knee = next(c for c in walk.curves if (c.side, c.subject, c.quantity) == ("left", "knee", "angle"))
     assert knee.mean[50] == pytest.approx(60.0, abs=0.1) and knee.unit == "°"
+    with pytest.raises(mbd.MbdError, match=r"strikes were none; .* plates: mbd gait FILE --model leg.osim"):
+        mbd.gait_report(replace(recording(), events=()))
 
 
 def band_file(folder, text=None):
