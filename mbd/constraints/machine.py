@@ -38,7 +38,7 @@ class Change:
     condition : what must be positive for it to happen
     stored : by the number of the field, what the machine holds from then on
     reset, terminal : of its event, as of `mbd.Event`
-    timed : whether the guard is a time in the state less one, so that it is due at once where that is no time to come
+    timed : whether the guard is a time that is still to come as the state is entered, so that it is due at once if not
     """
 
     name: str

@@ -192,7 +192,7 @@ class SampledLaw(Machine):
         period, sampled = scope.parameter(self.name, "period", self.period), self.first_values(scope, held)
         computed = int(self.puts_out_late)
         since_next = scope.time - held[NEXT]
-        found = [Change(f"{self.name}{SEPARATOR}sample", 0, computed, since_next, 1, stored=sampled)]
+        found = [Change(f"{self.name}{SEPARATOR}sample", 0, computed, since_next, 1, stored=sampled, timed=True)]
         for name in self.restart_on:
             title = f"{self.name}{SEPARATOR}restart by {name}"
             names = (title, f"{title} (2)")[: computed + 1]
@@ -200,7 +200,10 @@ class SampledLaw(Machine):
         if computed:
             late = scope.parameter(self.name, "delay", self.delay) - (self.waits - 1) * period
             put_out = {FIRST + k: held[FIRST + len(self.outputs) * self.waits + k] for k in range(len(self.outputs))}
-            found.append(Change(f"{self.name}{SEPARATOR}output", 1, 0, since_next + (period - late), 1, stored=put_out))
+            since_put_out = since_next + (period - late)
+            found.append(Change(
+                f"{self.name}{SEPARATOR}output", 1, 0, since_put_out, 1, stored=put_out, timed=True
+            ))  # fmt: skip
         return found
 
     def first_values(self, scope: Scope, held: Sequence[Node]) -> Mapping[int, Scalar]:

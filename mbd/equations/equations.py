@@ -230,8 +230,8 @@ class Guard:
     @property
     def is_timer(self) -> bool:
         """Whether it is the time less an instant that is known as a state is entered."""
-        fires = self.transition is not None and any(kind == "event" for kind, _ in self.transition.causes)
-        return fires and self.rate.op == "const" and self.rate.data == 1.0
+        timed = self.transition is not None and self.transition.timed
+        return timed and self.rate.op == "const" and self.rate.data == 1.0
 
 
 @dataclass(frozen=True)

@@ -485,6 +485,23 @@ def test_a_time_that_is_not_positive_on_entry_is_due_at_once_also_as_a_run_begin
     assert [event.time for event in run.events] == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize(("direction", "expected"), [
+    (0, [0.7, 1.0, 1.7, 2.0, 2.7, 3.0]), (1, [0.7, 1.3, 2.0, 2.3, 3.0]), (-1, [0.7, 1.0, 1.7, 2.0, 2.7, 3.0]),
+])  # fmt: skip
+@pytest.mark.parametrize("integrator", [mbd.HHT(), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
+def test_the_time_in_another_mode_is_watched_as_any_quantity(integrator, direction, expected) -> None:
+    """It is past 0.3 s as 'a' is entered: it falls back as the other mode changes each second, and then rises."""
+    model = mbd.Model("slider")
+    model.connect(mbd.Prismatic("rail", model.ground.origin, mbd.PointMass("body", mass=1.0).origin))
+    late = mbd.measure(lambda t: t - 0.3, "n.time")
+    changes = [T("b", "a", after=0.7), T("a", "b", when=late, direction=direction)]
+    other = [T("c", "d", after=1.0), T("d", "c", after=1.0)]
+    model.apply(mbd.Mode("n", ("c", "d"), transitions=other), mbd.Mode("m", ("b", "a"), transitions=changes))
+    run = mbd.simulate(model, mbd.assemble(model), integrator, dt=0.01, until=3.1)
+    found = [event.time for event in run.events if event.name.startswith("m")]
+    assert found == pytest.approx(expected, abs=1e-14)
+
+
 def test_the_second_of_two_timers_of_equal_length_is_an_error() -> None:
     back = T(("b", "c"), "a", after=1.0)
     for time, said in (0.3, "0.3 s"), ("m.t", "'m.t'"):
