@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mbd.errors import TrajectoryError
+from mbd.forces.samples import in_degrees
 from mbd.laboratory.axes import turn_of, turn_words
 from mbd.laboratory.comma_separated import read_csv
 from mbd.laboratory.motion_capture import read_c3d
@@ -25,6 +28,10 @@ READERS: dict[str, tuple[Callable[[Path], Recording], str]] = {
     ".csv": (read_csv, "y"),
 }  # fmt: skip
 """Readers by the end of the name, and the axis that usually points up in such files."""
+ANGLE = re.compile(
+    r"(angle|flexion|extension|rotation|adduction|abduction|tilt|list|obliquity)(_[lr])?$", re.IGNORECASE
+)
+"""Channels that are angles by their names."""
 MAX_MARKER_DISTANCE = 50.0
 """Distance of markers from each other that no laboratory has [m]."""
 
@@ -82,6 +89,13 @@ def _plate(plate: PlateRecord, turn: np.ndarray) -> PlateRecord:
 
 
 def _doubt_units(recording: Recording) -> None:
+    for name, values in recording.channels.items():
+        if ANGLE.search(name) and (swing := in_degrees(values[np.isfinite(values)])):
+            doubt(
+                f"{recording.name}: {name!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; it is "
+                "probably in degrees: say so by inDegrees=yes in the header, or by 'knee_angle [deg]' above the column"
+            )
+            break
     for name, track in recording.markers.items():
         seen = track[np.isfinite(track).all(axis=1)]
         if len(seen) and np.ptp(seen, axis=0).max() > MAX_MARKER_DISTANCE:

@@ -109,6 +109,19 @@ def test_a_storage_file_with_commas_between_its_cells_is_read(tmp_path, end):
     assert found["pelvis_tx"] == pytest.approx([1.5, 1.6, 1.7])
 
 
+@pytest.mark.parametrize(("name", "swing", "doubted"), [
+    ("knee_angle_r", 60.0, True), ("knee_angle_r", 1.05, False), ("wheel.length", 60.0, False),
+])  # fmt: skip
+def test_angles_in_degrees_under_a_header_of_radians_are_doubted(tmp_path, name, swing, doubted, recwarn):
+    rows = [f"{k / 100}\t{swing * math.sin(k / 5) ** 2}" for k in range(60)]
+    head = STO.partition("time\t")[0].replace("inDegrees=yes", "inDegrees=no")
+    mbd.read(written(tmp_path, "gait.sto", head + f"time\t{name}\n" + "\n".join(rows) + "\n"))
+    said = [str(each.message) for each in recwarn]
+    assert [f"{name!r} swings to and fro by 60 rad, 9.5 turns; it is probably in degrees" in text for text in said] == (
+        [True] if doubted else []
+    )
+
+
 CSV_VARIANTS = {
     "as it is": CSV,
     "semicolons and commas": CSV.replace(",", ";").replace(".1;", ",1;").replace("0.2;", "0,2;"),
