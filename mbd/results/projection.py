@@ -25,7 +25,7 @@ from mbd.results.record import Rows
 
 __all__ = ["Projection"]
 
-MIN_SINGULAR_VALUE = 0.05
+MIN_SINGULAR_VALUE = 0.005
 """Least singular value from which rows are followed: of B over sizes of its columns, then lengths of rows, in the run.
 
 Inertia is no part of it: in its metric the rows at the two ends of a light link depend on each other.
