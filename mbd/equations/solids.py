@@ -74,9 +74,9 @@ def _cones(model: Description) -> list[tuple[str, Cone]]:
 
 
 def _middle(cone: Cone) -> Vector3:
-    """The middle of a cone in the parent's frame, on the side on which the child has its center."""
+    """The middle of a cone in the parent's frame, on the side on which the child has its center, if any."""
     child = cone.joint.child
-    (cx, cy, cz), (ox, oy, oz) = child.body.center.offset, child.offset
+    (cx, cy, cz), (ox, oy, oz) = child.body.frames.get("center", child).offset, child.offset
     axis = rotate(child.rotation, cone.axis) if child.rotation is not None else cone.axis
     along = dot(axis, (cx - ox, cy - oy, cz - oz))
     x, y, z = cone.direction

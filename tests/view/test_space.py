@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,16 @@ def hanging() -> tuple[mbd.Model, mbd.State]:
         mbd.Universal("elbow", upper.point(*TIP, name="tip"), lower.point(0.0, 0.3, 0.0, name="top")),
     )
     return model, mbd.assemble(model, position={"shoulder.first": 0.9, "elbow.second": -0.4})
+
+
+def stopped(from_ground: bool = True) -> mbd.Trajectory:
+    """A ball joint with a stop of directions, seen from the ground or from its body."""
+    model, body = mbd.Model("hip"), mbd.RigidBody("thigh", 1.0, (0.1, 0.1, 0.1), center=(0.0, -0.2, 0.0))
+    ends = (model.ground.origin, body.origin) if from_ground else (body.origin, model.ground.origin)
+    hip = mbd.Spherical("hip", *ends)
+    model.connect(hip)
+    model.constrain(mbd.Unilateral("stop", mbd.cone(hip, 0.4)))
+    return mbd.simulate(model, mbd.assemble(model), dt=1e-2, until=0.05)
 
 
 @cache
@@ -313,16 +323,7 @@ def test_between_the_pictures_that_are_kept_nothing_is_missed_by_more_than_the_t
     assert set(twice) | set(twice + 1) <= set(found)
 
 
-def stopped() -> mbd.Trajectory:
-    """A ball joint with a stop of directions."""
-    model, body = mbd.Model("hip"), mbd.RigidBody("thigh", 1.0, (0.1, 0.1, 0.1), center=(0.0, -0.2, 0.0))
-    hip = mbd.Spherical("hip", model.ground.origin, body.origin)
-    model.connect(hip)
-    model.constrain(mbd.Unilateral("stop", mbd.cone(hip, 0.4)))
-    return mbd.simulate(model, mbd.assemble(model), dt=1e-2, until=0.05)
-
-
-@pytest.mark.parametrize("make", [pendulum, stopped])
+@pytest.mark.parametrize("make", [pendulum, stopped, partial(stopped, from_ground=False)])
 def test_a_file_keeps_solids_hinges_and_stops(make, tmp_path):
     run = make()
     loaded = mbd.load(run.save(tmp_path / "run"))
