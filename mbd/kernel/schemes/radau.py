@@ -311,11 +311,12 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
     rough = evaluate_stages(K, h, t1, m, 256.0 * EPS, 0.0, 0.0, False)
     if rough <= roughly(K):
         left = evaluate_stages(K, h, t1, m, K.tolerance, c, c * c, False)
-        if left > 1.0:
+        if left <= 1.0:
+            K.n_stagnations += 1
+            return 0
+        if stuck:  # earlier, one good correction makes the next look like the last
             K.failure_size = left
             return TOO_TIGHT
-        K.n_stagnations += 1
-        return 0
     status = NOT_CONVERGED
     left = 0.0
     if stuck:
