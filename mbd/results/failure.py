@@ -63,7 +63,10 @@ class Failure:
 
     def __repr__(self) -> str:
         worst = sorted(self.residuals.items(), key=lambda item: -abs(item[1]))[:3]
-        lines = [f"Failure after t = {self.time:.9g} s, of the step to {self.attempted:.9g} s: {self.message}"]
+        where = f"after t = {self.time:.9g} s, of the step to {self.attempted:.9g} s"
+        if self.attempted <= self.time:
+            where = f"of the run to t = {self.time:.9g} s"
+        lines = [f"Failure {where}: {self.message}"]
         tol = self.settings.get("tol")
         steps = f"dt = {self.dt:g} s" if tol is None else f"tol = {tol:g}"
         lines.append(f"  {self.integrator!r}, {steps}, {self.iterations} Newton corrections")

@@ -91,8 +91,10 @@ class Replay:
             lines += (
                 shown if len(shown) <= MAX_SHOWN else [*shown[: MAX_SHOWN // 2], "      …", *shown[-MAX_SHOWN // 2 :]]
             )
-        if not self.tries:
-            lines.append("  no Newton iteration of mbd took place; what an integrator of your own solves is its own")
+        if not self.tries and self.failure.attempted <= self.failure.time:
+            lines.append("  no step failed: the run was judged as a whole, so make it again with another dt or scheme")
+        elif not self.tries:
+            lines.append("  no Newton iteration took place: steps are explicit, or solved by an integrator of your own")
         return "\n".join(lines)
 
 

@@ -258,8 +258,24 @@ def test_a_replay_tells_whether_another_step_or_scheme_goes_through():
     assert finer.run.final["x.displacement"] < 0.5 and finer.run.final["x.rate"] == pytest.approx(-1.0, abs=0.05)
     other = mbd.replay(failed.failure, integrator=mbd.RungeKutta853())
     assert other.passed and not other.reproduced
+    assert "steps are explicit" in repr(other)
     alike = mbd.replay(failed.failure, integrator=mbd.GeneralizedAlpha(0.5))
     assert not alike.passed and alike.message
+
+
+def test_a_failure_of_a_whole_run_is_told_as_one_of_no_step():
+    """An explicit scheme turns a body round at a wall by its steps' size; the energy of all rows tells."""
+    model, start = stiff(jump=1e5)
+    failure = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=1.0, on_failure="return").failure
+    assert "Failure of the run to t = 1 s" in repr(failure) and "numerical energy gain" in failure.message
+    assert "no step failed: the run was judged as a whole" in repr(mbd.replay(failure))
+
+
+def test_a_wall_that_only_stages_meet_is_told():
+    """Four stages err by what their embedded estimate, of the last one and the end, does not see."""
+    model, start = stiff(jump=1e4)
+    met = mbd.simulate(model, start, mbd.RungeKutta4(), dt=0.01, until=1.0, on_failure="return")
+    assert not met.success and "a step of 0.01 s takes the rate of 'x.displacement'" in met.message
 
 
 def clean_failure(**settings):

@@ -28,6 +28,8 @@ __all__ = ["judge_change"]
 
 MAX_RATE_ERROR = 0.2
 """Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
+UNSEEN_RATIO = 4.0
+"""Change of velocities over that by the accelerations at the ends of a step above which these do not tell it [-]."""
 MAX_UNEXPLAINED_ENERGY = 0.5
 """Part of the kinetic energy at the end of a step that may be neither old nor work of forces [-]."""
 MIN_CHANGE_ENERGY = 0.085
@@ -43,11 +45,12 @@ def judge_change(K: Kernel, h: float, t1: float) -> int:
     if K.estimates == 0 and changes_little(K, h, stretch):
         return 0
     worst = largest_share(K, h, stretch)
-    if (worst <= MAX_UNCHECKED_ERROR and not bends(K, h)) or K.near_singular > 0 or sharing(K):
+    unseen = K.explicit == 1 and worst <= MAX_UNCHECKED_ERROR and changes_unseen(K, h)
+    if (worst <= MAX_UNCHECKED_ERROR and not unseen and not bends(K, h)) or K.near_singular > 0 or sharing(K):
         return 0
     if worst > MAX_UNCHECKED_ERROR:  # then stages have seen nothing that counts
         K.stage_pull = 0.0
-    return look_closer(K, h, t1, stretch, worst > K.look_twice)
+    return look_closer(K, h, t1, stretch, worst > K.look_twice or unseen)
 
 
 def changes_little(K: Steps, h: float, stretch: float) -> bool:
@@ -62,6 +65,25 @@ def changes_little(K: Steps, h: float, stretch: float) -> bool:
     for i in range(K.n_v, K.n):
         largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
     return is_small(K, h, stretch, most, largest, fastest)
+
+
+def changes_unseen(K: Equations, h: float) -> bool:
+    """Whether a step changed velocities although accelerations at neither end tell; the share is in K.failure_size.
+
+    Stages between the ends have met a force then, such as that of a wall which the step leaves again; the estimate of
+    four stages may not see it.
+    """
+    change = 0.0
+    most = 0.0
+    fastest = 0.0
+    for i in range(K.n_v):
+        change = max(change, abs(K.y1[i] - K.y[i]))
+        most = max(most, max(abs(K.rate[i]), abs(K.rate1[i])))
+        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
+    if change <= UNSEEN_RATIO * h * most or change <= MAX_RATE_ERROR * max(K.rest_speed, fastest):
+        return False
+    K.failure_size = max(K.failure_size, change / max(K.rest_speed, fastest))
+    return True
 
 
 def bends(K: Equations, h: float) -> bool:
