@@ -52,10 +52,11 @@ class Node:
         self.tape, self.index, self.op, self.args, self.data = tape, index, op, args, data
 
     def __add__(self, other: Scalar) -> Node:
+        if other.__class__ is float and other == 0.0:
+            return self
         return self.tape.add(self, other) if _is_scalar(other) else NotImplemented
 
-    def __radd__(self, other: Scalar) -> Node:
-        return self.tape.add(other, self) if _is_scalar(other) else NotImplemented
+    __radd__ = __add__
 
     def __sub__(self, other: Scalar) -> Node:
         return self.tape.sub(self, other) if _is_scalar(other) else NotImplemented
@@ -64,10 +65,14 @@ class Node:
         return self.tape.sub(other, self) if _is_scalar(other) else NotImplemented
 
     def __mul__(self, other: Scalar) -> Node:
+        if other.__class__ is float and self.op != "const":  # most factors of rotations and axes are these
+            if other == 0.0:
+                return self.tape.zero
+            if other == 1.0:
+                return self
         return self.tape.mul(self, other) if _is_scalar(other) else NotImplemented
 
-    def __rmul__(self, other: Scalar) -> Node:
-        return self.tape.mul(other, self) if _is_scalar(other) else NotImplemented
+    __rmul__ = __mul__
 
     def __truediv__(self, other: Scalar) -> Node:
         return self.tape.div(self, other) if _is_scalar(other) else NotImplemented
@@ -232,6 +237,8 @@ class Tape:
 
     def lift(self, value: Scalar) -> Node:
         """The node of a scalar: itself, or the constant of a float."""
+        if value.__class__ is float:
+            return self.constant(value)
         if isinstance(value, Node):
             if value.tape is not self:
                 raise TraceError("two tapes met in one expression: a value was kept from an earlier derivation")
