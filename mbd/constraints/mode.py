@@ -32,8 +32,8 @@ class Transition:
     ----------
     source : state that it leaves, or several
     target : state that it enters
-    on : name of what causes it: a contact that closes ('right foot') or opens ('right foot opened'), an `mbd.Event`,
-        another mode that changes ('other'), or enters a state ('other: stance')
+    on : name of what causes it: a contact that closes ('right foot') or opens ('right foot opened'), one after the
+        other in a rebound, an `mbd.Event`, another mode that changes ('other'), or enters a state ('other: stance')
     when : what crosses zero as it happens, located like the guard of an `mbd.Event`: a measure, the name of a
         quantity, a function of named quantities, an expression. One that is beyond zero already as the state is
         entered has to go back first

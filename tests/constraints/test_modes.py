@@ -304,6 +304,28 @@ def test_a_contact_closes_waits_for_a_timer_and_is_thrust_off_for_a_time() -> No
     assert ended.final.time == longer.events[2].time
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("order", ["", "before", "with", "after"])
+def test_a_mode_of_closings_and_openings_is_that_of_the_contact(order: str, restitution: float) -> None:
+    """Also where it opens as it closes: in a rebound, or as an impulse lifts it or keeps it from striking."""
+    model = mbd.Model("ball")
+    ball = mbd.PointMass("ball", mass=1.0)
+    model.connect(mbd.Prismatic("rail", model.ground.origin, ball.origin, axis=(0, 1, 0)))
+    changes = [mbd.Transition("off", "on", on="floor"), mbd.Transition("on", "off", on="floor opened")]
+    model.constrain(
+        mbd.Unilateral("floor", mbd.height(ball.origin), restitution=restitution),
+        mbd.Mode("stance", ("off", "on"), transitions=changes),
+        *([mbd.Impulse("kick", ball.origin, 1.0, on="floor", direction=(0, 1), order=order)] if order else []),
+    )
+    state, names = mbd.assemble(model, {"rail.displacement": 0.1}), list[str]()
+    for until in np.linspace(0.05, 1.5, 30):
+        run = mbd.simulate(model, state, mbd.RungeKutta853(), dt=0.02, until=float(until))
+        state, names = run.final, names + [event.name for event in run.events]
+        assert run["stance"][-1] == ("on" if "floor" in state.mode.closed else "off")
+    assert names.count("stance: off to on") >= 1
+    assert names.count("stance: off to on") - names.count("stance: on to off") == int("floor" in state.mode.closed)
+
+
 def test_modes_follow_each_other_at_one_instant_in_order() -> None:
     model, start = hopper()
     model.constrain(

@@ -108,6 +108,8 @@ def close_by_impact(K: Switching, fastest: float) -> int:
                 K.closed[c] = 1
             else:
                 K.armed[c] = 1
+                if K.n_machines > 0:  # it rebounds, or an impulse keeps it from striking: open again, for modes too
+                    K.happened[LOG_OPENED * K.n_contacts + c] = 1
         elif K.active[c] == 0:
             K.closed[c] = 0
             K.armed[c] = 1

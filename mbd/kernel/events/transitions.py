@@ -18,6 +18,10 @@ from mbd.kernel.stepping.restart import evaluate
 __all__ = ["begins_now", "find_due", "has_happened", "is_allowed", "is_due", "settle_fresh", "take_transitions"]
 
 
+NEXT_ROUND = 2
+"""Mark of what transitions are looked for by in the round that follows."""
+
+
 def begins_now(K: Guards, e: int) -> bool:
     """Whether the state that timer e leaves begins at the accepted state."""
     return bool(K.anchors[K.machine_start[K.guard_machine[e]] + 1] == K.time)
@@ -77,13 +81,17 @@ def take_transitions(K: Switching) -> int:
         K.chain_time = K.time
         K.n_rounds = 0
     watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
+    # of a contact that closed and opened at this instant, what it is now came last
+    for c in range(K.n_contacts):
+        if K.happened[c] == 1 and K.happened[K.n_contacts + c] == 1:
+            K.happened[c if K.closed[c] == 1 else K.n_contacts + c] = NEXT_ROUND
     while has_happened(K):
         K.n_rounds += 1
         taken = find_taken(K)
         for i in range(K.n_marks):
-            K.happened[i] = 0
+            K.happened[i] = 1 if K.happened[i] == NEXT_ROUND else 0
         if taken == 0:
-            return 0
+            continue
         if K.n_rounds > 64:  # transitions that follow each other without end
             return ENDLESS_TRANSITIONS
         store_taken(K)
