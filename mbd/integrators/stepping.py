@@ -153,13 +153,13 @@ def step_of(
 
 @lru_cache(maxsize=64)
 def _rooms(
-    n_q: int, n_v: int, n: int, m: int, vector: int, block: int, nodes: int, own: tuple[tuple[str, int], ...]
+    n_q: int, n_v: int, n: int, m: int, vector: int, nodes: int, own: tuple[tuple[str, int], ...]
 ) -> dict[Any, tuple[int, dict[str, slice]]]:
     """Of the reals and the integers of a record: how many, and where each array stands among them."""
     K = Kernel()
     vars(K).update(NOTHING, n_q=n_q, n_v=n_v, n=n, n_rows=m, vector=vector, n_nodes=nodes)
-    given = {"block": block, "out": K.n_tangent + block, "acc": K.acc_limit + 1, "params": 1, "blurs": 1, "unit": n}
-    given |= {"chart": 2 * n_q + 2 * n_v, "row_contact": m, "row_normal": m, "row_trivial": m, "row_level": m}
+    given = {"out": K.n_tangent + K.n_block, "acc": K.acc_limit + 1, "params": 1, "blurs": 1, "unit": n}
+    given |= {"chart": 2 * n_q + 2 * n_v, "row_contact": m, "row_trivial": m, "row_level": m}
     given |= {"row_friction": m, "row_unit": m + 1, **dict(own)}
     found = {}
     asked = TABLE.lengths(K, given)
@@ -188,22 +188,18 @@ class _Record:
         """Make room for n rates and m rows; without `levels` the system is asked which rows hold velocities."""
         n_q, n_v, n, m = self.n_q, self.n_v, self.n, len(lam)
         vector = int(self.system.is_vector)
-        o_x = 3 + n_q
-        o_v, o_a, o_lam = o_x + n_v, o_x + n_v + n, o_x + n_v + 2 * n
         K = self.K = Kernel()
         vars(K).update(NOTHING)
         vars(K).update(
-            n_q=n_q, n_v=n_v, n=n, n_rows=m, o_q=3, o_x=o_x, o_v=o_v, o_a=o_a, o_lam=o_lam, o_anchor=o_lam + m,
-            o_switch=o_lam + m, o_slip=o_lam + m, vector=vector, stabilized=int(self.integrator.stabilized),
+            n_q=n_q, n_v=n_v, n=n, n_rows=m, vector=vector, stabilized=int(self.integrator.stabilized),
             dt=self.whole, **self.scheme.numbers(),
         )  # fmt: skip
         set_numbers(K, self.integrator)
-        block = o_lam + m + n_v
         own = memory_lengths(K, self.scheme)
-        for kind, (whole, places) in _rooms(n_q, n_v, n, m, vector, block, K.n_nodes, tuple(own.items())).items():
+        for kind, (whole, places) in _rooms(n_q, n_v, n, m, vector, K.n_nodes, tuple(own.items())).items():
             room = np.zeros(whole, dtype=kind)
             vars(K).update({name: room[place] for name, place in places.items()})
-        K.shift1 = K.block[block - n_v :]
+        K.shift1 = K.block[K.n_block - n_v :]
         fill_coefficients(K, self.scheme)
         K.row_contact[:] = K.row_friction[:] = -1
         K.unit[:], K.row_unit[:] = 2, 2

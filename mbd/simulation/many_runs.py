@@ -12,7 +12,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.kernel import codes
-from mbd.kernel.stepping.many_runs import END_NUMBERS
 from mbd.simulation.marching import Run
 from mbd.simulation.run.late_resets import may_reset_late
 from mbd.simulation.run.plain import PlainScheme
@@ -116,9 +115,6 @@ class ManyRuns:
         v.noted_counts = v.counts.copy()
         v.n_whole_reals, v.n_whole_integers = len(stepper.reals), len(stepper.integers)
         v.n_counts = len(v.counts)
-        v.n_block, v.n_parameters = run.mechanism.layout.size, len(run.first_parameters)
-        v.start_width = 1 + v.n_q + v.n + v.n_anchors + 2 * v.n_contacts
-        v.end_width = END_NUMBERS + v.width + 2 * v.n_contacts + v.n_anchors
         v.last_time, v.near_end = run.end, run.boundaries.near
         v.chunk_of_runs = v.chunk
 
@@ -149,7 +145,7 @@ class ManyRuns:
         v.starts = np.ascontiguousarray(starts, dtype=float).ravel() if count else np.zeros(1)
         v.ends = np.zeros(max(count * v.end_width, 1))
         v.most_lines, v.lines = lines, np.zeros(max(count * lines * v.event_width, 1))
-        v.own_parameters = int(parameters is not None)
+        v.n_parameters = 0 if parameters is None else len(self.run.first_parameters)
         if parameters is not None:
             v.given_parameters = np.ascontiguousarray(parameters, dtype=float).ravel()
         else:
@@ -195,12 +191,12 @@ class ManyRuns:
     def _ends(self, count: int, lines: int) -> Ends:
         v = self.run.kernel
         table = v.ends[: count * v.end_width].reshape(count, v.end_width)
-        whole = table[:, : END_NUMBERS - 1].astype(np.int64)
-        n_c, at = v.n_contacts, END_NUMBERS + v.width
+        whole = table[:, : v.end_row - 1].astype(np.int64)
+        n_c, at = v.n_contacts, v.end_row + v.width
         status, stopped_by, steps, events, sequence, n_lines = whole.T
         return Ends(
-            status, stopped_by, steps, events, sequence, n_lines, table[:, END_NUMBERS - 1],
-            table[:, END_NUMBERS:at], table[:, at : at + n_c].astype(np.int64),
+            status, stopped_by, steps, events, sequence, n_lines, table[:, v.end_row - 1],
+            table[:, v.end_row : at], table[:, at : at + n_c].astype(np.int64),
             table[:, at + n_c : at + 2 * n_c].astype(np.int64), table[:, at + 2 * n_c :],
             v.lines[: count * lines * v.event_width].reshape(count, lines, v.event_width),
         )  # fmt: skip

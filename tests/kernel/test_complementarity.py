@@ -27,16 +27,13 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
     friction_row = normal + 1 if with_friction else np.zeros(1, dtype=int)
     frictions = contacts if with_friction else 0
     row_contact = np.repeat(np.arange(contacts), 2 if with_friction else 1)
-    is_normal = np.zeros(rows, dtype=int)
-    is_normal[normal] = 1
     row_friction = np.full(rows, -1)
     if with_friction:
         row_friction[friction_row] = np.arange(contacts)
     size = n + rows
     K = Scene(
         vector=1, n=n, n_v=n, n_q=n, n_rows=rows, n_contacts=contacts, n_frictions=frictions, n_cones=0,
-        n_machines=0, n_impulses=0, n_anchors=0, loaded=0, loads_act=0, o_lam=0, o_slip=rows, params=np.zeros(1),
-        block=np.zeros(rows + max(frictions, 1)),
+        n_machines=0, n_impulses=0, n_anchors=0, loaded=0, loads_act=0, n_modes=0, params=np.zeros(1),
         acc=np.zeros(n * n + n + 2 * n * rows + 3 * rows + 1 + max(frictions, 1)),
         kkt=np.zeros(size * size), rhs=np.zeros(size), columns=np.zeros(size, dtype=int), work=np.zeros(3 * size),
         basis=np.zeros((rows + 1) * n), lower=np.zeros((rows + 1) * rows), dependence=np.zeros(rows * rows),
@@ -48,10 +45,10 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
         loose=np.full(max(frictions, 1), 1 if with_friction else 0), active=np.ones(contacts, dtype=int),
         parting=np.zeros(contacts, dtype=int), free=np.ones(contacts, dtype=int), normal=normal,
         friction_row=friction_row, friction_contact=np.arange(max(contacts, 1)), row_contact=row_contact,
-        row_normal=is_normal, row_friction=row_friction, rows=np.zeros(rows, dtype=int),
+        row_friction=row_friction, rows=np.zeros(rows, dtype=int),
         dropped=np.zeros(rows, dtype=int), state=np.zeros(32, dtype=int), counts=np.zeros(24, dtype=int),
         leader=np.arange(max(frictions, 1)), group_size=np.ones(max(frictions, 1), dtype=int),
-        detail=np.zeros(16), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
+        detail=np.zeros(32), hooks=None, strategy=0, past=np.zeros(rows), past_limit=np.zeros(max(frictions, 1)),
     )  # fmt: skip
 
     for name in TABLE.real_arrays + TABLE.integer_arrays:  # what does not matter here
@@ -61,10 +58,10 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
     def accelerations(block, params, out):
         """M | f | ∂r/∂λ | B | h | ḣ | γ | captured | T | limits, of friction μ p that slides."""
         R = B.T.copy()
-        slips = block[K.o_slip :]
+        slips, lam = block[K.o_slip :], block[K.o_lam :]
         for f in range(frictions):
             R[:, normal[f]] += slips[f] * (-mu) * B[friction_row[f]]
-        limits = [-mu * block[normal[f]] for f in range(frictions)]
+        limits = [-mu * lam[normal[f]] for f in range(frictions)]
         out[:] = np.concatenate(
             [
                 M.ravel(),

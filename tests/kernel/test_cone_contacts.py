@@ -25,52 +25,51 @@ class Problem:
     def __init__(self, M, force, N=(), T=(), mu=(), H=(), D=(), limits=(), bias=(), held=()):
         self.n, self.N, self.T, self.mu = len(M), N, T, mu
         self.M, self.f = np.asarray(M, float), np.asarray(force, float)
-        rows, contact, normal, friction, who = [], [], [], [], []
+        rows, contact, friction, who = [], [], [], []
         for h in H:
-            rows.append(h), contact.append(-1), normal.append(0), friction.append(-1)
+            rows.append(h), contact.append(-1), friction.append(-1)
         self.places = []
         for c, row in enumerate(N):
             self.places.append(len(rows))
-            rows.append(row), contact.append(c), normal.append(1), friction.append(-1)
+            rows.append(row), contact.append(c), friction.append(-1)
             if mu[c] is None or mu[c] > 0.0:
-                rows.append(T[c]), contact.append(c), normal.append(0)
+                rows.append(T[c]), contact.append(c)
                 friction.append(-1 if mu[c] is None else len(who))
                 who += [] if mu[c] is None else [(len(rows) - 1, c, float(mu[c]))]
         for d, limit in zip(D, limits, strict=True):
-            rows.append(d), contact.append(-1), normal.append(0), friction.append(len(who))
+            rows.append(d), contact.append(-1), friction.append(len(who))
             who.append((len(rows) - 1, -1, float(limit)))
         self.B, self.who, self.contacts = np.array(rows, float).reshape(len(rows), self.n), who, len(N)
         self.bias = np.resize(np.asarray(bias if len(bias) else [0.0], float), len(rows))
-        self.K = self._kernel(contact, normal, friction)
+        self._kernel(contact, friction)
         for c in held:
             self.K.free[c] = 0
 
-    def _kernel(self, contact, normal, friction):
+    def _kernel(self, contact, friction):
         n, rows, contacts, frictions = self.n, len(self.B), self.contacts, len(self.who)
         size, most = n + rows, 64
         values = dict.fromkeys(TABLE.integers, 0) | dict.fromkeys(TABLE.reals, 0.0)
         values |= {name: np.zeros(most * most) for name in TABLE.real_arrays}
         values |= {name: np.zeros(most * most, dtype=np.int64) for name in TABLE.integer_arrays}
         values |= {"n_v": n, "n": n, "n_rows": rows, "n_contacts": contacts, "n_frictions": frictions}
-        values |= {"o_lam": 0, "o_slip": rows, "code": [self.evaluate], "hooks": None}
+        values |= {"code": [self.evaluate], "hooks": None}
         values["cone_work"] = np.zeros(cone_places(max(rows, 1)))
         values["kkt"], values["scale"] = np.zeros(size * size), np.ones(most * most)
-        K = Kernel(**values)
+        K = self.K = Kernel(**values)
         K.leader[:], K.group_size[:] = np.arange(len(K.leader)), 1
-        K.row_contact[:rows], K.row_normal[:rows], K.row_friction[:rows] = contact, normal, friction
+        K.row_contact[:rows], K.row_friction[:rows] = contact, friction
         K.normal[:contacts] = self.places
         for f, (row, c, _) in enumerate(self.who):
             K.friction_row[f], K.friction_contact[f], K.loose[f], K.sticks[f] = row, c, 1, 1
         K.active[:contacts] = K.free[:contacts] = 1
         K.code[0](K.block, K.params, K.acc)
-        return K
 
     def limit(self, f, lam):
         _, c, size = self.who[f]
         return size if c < 0 else -size * lam[self.places[c]]
 
     def evaluate(self, block, _params, out):
-        rows, lam, slip = len(self.B), block[: len(self.B)], block[len(self.B) :]
+        rows, lam, slip = len(self.B), block[self.K.o_lam :], block[self.K.o_slip :]
         R, force = self.B.T.copy(), self.f.copy()
         for f, (row, c, size) in enumerate(self.who):
             if c >= 0:

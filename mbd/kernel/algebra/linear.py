@@ -10,7 +10,7 @@ from mbd.kernel.records import Integers, Reals
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = [
-    "eliminate", "factor", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes",
+    "eliminate", "factor", "largest_entry", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes",
 ]  # fmt: skip
 
 PIVOT_RTOL = 1e-12

@@ -131,7 +131,6 @@ class ActiveSetManager:
             "leader": [min(friction.group, default=f) for f, friction in enumerate(self.frictions)],
             "group_size": [max(len(friction.group), 1) for friction in self.frictions],
             "row_trivial": [int(k in self.trivial) for k in range(len(self._row_contact))],
-            "row_normal": [int(k in normals) for k in range(len(self._row_contact))],
             "kind": [int(contact.kind == "penalty") for contact in self.contacts],
             "opens": [opens[contact.opens_on] for contact in self.contacts],
             "normal": normals, "when_start": starts, "when_target": targets, "when_after": afters,

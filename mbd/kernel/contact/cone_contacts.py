@@ -52,7 +52,7 @@ def solve_cones(K: Balance, level: int, allowed: float) -> int:
         fill_cones(K, held, count)
         cone_solve(
             K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
-            K.cone_work, K.cone_pivot,
+            K.cone_work, K.side_pivots,
         )  # fmt: skip
         residual = K.cone_work[0]
         if residual <= allowed and take_impulses(K, level, count):
@@ -97,7 +97,7 @@ def gather_unknowns(K: ContactForces) -> int:
     for row in range(K.n_rows):
         c = K.row_contact[row]
         f = K.row_friction[row]
-        if c >= 0 and (K.cone_normal[c] < 0 or K.row_normal[row] == 1):
+        if c >= 0 and (K.cone_normal[c] < 0 or K.normal[c] == row):
             continue
         chooses = f >= 0 and K.loose[f] > 0
         stuck = c >= 0 and K.free[c] != 2 and (f < 0 or (K.sticks[f] == 1 and K.loose[f] == 0))

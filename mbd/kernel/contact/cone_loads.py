@@ -54,8 +54,8 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
     sigma = find_brink(K, spans, discs)
     for row in range(K.n_rows):
         K.lam_at_limit[row] = lam[row] + scale * freed(K, row, spans)
-    if sigma < -SLACK_ATOL:
-        find_nearest(K, spans, discs)
+    if sigma < -SLACK_ATOL:  # the smallest freedoms within all discs, from those
+        minimize_within_discs(K, spans, discs, True)
     for row in range(K.n_rows):
         lam[row] += scale * freed(K, row, spans)
 
@@ -97,7 +97,8 @@ def find_freedoms(K: Balance, pushes_stay: bool) -> int:
         if turn == 0 and not pushes_stay:
             continue
         for row in range(K.n_rows):
-            wanted = K.row_normal[row] == 1 if turn == 0 else limits_row(K, row)
+            c = K.row_contact[row]
+            wanted = (c >= 0 and K.normal[c] == row) if turn == 0 else limits_row(K, row)
             if not wanted or found >= count:
                 continue
             o = found * width
@@ -221,25 +222,13 @@ def find_rises(K: ContactForces, lam: Reals, spans: int) -> None:
 def find_brink(K: Complementarity, spans: int, discs: int) -> float:
     """The least σ, with its freedoms in K.disc_y."""
     width = K.n_disc_unknowns
-    for j in range(spans + 1):
-        K.disc_y[j] = K.disc_cost[j] = 0.0
-        for k in range(spans + 1):
-            K.disc_quad[j * width + k] = 0.0
-    K.disc_cost[spans] = 1.0
+    K.disc_y[:spans] = 0.0
     far = 0.0
     for i in range(discs):
         K.disc_map[(DISC_SIZE * i + 3) * width + spans] = K.disc_weight[i]
         far = max(far, (disc_length(K, i, spans) - K.disc_at[DISC_SIZE * i + 3]) / K.disc_weight[i])
     K.disc_y[spans] = far + 1.0
-    minimize_within_discs(K, spans + 1, discs)
+    minimize_within_discs(K, spans + 1, discs, False)
     for i in range(discs):
         K.disc_map[(DISC_SIZE * i + 3) * width + spans] = 0.0
     return float(K.disc_y[spans])
-
-
-def find_nearest(K: Complementarity, spans: int, discs: int) -> None:
-    """The smallest freedoms within all discs, from those in K.disc_y."""
-    for j in range(spans):
-        K.disc_cost[j] = 0.0
-        K.disc_quad[j * K.n_disc_unknowns + j] = 1.0
-    minimize_within_discs(K, spans, discs)

@@ -258,7 +258,7 @@ def take_turns(K: Balance) -> int:
     K.own_columns[:islands] = 0
     for k in range(m):
         c = K.row_contact[K.rows[k]]
-        if c >= 0 and K.turn[c] == 0 and K.row_normal[K.rows[k]] == 1:
+        if c >= 0 and K.turn[c] == 0 and K.normal[c] == K.rows[k]:
             island = K.island[K.n + k]
             K.turn[c] = K.own_columns[island]
             K.own_columns[island] += 1

@@ -1,6 +1,6 @@
-"""A convex quadratic function over discs, by an interior-point method: how several frictions may share a load.
+"""The smallest y, or the least last number of one, over discs, by an interior-point method: how frictions share a load.
 
-``min ½ yᵀ Q y + cᵀ y``  with  ``‖t_i‖ ≤ ℓ_i``,  t_i (three numbers, in a plane the last 0) and ℓ_i affine in y
+``min ½ ‖y‖²`` or ``min y_n``  with  ``‖t_i‖ ≤ ℓ_i``,  t_i (three numbers, in a plane the last 0) and ℓ_i affine in y
 
 in the smooth form ``g_i = ‖t_i‖²/ℓ_i − ℓ_i ≤ 0``, which is convex; multipliers κ_i ≥ 0. Newton's method on the
 conditions of optimality with κ_i (−g_i) = τ, τ → 0 (Boyd & Vandenberghe 2004, Convex Optimization,
@@ -51,7 +51,7 @@ def disc_slack(K: Complementarity, i: int, unknowns: int) -> float:
 
 
 def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
-    """g_i′ into K.disc_slope, and what κ_i g_i″ and κ_i/s_i g_i′ g_i′ᵀ bring into the matrix K.disc_kkt."""
+    """g_i′ into K.disc_slope, and what κ_i g_i″ and κ_i/s_i g_i′ g_i′ᵀ bring into K.side_matrix."""
     width = K.n_disc_unknowns
     limit = disc_value(K, DISC_SIZE * i + 3, unknowns)
     x = disc_value(K, DISC_SIZE * i, unknowns) / limit
@@ -74,7 +74,7 @@ def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
         if first == 0.0 and second == 0.0 and third == 0.0 and slope == 0.0:
             continue
         for k in range(unknowns):
-            K.disc_kkt[j * unknowns + k] += (
+            K.side_matrix[j * unknowns + k] += (
                 steep * slope * K.disc_slope[i * width + k]
                 + bend * first * (K.disc_map[o + k] - x * K.disc_map[o_l + k])
                 + bend * second * (K.disc_map[o + width + k] - y * K.disc_map[o_l + k])
@@ -82,24 +82,25 @@ def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
             )
 
 
-def find_step(K: Complementarity, unknowns: int, discs: int, target: float) -> int:
+def find_step(K: Complementarity, unknowns: int, discs: int, smallest: bool, target: float) -> int:
     """The step of Newton's method, of y into K.disc_step and of κ into K.disc_change; 1 if there is none."""
     width = K.n_disc_unknowns
-    for j in range(unknowns):
-        for k in range(unknowns):
-            K.disc_kkt[j * unknowns + k] = K.disc_quad[j * width + k]
+    K.side_matrix[: unknowns * unknowns] = 0.0
+    if smallest:
+        for j in range(unknowns):
+            K.side_matrix[j * unknowns + j] = 1.0
     for i in range(discs):
         find_slopes(K, i, unknowns)
     for j in range(unknowns):
-        value = K.disc_cost[j]
-        for k in range(unknowns):
-            value += K.disc_quad[j * width + k] * K.disc_y[k]
+        value = 1.0 if j == unknowns - 1 else 0.0
+        if smallest:
+            value = K.disc_y[j]
         for i in range(discs):
             value += target / K.disc_left[i] * K.disc_slope[i * width + j]
         K.disc_step[j] = -value
-    if factor(K.disc_kkt, unknowns, K.disc_pivots) != 0:
+    if factor(K.side_matrix, unknowns, K.side_pivots) != 0:
         return 1
-    solve(K.disc_kkt, unknowns, K.disc_pivots, K.disc_step)
+    solve(K.side_matrix, unknowns, K.side_pivots, K.disc_step)
     for i in range(discs):
         along = 0.0
         for j in range(unknowns):
@@ -135,8 +136,11 @@ def take_part(K: Complementarity, unknowns: int, discs: int) -> float:
     return 0.0
 
 
-def minimize_within_discs(K: Complementarity, unknowns: int, discs: int) -> int:
-    """y of least value in K.disc_y, from one that is inside all discs there; κ in K.disc_force; 1 if it is outside."""
+def minimize_within_discs(K: Complementarity, unknowns: int, discs: int, smallest: bool) -> int:
+    """The `smallest` y, or the one whose last number is least, in K.disc_y, from one inside all discs there.
+
+    κ in K.disc_force; 1 if the first y is outside.
+    """
     for i in range(discs):
         K.disc_left[i] = disc_slack(K, i, unknowns)
         if not K.disc_left[i] > 0.0:
@@ -147,7 +151,7 @@ def minimize_within_discs(K: Complementarity, unknowns: int, discs: int) -> int:
         gap = 0.0
         for i in range(discs):
             gap += K.disc_force[i] * K.disc_left[i] / discs
-        if find_step(K, unknowns, discs, GAP_REDUCTION * gap) != 0:
+        if find_step(K, unknowns, discs, smallest, GAP_REDUCTION * gap) != 0:
             return 0
         part = take_part(K, unknowns, discs)
         size = 0.0

@@ -18,6 +18,7 @@ from __future__ import annotations
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CONFLICT, ENERGY_GAIN, NO_IMPACT, PULL
 from mbd.kernel.contact.impact_solve import (
+    ENERGY_GAIN_RTOL,
     energy_gain,
     gather,
     let_rebound,
@@ -35,8 +36,6 @@ __all__ = ["impact"]
 
 MAX_IMPACTS = 1000
 """Impacts of the sequential law at one instant [-]."""
-ENERGY_GAIN_RTOL = 1e-12
-"""Energy that impulses add, relative to its terms, above which a law is given up: restitution that sticks can [-]."""
 APPROACH_RTOL = 1e-11
 """Approach speed, relative to the fastest, that counts as none [-]."""
 
@@ -118,7 +117,7 @@ def newton_law(K: Switching, slow: bool, held: bool) -> int:
         c = K.row_contact[k]
         K.given[k] = 0.0
         K.bias[k] = row_speed(K, k)
-        if c >= 0 and K.closing[c] > 0 and not slow and K.row_normal[k] == 1:
+        if c >= 0 and K.closing[c] > 0 and not slow and K.normal[c] == k:
             K.bias[k] += restitution_of(K, c) * (K.before[c] if K.strategy == 1 else K.bias[k])
     status = solve_impact(K)
     if status == 0 and not slow:
@@ -247,7 +246,7 @@ def sequential_law(K: Switching) -> int:
             c = K.row_contact[k]
             K.given[k] = 0.0
             K.bias[k] = speed(K, k)
-            if c >= 0 and K.free[c] == 1 and K.row_normal[k] == 1:
+            if c >= 0 and K.free[c] == 1 and K.normal[c] == k:
                 K.bias[k] *= 1.0 + K.restitution[c]
         status = solve_impact(K)
         if status != 0:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import LOG_OPENED, LOG_STUCK, NO_FORCE
 from mbd.kernel.contact.contact_log import ALL_IMPULSES, NO_IMPULSE, log_event
-from mbd.kernel.contact.impact_solve import energy_gain, gather, prepare, solve_impact, start_over
+from mbd.kernel.contact.impact_solve import ENERGY_GAIN_RTOL, energy_gain, gather, prepare, solve_impact, start_over
 from mbd.kernel.records import ContactForces, Switching
 from mbd.kernel.stepping.restart import row_speed
 
@@ -22,8 +22,6 @@ APPROACH_REDUCTION = 0.1
 """The approach that follows, over the one before, until there is none [-]."""
 MAX_REDUCTIONS = 4
 """Approaches before there is none [-]."""
-ENERGY_GAIN_RTOL = 1e-12
-"""Energy that impulses add, relative to its terms, above which they are none [-]."""
 
 
 def stop_slide(K: Switching, c: int) -> int:
@@ -37,7 +35,7 @@ def stop_slide(K: Switching, c: int) -> int:
     slide = 0.0
     for k in range(K.n_rows):
         K.given[k] = 0.0
-        if K.row_contact[k] == c and K.row_normal[k] == 0:
+        if K.row_contact[k] == c and K.normal[c] != k:
             slide += abs(row_speed(K, k))
     # the branches of a slow approach, then the impulses that these give without it
     status = 0
@@ -46,7 +44,8 @@ def stop_slide(K: Switching, c: int) -> int:
         start_over(K)
         for k in range(K.n_rows):
             K.bias[k] = row_speed(K, k)
-            if K.row_normal[k] == 1 and K.active[K.row_contact[k]] == 1:
+            other = K.row_contact[k]
+            if other >= 0 and K.normal[other] == k and K.active[other] == 1:
                 K.bias[k] -= approach * slide
         if status == 0:
             status = solve_impact(K)

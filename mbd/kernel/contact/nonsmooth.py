@@ -14,6 +14,7 @@ beyond its limit, let go before it, and the step is taken again.
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.linear import largest_entry
 from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import follows
@@ -115,7 +116,7 @@ def project_gaps(K: Switching) -> int:
         K.loose[f] = 0
     for k in range(K.n_rows):  # those that depend on others, and along a surface that is only being reached
         c = K.row_contact[k]
-        along = c >= 0 and K.row_normal[k] == 0 and K.closed[c] == 0
+        along = c >= 0 and K.normal[c] != k and K.closed[c] == 0
         K.lifting[k] = 1 if (along or K.dropped[k] == 1) else 0
     status = NO_IMPACT
     left = 0.0
@@ -139,7 +140,7 @@ def project_gaps(K: Switching) -> int:
         for c in range(K.n_contacts):
             if K.kind[c] == 0 and K.armed[c] == 1 and K.closed[c] == 0 and is_watched(K, c, K.guards0):
                 left = max(left, -K.guards0[c] / gap_tolerance(K, c))
-        if left <= 1.0 and K.correction_size <= 1e-12:
+        if left <= 1.0 and largest_entry(K.jump, 0, K.n_v) <= 1e-12:
             break
     K.slip[: K.n_frictions] = K.base_limit[: K.n_frictions]
     K.lifting[: K.n_rows] = 0
@@ -149,7 +150,7 @@ def project_gaps(K: Switching) -> int:
 
 
 def project_gaps_once(K: Balance) -> int:
-    """One Newton step of `project_gaps`; the size of the correction relative to 1 is left in K.correction_size."""
+    """One Newton step of `project_gaps`; the correction relative to 1 is left in K.jump."""
     n = K.n
     evaluate(K, K.time, K.q, K.y)
     K.force[:n] = 0.0
@@ -159,14 +160,10 @@ def project_gaps_once(K: Balance) -> int:
     status = complementarity(K, 2)
     if status == CONFLICT and touches(K):
         K.impulse[: K.n_rows] = 0.0
-        K.correction_size = 0.0
+        K.jump[:n] = 0.0
         return 0
     if status != 0:
         return status
-    moved = 0.0
-    for i in range(K.n_v):
-        moved = max(moved, abs(K.jump[i]))
-    K.correction_size = moved
     displace(K, K.q, K.jump)
     return 0
 

@@ -186,7 +186,7 @@ def is_quiet(K: Guards) -> bool:
 
 
 def judge(K: Switching, h: float) -> bool:
-    """Whether a guard fired between the accepted state and the candidate; the earliest in K.fired, K.pick."""
+    """Whether a guard fired between the accepted state and the candidate; the earliest in K.event_kind and so on."""
     K.event_kind = -1
     K.event_place = 2.0
     for c in range(K.n_contacts):

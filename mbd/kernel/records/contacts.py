@@ -43,7 +43,6 @@ class Contacts(SchemeAbilities):
     largest_rate: Reals = reals(lambda s: s.n_contacts, kept=True)  # in the present window of steps
     contact_steps: Reals = reals(lambda s: s.n_contacts, kept=True)
     least_contact_step: Reals = reals(lambda s: s.n_contacts, kept=True)  # ever
-    correction_size: float = place("detail")  # of the last correction of positions by contacts
     plastic_impact: int = place("state")  # 1: without restitution
 
 
@@ -103,14 +102,12 @@ class Events(SchemeAbilities):
     crossed: Reals = reals(lambda s: s.n_guards)  # from the start of the step to an event without a restart, or < 0
     doubt: Reals = reals(lambda s: 2 * s.n_watched + 2 * s.n)  # guards, then round-off of positions and velocities
     inside: Reals = reals(lambda s: 2 * s.n_watched + 2 * s.n_rows + s.n_q + 2 * s.n)  # what substeps began from
-    pick: Reals = reals()  # the event that fired first
-    event_place: float = place("pick")  # its estimated distance, part of the step
-    event_low: float = place("pick")  # the lower end of its bracket
-    changes_little: float = place("pick")  # 1: rates of the candidate change so little that it needs no other look
-    event_after: float = place("pick")  # its distance from the start of the step [s]
-    fired: Integers = integers()
-    event_kind: int = place("fired")  # −1: none
-    event_index: int = place("fired")
+    event_place: float = place("detail")  # estimated distance of the event that fired first, part of the step
+    event_low: float = place("detail")  # the lower end of its bracket
+    changes_little: float = place("detail")  # 1: rates of the candidate change so little that it needs no other look
+    event_after: float = place("detail")  # its distance from the start of the step [s]
+    event_kind: int = place("state")  # −1: none
+    event_index: int = place("state")
     seen: Reals = reals(  # who was closed, stuck, … at an earlier switch of this instant, and the state
         lambda s: 1 + 2 * s.n_contacts + 2 * s.n_frictions + s.n_guards + s.n_q + s.n, kept=True
     )

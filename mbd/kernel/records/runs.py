@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.records.declare import Integers, Reals, integers, place, reals
+from mbd.kernel.records.declare import Integers, Reals, formula, integers, place, reals
 from mbd.kernel.records.settings import SchemeAbilities
 
 __all__ = ["Runs"]
@@ -26,14 +26,10 @@ class Runs(SchemeAbilities):
     run: int = place("limits")  # the present one
     n_runs: int = place("limits")
     begun: int = place("limits")  # 1: it has begun
-    own_parameters: int = place("limits")  # 1: each run has its own
-    n_parameters: int = place("limits")
+    n_parameters: int = place("limits")  # that each run has of its own
     n_whole_reals: int = place("limits")
     n_whole_integers: int = place("limits")
     n_counts: int = place("limits")
-    n_block: int = place("limits")
-    start_width: int = place("limits")
-    end_width: int = place("limits")
     most_lines: int = place("limits")  # of the log that are kept of each run
     n_lines: int = place("limits")  # that were
     n_seen: int = place("limits")  # events of the present run
@@ -53,3 +49,7 @@ class Runs(SchemeAbilities):
     resets: Integers = integers(lambda s: s.n_guards)  # 1: what resets the state after this event comes after the run
     closed_now: Integers = integers(lambda s: s.n_contacts)  # after the events seen so far
     closed_before: Integers = integers(lambda s: s.n_contacts)  # before those of the last instant among them
+
+    start_width: int = formula(lambda s: 1 + s.n_q + s.n + s.n_anchors + 2 * s.n_contacts)  # of a line of `starts`
+    end_row: int = formula(lambda s: 7)  # where the row of results begins in one of `ends`
+    end_width: int = formula(lambda s: s.end_row + s.width + 2 * s.n_contacts + s.n_anchors)

@@ -8,7 +8,7 @@ __all__ = ["SchemeAbilities", "Settings", "Sizes"]
 
 
 class Sizes(Record):
-    """How many of everything, and where inputs begin in the block."""
+    """How many of everything, and where inputs begin in the block, which `mbd.compile.layout` explains."""
 
     n_q: int
     n_v: int
@@ -21,20 +21,21 @@ class Sizes(Record):
     n_machines: int  # discrete states with transitions
     n_impulses: int  # of the user, as contacts close
     n_cones: int  # groups of frictions that slide together, those of contacts in space and of ball joints
-    o_q: int  # offsets into the block
-    o_x: int
-    o_v: int
-    o_a: int
-    o_lam: int
-    o_anchor: int
-    o_switch: int
-    o_slip: int
-    n_watched: int  # guard values in all
-    width: int  # of a stored row
+    n_modes: int  # known ones
     capacity: int  # stored rows
-    event_width: int
     event_capacity: int
 
+    o_q: int = formula(lambda s: 3)  # where inputs begin in the block, behind t and two coefficients of the scheme
+    o_x: int = formula(lambda s: 3 + s.n_q)
+    o_v: int = formula(lambda s: s.o_x + s.n_v)
+    o_a: int = formula(lambda s: s.o_v + s.n)
+    o_lam: int = formula(lambda s: s.o_a + s.n)
+    o_anchor: int = formula(lambda s: s.o_lam + s.n_rows)
+    o_switch: int = formula(lambda s: s.o_anchor + s.n_anchors)
+    o_slip: int = formula(lambda s: s.o_switch + s.n_contacts)
+    n_block: int = formula(lambda s: s.o_slip + s.n_frictions + s.n_v)  # numbers of it, the predicted shift among them
+    width: int = formula(lambda s: 1 + s.n_q + 2 * s.n + s.n_rows + s.n_contacts + s.n_frictions)  # of a stored row
+    event_width: int = formula(lambda s: 5 + s.n_rows)  # of a line of the log
     n_kkt: int = formula(lambda s: s.n + s.n_rows)  # unknowns of balance and rows together
     n_unknowns: int = formula(lambda s: s.n_rows * (s.n_contacts + s.n_frictions > 0))  # of a problem over cones
     n_discs: int = formula(
@@ -70,6 +71,7 @@ class Sizes(Record):
     at_slip_rate: int = formula(lambda s: s.at_slip + s.n_frictions)
     at_limit: int = formula(lambda s: s.at_slip + 2 * s.n_frictions)  # largest frictions
     at_allowed: int = formula(lambda s: s.at_limit + s.n_frictions)  # conditions of transitions, of machines
+    n_watched: int = formula(lambda s: s.at_allowed + min(s.n_machines, 1) * s.n_guards)  # guard values in all
     n_marks: int = formula(lambda s: 2 * s.n_contacts + 2 * s.n_guards)  # of what may happen at an instant
     flag_user: int = formula(lambda s: s.n_contacts)  # where guards of the user begin among flags, behind contacts
     flag_friction: int = formula(lambda s: s.n_contacts + s.n_guards)  # frictions
@@ -90,7 +92,6 @@ class Settings(Sizes):
     strategy: int  # 0 located events, 1 non-smooth steps
     auto: int  # 1: non-smooth steps follow where located impacts crowd
     impact_law: int  # 0 Newton, 1 Poisson, 2 sequential
-    n_judged: int  # unilateral contacts that open where they pull, and frictions
     loads_act: int  # 1 where forces follow multipliers: smooth friction of contacts by rows, laws that read them
     loaded: int  # forces follow multipliers other than linearly: 1 pins and laws, 2 friction not at all where one pulls
     adaptive: int  # 1: steps follow the estimated error, 0: they are all dt

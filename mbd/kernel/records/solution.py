@@ -39,11 +39,11 @@ class Complementarity(SchemeAbilities):
     past_time: float = place("detail")  # that they cover
     n_repeats: int = place("state")  # of a non-smooth step
     cone_who: Integers = integers(lambda s: s.n_frictions)  # of each unknown angle, the group whose direction it turns
-    cone_pivots: Integers = integers(lambda s: s.n_frictions)
+    side_matrix: Reals = reals(lambda s: max(s.n_frictions, s.n_disc_unknowns) ** 2)  # of small systems beside `kkt`
+    side_pivots: Integers = integers(lambda s: max(s.n_unknowns, s.n_frictions, s.n_disc_unknowns))
     cone_across: Reals = reals(lambda s: 3 * s.n_frictions)  # of each, the vector along which it turns
     cone_miss: Reals = reals(lambda s: s.n_frictions)  # of each, part of γ across the direction
     cone_turn: Reals = reals(lambda s: s.n_frictions)  # by which it turns [rad]
-    cone_slope: Reals = reals(lambda s: s.n_frictions * s.n_frictions)
     cone_kept: Reals = reals(lambda s: s.n_frictions)  # cosines before a turn
     cone_residual: float = place("detail")  # the largest of problems over cones, of their largest impulses
     cone_matrix: Reals = reals(lambda s: s.n_unknowns * s.n_unknowns)  # of problems over cones
@@ -55,7 +55,6 @@ class Complementarity(SchemeAbilities):
     cone_rows: Integers = integers(lambda s: s.n_unknowns)
     cone_owner: Integers = integers(lambda s: s.n_unknowns)
     cone_twin: Integers = integers(lambda s: s.n_unknowns)
-    cone_pivot: Integers = integers(lambda s: s.n_unknowns)
     cone_normal: Integers = integers(lambda s: s.n_contacts)  # its number among the unknowns, −1 for none
     cone_flags: Integers = integers(lambda s: 2 * s.n_contacts + s.n_frictions)  # branches before such a problem
     cone_dropped: Integers = integers(lambda s: s.n_unknowns)  # dependent rows before it
@@ -71,13 +70,9 @@ class Complementarity(SchemeAbilities):
     disc_map: Reals = reals(lambda s: 4 * s.n_discs * s.n_disc_unknowns)  # three t_i and ℓ_i of each disc
     disc_at: Reals = reals(lambda s: 4 * s.n_discs)
     disc_weight: Reals = reals(lambda s: s.n_discs)
-    disc_quad: Reals = reals(lambda s: s.n_disc_unknowns * s.n_disc_unknowns)  # Q and c of what is minimized
-    disc_cost: Reals = reals(lambda s: s.n_disc_unknowns)
     disc_y: Reals = reals(lambda s: s.n_disc_unknowns)
     disc_kept: Reals = reals(lambda s: s.n_disc_unknowns)  # before a step
     disc_step: Reals = reals(lambda s: s.n_disc_unknowns)
-    disc_kkt: Reals = reals(lambda s: s.n_disc_unknowns * s.n_disc_unknowns)
-    disc_pivots: Integers = integers(lambda s: s.n_disc_unknowns)
     disc_slope: Reals = reals(lambda s: s.n_discs * s.n_disc_unknowns)
     disc_left: Reals = reals(lambda s: s.n_discs)  # −g_i
     disc_force: Reals = reals(lambda s: s.n_discs)  # κ_i

@@ -21,7 +21,7 @@ class Model(SchemeAbilities):
 
     code: Sequence[Any]  # functions: see the numbers in `mbd.kernel.codes`; those of modes follow
     params: Reals = reals()
-    block: Reals = reals()
+    block: Reals = reals(lambda s: s.n_block)
     block_time: float = place("block")
     block_c_C: float = place("block")
     block_c_K: float = place("block")
@@ -34,7 +34,6 @@ class Model(SchemeAbilities):
     blur: float = place("blurs")  # part of the forces up to which friction in a plane is known in a step
     typical: Reals = reals(lambda s: s.n)  # of velocities or accelerations without rows
     row_contact: Integers = integers()  # contact of each row
-    row_normal: Integers = integers()  # 1 for the normal row of a contact
     row_trivial: Integers = integers()  # 1: a row that holds whatever the motion, and never acts
     row_level: Integers = integers()  # of each row: 0 holds positions, 1 velocities only
     row_friction: Integers = integers()  # friction of each row that holds only while it sticks, −1 otherwise
@@ -44,10 +43,8 @@ class Model(SchemeAbilities):
     chart: Reals = reals()  # what programs of charts are called with
     chart_end: Reals = reals(lambda s: 3 * s.n_v)  # x, ẋ and ẍ of the candidate in the chart of the step
     chart_motion: Reals = reals(lambda s: 2 * s.n_v)  # v and v̇ of the interpolant
-    n_modes: int = place("mode_count")
     mode_key: Integers = integers(lambda s: MODE_CAPACITY * (s.n_contacts + s.n_rows + s.n_frictions))  # known modes
     mode_code: Integers = integers(lambda s: PROGRAMS * MODE_CAPACITY)
-    mode_count: Integers = integers()
     mode_order: Integers = integers(lambda s: MODE_CAPACITY)  # where the order of elimination begins, 0 for none
     orders: Integers = integers(lambda s: 1)  # all of them
     mode_id: int = place("state")  # the present mode, −1: not known yet

@@ -10,7 +10,7 @@ from mbd.kernel.codes import NOT_FINITE, SINGULAR
 from mbd.kernel.hooks import call_on
 from mbd.kernel.records import Balance
 from mbd.kernel.stepping.free_rates import NOT_CLEAR, free_rates
-from mbd.kernel.stepping.mass_ratios import CORRECTED_PIVOT_RTOL, polish_rates, polish_with_rows
+from mbd.kernel.stepping.mass_ratios import polish_rates, polish_with_rows
 from mbd.kernel.stepping.restart import consistent, evaluate
 
 __all__ = ["explicit_rates", "rates_at_end"]
@@ -40,13 +40,13 @@ def explicit_rates(K: Balance, t: float) -> int:
             K.jump[i] = -K.acc[K.acc_f + i]
         kept = solve_definite(K.acc, n, K.jump, K.spare)
         if K.vector == 0:
-            if kept >= CORRECTED_PIVOT_RTOL:
+            if kept >= DIRECT_PIVOT_RTOL:
                 note_pull(K)
             else:
                 K.stage_pull = 1e300
         if kept == 0.0:
             return consistent(K, t, K.q1, K.y1)
-        if kept < CORRECTED_PIVOT_RTOL:
+        if kept < DIRECT_PIVOT_RTOL:
             polish_rates(K, kept)
         return 0
     if K.uneven_masses == 0 and solve_straight(K, m):

@@ -62,7 +62,7 @@ __all__ = ["PIVOTS_SEARCHED", "BAD_FACTORS", "solve_step"]
 
 MAX_FIXED_ORDER = 2
 """Tangents of a step that straight-line code may factor: where it takes more, pivots are searched for."""
-PIVOTS_SEARCHED = 3
+PIVOTS_SEARCHED = MAX_FIXED_ORDER + 1
 """More than `MAX_FIXED_ORDER`: counted as the tangents before the first of a step whose pivots are all searched for."""
 BAD_FACTORS = -1
 """Result of `solve_step` where factors in a fixed order led to a correction that is no solution at all."""

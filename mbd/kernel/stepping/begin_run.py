@@ -31,7 +31,7 @@ def begin_run(K: Kernel) -> int:
     return status
 
 
-def judge_start(K: Kernel) -> int:
+def judge_start(K: Switching) -> int:
     """On which sides of contacts and guards the start in the arrays lies; `DOUBTFUL_START` where Python must judge."""
     for i in range(K.n_block):
         K.block[i] = 0.0
@@ -60,8 +60,7 @@ def put_start(K: Kernel) -> None:
     carry(K.fresh_integers, K.whole_integers, 0, K.n_whole_integers, True)
     for i in range(K.n_counts):
         K.counts[i] = 0
-    if K.own_parameters == 1:
-        carry(K.params, K.given_parameters, K.run * K.n_parameters, K.n_parameters, False)
+    carry(K.params, K.given_parameters, K.run * K.n_parameters, K.n_parameters, False)
     o = K.run * K.start_width
     K.time = K.starts[o]
     K.grid_start = K.starts[o]

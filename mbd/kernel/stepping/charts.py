@@ -22,7 +22,7 @@ MIN_TURN = 0.1
 """Way below which a step that fails does so for another reason than how far it turns a joint [rad]."""
 PART_GROWTH = 1.02
 """Growth of the parts from one to the next, after a step has failed for how far it turns a joint [-]."""
-MAX_TURN = 2.356194490192345
+MAX_TURN = 1.5 * QUARTER_TURN
 """Way at the speed with which it ends, above which a step is not accepted: three eighths of a turn [rad]."""
 
 

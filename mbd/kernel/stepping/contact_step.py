@@ -27,7 +27,7 @@ WINDOW_STEPS = 44
 """Short steps, a period, after which it is asked whether the contact rests [-]."""
 REST_RATE_RATIO = 1e-2
 """Share of the gap rate at closing below which, over a window, it does [-]."""
-MAX_SHORT_STEPS = 880
+MAX_SHORT_STEPS = 20 * WINDOW_STEPS
 """Short steps after which those of a contact that goes on vibrating become longer all the same [-]."""
 
 

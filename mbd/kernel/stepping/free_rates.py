@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
 from mbd.kernel.codes import FREE_RATES
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance
-from mbd.kernel.stepping.mass_ratios import CORRECTED_PIVOT_RTOL
 from mbd.kernel.stepping.restart import fill_block
 from mbd.kernel.tangent_rules import is_differentiated
 
@@ -33,7 +33,7 @@ def rates_in_block(K: Balance) -> float:
     n = K.n
     call(K, FREE_RATES, K.spare)
     pull = K.spare[2 * n + 1]
-    if not (K.spare[2 * n] >= CORRECTED_PIVOT_RTOL and abs(pull) < 1e300):
+    if not (K.spare[2 * n] >= DIRECT_PIVOT_RTOL and abs(pull) < 1e300):
         return NOT_CLEAR
     K.jump[:n] = K.spare[n : 2 * n]
     return float(max(pull, 0.0))

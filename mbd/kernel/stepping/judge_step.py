@@ -122,7 +122,7 @@ def passes_events(K: Kernel, h: float) -> bool:
 
 
 def find_event(K: Kernel, h: float, t1: float) -> int:
-    """−1 with the candidate at the first event of the step, which K.fired tells; 0 without one; else a failure.
+    """−1 with the candidate at the first event of the step, which K.event_kind tells; 0 without one; else a failure.
 
     `SLIDES_ON`: the step is to be taken again, shorter, with fewer directions that are held.
     """
@@ -252,7 +252,7 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
         if status != 0:
             return status
     ends = K.n_machines > 0 and event == 0 and is_due(K, t1)
-    pulls = K.n_judged > 0 and not ends and event == 0 and not quiet and has_spurious_reaction(K)
+    pulls = K.n_contacts + K.n_frictions > 0 and not ends and event == 0 and not quiet and has_spurious_reaction(K)
     if pulls and K.n_active > 0 and restart_on_spurious_reaction(K):
         return -1
     add_error(K, h, event < 0)

@@ -15,12 +15,10 @@ from mbd.kernel.stepping.advance import advance
 from mbd.kernel.stepping.begin_run import begin_run
 from mbd.kernel.stepping.candidate import carry
 
-__all__ = ["END_NUMBERS", "march_many"]
+__all__ = ["march_many"]
 
 NEVER = float("inf")
 """When a run ends that is not to end [s]."""
-END_NUMBERS = 7
-"""Numbers of an end before its row: status, flag of the event that ended it, steps, events, sequence, lines, time."""
 
 
 def march_many(K: Kernel) -> int:
@@ -130,8 +128,8 @@ def see_events(K: Kernel) -> None:
 
 
 def note_end(K: Kernel, status: int) -> None:
-    """The line of the run among the ends: `END_NUMBERS`, the row of results, armed contacts, those closed just before
-    the end, and what contacts hold.
+    """The line of the run among the ends: status, flag of the event that ended it, steps, events, sequence, lines and
+    time; then the row of results, armed contacts, those closed just before the end, and what contacts hold.
     """
     o = K.run * K.end_width
     now = K.last_time if status == DONE else K.time
@@ -142,7 +140,7 @@ def note_end(K: Kernel, status: int) -> None:
     K.ends[o + 4] = float(K.sequence)
     K.ends[o + 5] = float(K.n_lines)
     K.ends[o + 6] = now
-    o += END_NUMBERS
+    o += K.end_row
     K.ends[o] = now
     o = carry(K.q, K.ends, o + 1, K.n_q, True)
     o = carry(K.y, K.ends, o, K.n, True)

@@ -10,12 +10,11 @@ the factor that elimination has lost, so one or two suffice. Where nothing is lo
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import solve_again, solve_definite
-from mbd.kernel.algebra.ordered import order_at, solve_kkt
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, NEWTON_PIVOT_RTOL, order_at, solve_kkt
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Equations, Motion
 
 __all__ = [
-    "CORRECTED_PIVOT_RTOL",
     "excuses_much",
     "find_imbalance",
     "has_settled",
@@ -24,13 +23,8 @@ __all__ = [
     "polish_with_rows",
 ]
 
-CORRECTED_PIVOT_RTOL = 1e-4
-"""Part of a diagonal entry that is left as its pivot below which rates are corrected [-]."""
-REPEATED_PIVOT_RTOL = 1e-8
-"""The same below which they are corrected until corrections are small [-]."""
 CORRECTION_RTOL = 1e-9
 """Correction over the largest rate, both as they are, after which none follows [-]."""
-
 RESIDUAL_CORRECTION_RTOL = 1e-8
 """Part of the largest rate that a correction of residuals that pass may change without another look [-]."""
 MAX_FORCE_RATIO = 1e6
@@ -90,7 +84,7 @@ def is_uneven(K: Equations, m: int) -> bool:
             if K.unit[i] == unit and entry > 0.0:
                 big = max(big, entry)
                 least = min(least, 1.0 / K.kkt[i * n + i] if definite else entry)
-        if least < CORRECTED_PIVOT_RTOL * big:
+        if least < DIRECT_PIVOT_RTOL * big:
             return True
     return False
 
@@ -102,7 +96,7 @@ def polish_rates(K: Balance, kept: float) -> None:
     """
     n = K.n
     before = 1e300
-    for _ in range(8 if kept < REPEATED_PIVOT_RTOL else 1):
+    for _ in range(8 if kept < NEWTON_PIVOT_RTOL else 1):
         find_imbalance(K)
         for i in range(n):
             K.rhs[i] = -K.out[i]

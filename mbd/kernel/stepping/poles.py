@@ -11,11 +11,11 @@ step from any other at most; next to an end it has not. In space, without rows, 
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import solve_definite
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
 from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Guards, Switching
 from mbd.kernel.stepping.free_rates import NOT_CLEAR, rates_in_block
-from mbd.kernel.stepping.mass_ratios import CORRECTED_PIVOT_RTOL
 from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.stepping.scales import still_energy
 
@@ -128,7 +128,7 @@ def pull_without_rows(K: Balance, t: float) -> float:
         finite += abs(K.jump[i])
     if not finite < 1e300:
         return NOT_FOUND
-    if solve_definite(K.acc, n, K.jump, K.spare) < CORRECTED_PIVOT_RTOL:
+    if solve_definite(K.acc, n, K.jump, K.spare) < DIRECT_PIVOT_RTOL:
         return NOT_FOUND
     total = 0.0
     for i in range(K.n_v):

@@ -223,7 +223,7 @@ def is_held(K: ContactRows, row: int, flags: Integers) -> bool:
     """
     contact = K.row_contact[row]
     friction = K.row_friction[row]
-    if contact >= 0 and (flags[contact] == 0 or (K.row_normal[row] == 1 and K.parting[contact] == 1)):
+    if contact >= 0 and (flags[contact] == 0 or (K.normal[contact] == row and K.parting[contact] == 1)):
         return False
     if K.lifting[row] == 1 or K.row_trivial[row] == 1:
         return False

@@ -14,11 +14,11 @@ from mbd.equations.equations import Equations
 from mbd.equations.programs import ActiveSet, follows_multipliers, mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
+from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.memory import start_step
-from mbd.kernel.stepping.mass_ratios import CORRECTED_PIVOT_RTOL
 from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, fill_block, refresh_scales, take_consistent
 from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.run.user_calls import call_user
@@ -208,7 +208,7 @@ class MechanismSystem(System):
                 lam[given_rows] = part @ solved[n:]
             if not self.slip.any() or change <= 1e-13 * np.max(np.abs(lam)):
                 break
-        if not self.slip.any() and not any(self.dropped) and _least_pivot(terms.M) < CORRECTED_PIVOT_RTOL:
+        if not self.slip.any() and not any(self.dropped) and _least_pivot(terms.M) < DIRECT_PIVOT_RTOL:
             block = self._block(Point(t, q, np.zeros(self.n_v), y, solved[:n], solved[n:]), rows, penalties)
             active = self._acting(rows, penalties, ())
             out = np.zeros(active.tail(n))

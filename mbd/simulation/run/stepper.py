@@ -107,7 +107,10 @@ class Stepper:
         self.stabilized = integrator.stabilized
         layout = mechanism.layout
         self.kernel = self._sizes(dt, options)
-        if self.stabilized and self.kernel.n_judged > 0 and driving_rows(mechanism.equations):
+        judged = layout.n_frictions > 0 or any(
+            contact.kind != "penalty" and contact.opens_on == "pull" for contact in manager.contacts
+        )
+        if self.stabilized and judged and driving_rows(mechanism.equations):
             self.kernel.driven = 1
         self._arrays(parameters, manager)
         self.kernel.chunk, self.kernel.end = 1, float(options.get("end", 0.0))
@@ -147,7 +150,7 @@ class Stepper:
         self._fresh.restore(v, self.shelves.rooms)
         v.renewed |= set() if self._table is None else self._table.renewed
         del self.functions[len(self.functions) - self._n_of_modes :]
-        self._n_of_modes, self.modes, self.dependent = 0, [], {}
+        self._n_of_modes, self.modes, self.dependent, v.n_modes = 0, [], {}, 0
         v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
         self.system.parameters, v.end, self.resumed_at = v.params, end, float("nan")
         if self._table is not None:
@@ -159,14 +162,10 @@ class Stepper:
         n_contacts, n_guards = layout.n_contacts, len(self.manager.guards)
         K = Kernel(
             n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
-            n_contacts=n_contacts, n_guards=n_guards, o_q=layout.q, o_x=layout.x, o_v=layout.v, o_a=layout.a,
-            o_lam=layout.lam, o_anchor=layout.anchor, o_switch=layout.switch, o_slip=layout.slip,
+            n_contacts=n_contacts, n_guards=n_guards, n_modes=0,
             n_frictions=layout.n_frictions, n_machines=len(self.manager.machines),
             n_impulses=len(self.manager.impulses),
             n_cones=len({f.group for f in self.manager.frictions if f.group}),
-            n_watched=self.mechanism.sizes["guards"],
-            n_judged=layout.n_frictions
-            + sum(contact.kind != "penalty" and contact.opens_on == "pull" for contact in self.manager.contacts),
             loads_act=int(loads_act(self.mechanism.equations)),
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
@@ -174,8 +173,7 @@ class Stepper:
             stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
             max_switches=20 + 4 * (n_contacts + n_guards + layout.n_frictions),
             linear=int(options.get("locate") == "linear"),
-            width=1 + layout.n_q + 2 * layout.n + layout.n_rows + n_contacts + layout.n_frictions,
-            capacity=int(options["capacity"]), stride=int(options.get("store", 1)), event_width=5 + layout.n_rows,
+            capacity=int(options["capacity"]), stride=int(options.get("store", 1)),
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt,
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
@@ -189,10 +187,10 @@ class Stepper:
 
     def _arrays(self, parameters: Vector, manager: ActiveSetManager) -> None:
         v = self.kernel
-        block, tables = self.mechanism.layout.size, manager.tables()
+        block, tables = v.n_block, manager.tables()
         own = memory_lengths(v, self.own)
         given = own | {name: len(table) for name, table in tables.items()}
-        given |= {"block": block, "out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
+        given |= {"out": max(v.n_tangent, block), "acc": self.mechanism.sizes["accelerations"]}
         given["chart"] = 1 if v.vector else max(block, 2 * v.n_q + 2 * v.n_v)
         self.shelves = Shelves(plan_of(v, self._lengths(given)))
         self.reals, self.integers, *_ = self.shelves.rooms
@@ -301,7 +299,7 @@ class Stepper:
 
     def judge_start(self) -> int:
         """Judge the start in the arrays, in compiled code: see `mbd.kernel.stepping.begin_run.judge_start`."""
-        self.kernel.many, self.kernel.n_block = 2, self.mechanism.layout.size
+        self.kernel.many = 2
         try:
             return self._advance_compiled()
         finally:
