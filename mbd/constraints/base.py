@@ -118,6 +118,8 @@ class VelocityConstraint(Constraint):
     of the row on the mechanism.
     """
 
+    kind = "nonholonomic"
+
     @property
     @abstractmethod
     def unit(self) -> str:
@@ -126,11 +128,6 @@ class VelocityConstraint(Constraint):
     @abstractmethod
     def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """(part, a · v + b) of each row, linear in velocities [unit/s]; a single row has the part ''."""
-
-    @property
-    def kind(self) -> str:
-        """'nonholonomic'."""
-        return "nonholonomic"
 
     @property
     def contact(self) -> str | None:

@@ -54,6 +54,8 @@ class Bilateral(Constraint):
     value: Quantity = 0.0
     arguments: Any = ("t",)
 
+    kind = "bilateral"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Bilateral")
         if isinstance(self.subject, Joint):
@@ -76,11 +78,6 @@ class Bilateral(Constraint):
             return JointMeasure(self.subject)
         assert isinstance(self.subject, Measure)  # expressions have become one
         return self.subject
-
-    @property
-    def kind(self) -> str:
-        """'bilateral'."""
-        return "bilateral"
 
     def residual(self, scope: Scope) -> Scalar:
         """h = g − value [m or rad].

@@ -57,6 +57,10 @@ class DiskTouchdown(Measure):
     axis: Vector3
     ground: Plane | Surface = field(default_factory=Plane)
 
+    unit = "m"
+    has_slip_velocities = True
+    has_spin = True
+
     def gap(self, scope: Scope) -> Scalar:
         """n · s_C − r |n × a|."""
         radius = scope.parameter(self.center.full_name, "radius", self.radius)
@@ -66,19 +70,9 @@ class DiskTouchdown(Measure):
         return lift - radius * steepness(self.center, self.axis, self.ground, scope)
 
     @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
-
-    @property
     def undefined(self) -> str:
         """It lies flat, or a height function has no single place of contact."""
         return f"{FLAT_DISK}, or {NO_CONTACT_POINT}" if isinstance(self.ground, Surface) else FLAT_DISK
-
-    @property
-    def has_slip_velocities(self) -> bool:
-        """True."""
-        return True
 
     def slip_velocities(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Forward and sideways on the plane, without the one in which nothing moves (in a planar model sideways)."""
@@ -96,11 +90,6 @@ class DiskTouchdown(Measure):
         radius = scope.parameter(self.center.full_name, "radius", self.radius)
         frame = scope.frame(self.center)
         return edge_on(surface, frame.position, rotate(frame.rotation, self.axis), radius, scope)
-
-    @property
-    def has_spin(self) -> bool:
-        """True."""
-        return True
 
     def spin(self, scope: Scope) -> Scalar:
         """n · (ω − ω_ground)."""

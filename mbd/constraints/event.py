@@ -47,6 +47,10 @@ class Event(Machine):
     direction: int = 0
     on: str | None = None
 
+    state_names = ("waiting",)
+    fields = ("index",)
+    quantity_names = ()
+
     def __post_init__(self) -> None:
         name_of(self.name, "Event")
         if (self.guard is None) == (self.on is None):
@@ -103,24 +107,10 @@ class Event(Machine):
         return [] if self.guard is None else self.guard.faults(self.name)
 
     # the promise of machines, for one that happens with something else ---------------------------------------------
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        """One."""
-        return ("waiting",)
-
-    @property
-    def fields(self) -> tuple[str, ...]:
-        """Its state."""
-        return ("index",)
 
     def initial(self, values: Mapping[str, float]) -> tuple[float, ...]:
         """It waits."""
         return (0.0,)
-
-    @property
-    def quantity_names(self) -> tuple[str, ...]:
-        """None."""
-        return ()
 
     def quantities(self, scope: Scope, held: Sequence[Node]) -> Mapping[str, Scalar]:
         """None."""

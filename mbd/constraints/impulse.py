@@ -74,6 +74,8 @@ class Impulse(Constraint):
     axes: Frame | None = None
     arguments: Any = ("t",)
 
+    kind = "impulse"
+
     def __post_init__(self) -> None:
         put, title = object.__setattr__, f"Impulse '{self.name}'"
         name_of(self.name, "Impulse")
@@ -95,11 +97,6 @@ class Impulse(Constraint):
             raise ModelError(f"order of {title} is 'before', 'with' or 'after' the impact, got {self.order!r}")
         if self.axes is not None and (not isinstance(self.axes, Frame) or isinstance(self.axes.body, PointMass)):
             raise ModelError(f"axes of {title} is a frame of a RigidBody or a Link, got {self.axes!r}")
-
-    @property
-    def kind(self) -> str:
-        """'impulse'."""
-        return "impulse"
 
     def mentions(self) -> list[Mention]:
         """Where it acts, and what its size is called with."""

@@ -36,16 +36,13 @@ class KnifeEdge(VelocityConstraint):
     frame: Frame
     normal: Any = (0.0, 1.0, 0.0)
 
+    unit = "m"
+
     def __post_init__(self) -> None:
         name_of(self.name, "KnifeEdge")
         frame_of(self.frame, f"frame of KnifeEdge '{self.name}'")
         normal: Vector3 = unit_vector(self.normal, f"normal of KnifeEdge '{self.name}'")
         object.__setattr__(self, "normal", normal)
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
 
     def rates(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Velocity across the blade."""

@@ -28,6 +28,8 @@ class JointMeasure(Measure):
     sign: float = 1.0
     offset: float = 0.0
 
+    reaction = "drive"
+
     def gap(self, scope: Scope) -> Scalar:
         """±q − offset."""
         (q,) = scope.joint(self.joint.name).coordinates
@@ -37,11 +39,6 @@ class JointMeasure(Measure):
     def title(self) -> str:
         """'flexion' or 'extension'."""
         return "flexion" if self.sign < 0.0 else "extension"
-
-    @property
-    def reaction(self) -> str:
-        """'drive'."""
-        return "drive"
 
     @property
     def unit(self) -> str:
@@ -83,14 +80,11 @@ class Height(Measure):
 
     point: Frame
 
+    unit = "m"
+
     def gap(self, scope: Scope) -> Scalar:
         """y."""
         return scope.frame(self.point).position[1]
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
 
     def mentions(self) -> list[Mention]:
         """Its point."""
@@ -109,19 +103,12 @@ class Distance(Measure):
     a: Frame
     b: Frame
 
+    unit = "m"
+    reaction = "tension"
+
     def gap(self, scope: Scope) -> Scalar:
         """|p_b − p_a|."""
         return norm(difference(scope.frame(self.b).position, scope.frame(self.a).position))
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
-
-    @property
-    def reaction(self) -> str:
-        """'tension'."""
-        return "tension"
 
     def mentions(self) -> list[Mention]:
         """Its points."""
@@ -145,15 +132,12 @@ class Separation(Measure):
     b: Frame
     direction: Vector3
 
+    unit = "m"
+
     def gap(self, scope: Scope) -> Scalar:
         """d · (p_b − p_a)."""
         a = scope.frame(self.a)
         return dot(rotate(a.rotation, self.direction), difference(scope.frame(self.b).position, a.position))
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
 
     def mentions(self) -> list[Mention]:
         """Its points."""

@@ -80,6 +80,8 @@ class Penalty(Constraint):
     creep: float = CREEP_SPEED
     only_while: str | Measure | None = None
 
+    kind = "penalty"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Penalty")
         object.__setattr__(self, "measure", measure_of(self.measure, f"Penalty '{self.name}'"))
@@ -135,11 +137,6 @@ class Penalty(Constraint):
                 f"one (got {self.effective_mass}), or use law='exact'"
             )
         return found
-
-    @property
-    def kind(self) -> str:
-        """'penalty'."""
-        return "penalty"
 
     @property
     def chi(self) -> float | None:

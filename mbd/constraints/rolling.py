@@ -75,6 +75,8 @@ class Rolling(VelocityConstraint):
     axis: Any = None
     ball: bool = False
 
+    unit = "m"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Rolling")
         frame_of(self.center, f"center of Rolling '{self.name}'")
@@ -108,11 +110,6 @@ class Rolling(VelocityConstraint):
                 f"ground of Rolling '{self.name}': the wheel rolls in the x-y plane, but its frame "
                 f"'{self.ground.frame.full_name}' is tilted out of it; turn the frame about z only"
             )
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
 
     @property
     def contact(self) -> str | None:

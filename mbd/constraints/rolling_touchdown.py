@@ -36,20 +36,13 @@ class RollingSole(Measure):
     word: ClassVar[str]
     ground: Plane
 
+    unit = "m"
+    has_tangents = True
+
     @property
     @abstractmethod
     def foot(self) -> Frame:
         """Its frame."""
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
-
-    @property
-    def has_tangents(self) -> bool:
-        """True."""
-        return True
 
     def mentions(self) -> list[Mention]:
         """Its frame, and that of the plane."""

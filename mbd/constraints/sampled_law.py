@@ -72,6 +72,8 @@ class SampledLaw(Machine):
     resolution: Mapping[str, float] = field(default_factory=dict, hash=False)
     restart_on: Sequence[str] = ()
 
+    reads_before = True  # a sample reads what was before its outputs change
+
     def __post_init__(self) -> None:
         put, title = object.__setattr__, f"SampledLaw '{self.name}'"
         name_of(self.name, "SampledLaw")
@@ -120,11 +122,6 @@ class SampledLaw(Machine):
         for name in (*self.own_outputs, *self.states):
             if name in ("period", "delay", *labels) or (name in self.states and name in self.outputs):
                 yield f"SampledLaw '{self.name}': {name!r} names two things; rename one"
-
-    @property
-    def reads_before(self) -> bool:
-        """Always: a sample reads what was before its outputs change."""
-        return True
 
     # what it holds --------------------------------------------------------------------------------------------------
     @property

@@ -37,6 +37,10 @@ class SphereTouchdown(Measure):
     radius: float
     ground: Plane | Surface | Ball = field(default_factory=Plane)
 
+    unit = "m"
+    has_slip_velocities = True
+    has_spin = True
+
     def gap(self, scope: Scope) -> Scalar:
         """n · s_C − r."""
         p, radius = scope.frame(self.center).position, self._radius(scope)
@@ -45,19 +49,9 @@ class SphereTouchdown(Measure):
         return self.ground.gap(p, scope) - radius
 
     @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
-
-    @property
     def undefined(self) -> str:
         """On a height function: no single place of contact."""
         return NO_CONTACT_POINT if isinstance(self.ground, Surface) else ""
-
-    @property
-    def has_slip_velocities(self) -> bool:
-        """True."""
-        return True
 
     def slip_velocities(self, scope: Scope) -> Sequence[tuple[str, Scalar]]:
         """Forward and sideways, without the one in which nothing moves (in a planar model sideways)."""
@@ -69,11 +63,6 @@ class SphereTouchdown(Measure):
         if isinstance(self.ground, Surface):
             return ball_on(self.ground, p, radius, scope)[1]
         return scaled(-1.0 * radius, self.ground.normal_at(p, scope))
-
-    @property
-    def has_spin(self) -> bool:
-        """True."""
-        return True
 
     def spin(self, scope: Scope) -> Scalar:
         """n · (ω − ω_ground)."""

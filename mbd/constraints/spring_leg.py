@@ -56,6 +56,8 @@ class SpringLeg(Constraint):
     length: float
     touchdown_angle: float
 
+    kind = "penalty"
+
     def __post_init__(self) -> None:
         name_of(self.name, "SpringLeg")
         frame_of(self.hip, f"hip of SpringLeg '{self.name}'")
@@ -68,11 +70,6 @@ class SpringLeg(Constraint):
         ]
         if wrong:
             raise ModelError(wrong)
-
-    @property
-    def kind(self) -> str:
-        """'penalty': it pushes by a force while its foot is on the ground."""
-        return "penalty"
 
     @property
     def undefined(self) -> str:

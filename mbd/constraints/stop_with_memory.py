@@ -29,6 +29,8 @@ class StopWithMemory(Constraint):
 
     NUMBERS: ClassVar[dict[str, Domain]] = {}
 
+    kind = "penalty"
+
     def __post_init__(self) -> None:
         title = type(self).__name__
         name_of(self.name, title)
@@ -39,11 +41,6 @@ class StopWithMemory(Constraint):
                  for fault in domain.faults(f"{title} '{self.name}'", field, getattr(self, field))]  # fmt: skip
         if wrong:
             raise ModelError(wrong)
-
-    @property
-    def kind(self) -> str:
-        """'penalty'."""
-        return "penalty"
 
     def mentions(self) -> list[Mention]:
         """What its measure depends on."""

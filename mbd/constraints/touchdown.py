@@ -30,14 +30,13 @@ class Touchdown(Measure):
     point: Frame
     ground: Plane | Surface = field(default_factory=Plane)
 
+    unit = "m"
+    has_tangents = True
+    has_spin = True
+
     def gap(self, scope: Scope) -> Scalar:
         """Height over the ground."""
         return self.ground.gap(scope.frame(self.point).position, scope)
-
-    @property
-    def unit(self) -> str:
-        """'m'."""
-        return "m"
 
     @property
     def carrier(self) -> Frame | None:
@@ -56,16 +55,6 @@ class Touchdown(Measure):
             f"'{owner}': its point '{self.point.full_name}' and its plane are both on '{self.point.body.name}' and "
             "never move apart; give a point of another body, or the plane another frame"
         ]
-
-    @property
-    def has_tangents(self) -> bool:
-        """True."""
-        return True
-
-    @property
-    def has_spin(self) -> bool:
-        """True, unless its body is a point."""
-        return True
 
     def spin(self, scope: Scope) -> Scalar:
         """n · (ω − ω_ground)."""

@@ -30,15 +30,8 @@ class _OfRotation(Measure):
     limit: float
     axis: Vector3
 
-    @property
-    def unit(self) -> str:
-        """'rad'."""
-        return "rad"
-
-    @property
-    def reaction(self) -> str:
-        """'drive'."""
-        return "drive"
+    unit = "rad"
+    reaction = "drive"
 
     def mentions(self) -> list[Mention]:
         """Its joint."""

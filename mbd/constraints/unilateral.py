@@ -68,6 +68,8 @@ class Unilateral(Constraint):
     only_while: str | Measure | None = None
     spin_friction: float = 0.0
 
+    kind = "unilateral"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Unilateral")
         put = object.__setattr__
@@ -77,11 +79,6 @@ class Unilateral(Constraint):
         put(self, "spin_friction", number(self.spin_friction, f"spin_friction of '{self.name}'"))
         put(self, "release", releases_of(self.release, self.name) or None)
         put(self, "only_while", condition_of(self.only_while, self.name))
-
-    @property
-    def kind(self) -> str:
-        """'unilateral'."""
-        return "unilateral"
 
     @property
     def releases(self) -> tuple[When, ...]:

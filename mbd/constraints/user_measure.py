@@ -27,6 +27,8 @@ class UserMeasure(Measure):
     length_unit: str = "m"
     tangent_functions: tuple[Any, ...] = ()
 
+    title = "measure"
+
     def _value(self, function: Any, scope: Scope) -> Scalar:
         return traced_scalar(function, resolved(self.arguments, scope, "measure"), "user's measure", scope.tape)
 
@@ -35,11 +37,6 @@ class UserMeasure(Measure):
         if isinstance(self.function, str):
             return scope.time if self.function == "t" else scope.named(self.function)
         return self._value(self.function, scope)
-
-    @property
-    def title(self) -> str:
-        """'measure'."""
-        return "measure"
 
     @property
     def unit(self) -> str:

@@ -62,6 +62,9 @@ class Applied(Force):
     axes: Frame | None = None
     by: str | None = None
 
+    kind = "applied"
+    is_external = True
+
     def __post_init__(self) -> None:
         put = object.__setattr__
         name_of(self.name, "Applied")
@@ -81,16 +84,6 @@ class Applied(Force):
                     f"{what}: '{self.axes.body.name}' is a point mass, which has no axes; give a frame of "
                     "a RigidBody or a Link"
                 )
-
-    @property
-    def kind(self) -> str:
-        """'applied'."""
-        return "applied"
-
-    @property
-    def is_external(self) -> bool:
-        """True."""
-        return True
 
     def mentions(self) -> list[Mention]:
         """Its frames, and what its functions are called with."""

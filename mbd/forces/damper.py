@@ -36,6 +36,8 @@ class Damper(Force):
     b: Frame
     loss: float | Loss
 
+    kind = "loss"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Damper")
         frame_of(self.a, f"first end of Damper '{self.name}'")
@@ -49,11 +51,6 @@ class Damper(Force):
         """Its loss."""
         assert isinstance(self.loss, Loss)  # a number has become one
         return self.loss
-
-    @property
-    def kind(self) -> str:
-        """'loss'."""
-        return "loss"
 
     def mentions(self) -> list[Mention]:
         """Its ends."""

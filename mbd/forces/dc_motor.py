@@ -55,6 +55,9 @@ class DCMotor(Force):
     inductance: float = 0.0
     arguments: Any = ("t",)
 
+    kind = "applied"
+    column = "motor"
+
     def __post_init__(self) -> None:
         name_of(self.name, "DCMotor")
         joint_of(self.joint, f"joint of DCMotor '{self.name}'")
@@ -70,16 +73,6 @@ class DCMotor(Force):
         ]
         if wrong:
             raise ModelError(wrong)
-
-    @property
-    def kind(self) -> str:
-        """'applied'."""
-        return "applied"
-
-    @property
-    def column(self) -> str:
-        """'motor'."""
-        return "motor"
 
     def mentions(self) -> list[Mention]:
         """Its joint, and what its voltage is called with."""

@@ -51,6 +51,9 @@ class Motor(Force):
     force: Quantity | Mapping[str, Quantity] | None = None
     by: str | None = None
 
+    kind = "applied"
+    column = "motor"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Motor")
         joint_of(self.joint, f"joint of Motor '{self.name}'")
@@ -76,16 +79,6 @@ class Motor(Force):
     def effort(self) -> Any:
         """The torque or force."""
         return self.torque if self.force is None else self.force
-
-    @property
-    def kind(self) -> str:
-        """'applied'."""
-        return "applied"
-
-    @property
-    def column(self) -> str:
-        """'motor'."""
-        return "motor"
 
     def mentions(self) -> list[Mention]:
         """Its joint, and what its function is called with."""

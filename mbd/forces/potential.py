@@ -31,17 +31,14 @@ class Potential(Force):
     function: Function
     arguments: Any
 
+    kind = "potential"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Potential")
         object.__setattr__(self, "function", quantity_of(self.function, f"function of '{self.name}'"))
         object.__setattr__(self, "arguments", arguments_of(self.arguments, f"Potential '{self.name}'"))
         if not mentioned(self.arguments):
             raise ModelError(f"Potential '{self.name}': say what it depends on, such as arguments=('left hip.angle',)")
-
-    @property
-    def kind(self) -> str:
-        """'potential'."""
-        return "potential"
 
     def mentions(self) -> list[Mention]:
         """What it depends on."""

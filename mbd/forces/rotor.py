@@ -36,6 +36,8 @@ class Rotor(Force):
     inertia: float
     ratio: float = 1.0
 
+    kind = "potential"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Rotor")
         joint_of(self.joint, f"joint of Rotor '{self.name}'")
@@ -44,11 +46,6 @@ class Rotor(Force):
         wrong = self.domains()[f"{self.name}.inertia"].faults(f"Rotor '{self.name}'", "inertia", self.inertia)
         if wrong:
             raise ModelError(wrong)
-
-    @property
-    def kind(self) -> str:
-        """'potential': it keeps its energy."""
-        return "potential"
 
     def mentions(self) -> list[Mention]:
         """Its joint."""

@@ -40,6 +40,8 @@ class Spring(Force):
     length: NumberByMode = 0.0
     by: str | None = None
 
+    kind = "potential"
+
     def __post_init__(self) -> None:
         name_of(self.name, "Spring")
         frame_of(self.a, f"first end of Spring '{self.name}'")
@@ -47,11 +49,6 @@ class Spring(Force):
         object.__setattr__(self, "stiffness", number_by_mode(self.stiffness, self.by, f"stiffness of '{self.name}'"))
         object.__setattr__(self, "length", number_by_mode(self.length, self.by, f"length of '{self.name}'"))
         require_use(self.by, f"Spring '{self.name}'", self.stiffness, self.length)
-
-    @property
-    def kind(self) -> str:
-        """'potential'."""
-        return "potential"
 
     def mentions(self) -> list[Mention]:
         """Its ends."""

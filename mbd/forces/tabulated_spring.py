@@ -37,6 +37,8 @@ class TabulatedSpring(Force):
     angle: tuple[float, ...]
     torque: tuple[float, ...]
 
+    kind = "potential"
+
     def __init__(self, name: str, joint: Joint, angle: Any, torque: Any) -> None:
         put = object.__setattr__
         put(self, "name", name_of(name, "TabulatedSpring"))
@@ -50,11 +52,6 @@ class TabulatedSpring(Force):
             )
         if any(b <= a for a, b in zip(self.angle, self.angle[1:], strict=False)):
             raise ModelError(f"angles of TabulatedSpring '{name}' must increase; sort the table, drop repeated angles")
-
-    @property
-    def kind(self) -> str:
-        """'potential'."""
-        return "potential"
 
     def mentions(self) -> list[Mention]:
         """Its joint."""

@@ -35,17 +35,14 @@ class TorsionSpring(Force):
     rest: NumberByMode = 0.0
     by: str | None = None
 
+    kind = "potential"
+
     def __post_init__(self) -> None:
         name_of(self.name, "TorsionSpring")
         joint_of(self.joint, f"joint of TorsionSpring '{self.name}'")
         object.__setattr__(self, "stiffness", number_by_mode(self.stiffness, self.by, f"stiffness of '{self.name}'"))
         object.__setattr__(self, "rest", number_by_mode(self.rest, self.by, f"rest of '{self.name}'"))
         require_use(self.by, f"TorsionSpring '{self.name}'", self.stiffness, self.rest)
-
-    @property
-    def kind(self) -> str:
-        """'potential'."""
-        return "potential"
 
     def mentions(self) -> list[Mention]:
         """Its joint."""

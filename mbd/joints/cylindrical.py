@@ -37,6 +37,8 @@ class Cylindrical(Joint):
     _: KW_ONLY
     loss: JointLoss = field(default=None, hash=False)
 
+    is_planar = False  # it turns about the direction in which it shifts
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of '{self.name}'"))
         self.validate()
@@ -45,11 +47,6 @@ class Cylindrical(Joint):
     def labels(self) -> tuple[Label, ...]:
         """`angle`, `displacement`."""
         return (Label("angle", "rad"), Label("displacement", "m"))
-
-    @property
-    def is_planar(self) -> bool:
-        """False: it turns about the direction in which it shifts."""
-        return False
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """A turn about the axis and a shift along it."""

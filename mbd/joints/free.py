@@ -37,6 +37,12 @@ class Free(Joint):
     _: KW_ONLY
     loss: JointLoss = field(default=None, hash=False)
 
+    orientation = 3
+    adding = 3
+    is_vector = False
+    is_planar = False
+    defaults = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
     def __post_init__(self) -> None:
         self.validate()
 
@@ -49,31 +55,6 @@ class Free(Joint):
     def velocity_labels(self) -> tuple[Label, ...]:
         """`x.rate`, `y.rate`, `z.rate`, `angular_velocity.x`, `.y`, `.z`."""
         return (*(Label(f"{axis}.rate", "m/s") for axis in "xyz"), *ANGULAR_VELOCITY)
-
-    @property
-    def orientation(self) -> int:
-        """3."""
-        return 3
-
-    @property
-    def adding(self) -> int:
-        """3."""
-        return 3
-
-    @property
-    def is_vector(self) -> bool:
-        """False."""
-        return False
-
-    @property
-    def is_planar(self) -> bool:
-        """False."""
-        return False
-
-    @property
-    def defaults(self) -> tuple[float, ...]:
-        """At the parent's frame."""
-        return (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """A shift, then the rotation of the quaternion."""

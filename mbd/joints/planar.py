@@ -34,6 +34,8 @@ class Planar(Joint):
     _: KW_ONLY
     loss: JointLoss = field(default=None, hash=False)
 
+    is_planar = True
+
     def __post_init__(self) -> None:
         self.validate()
 
@@ -41,11 +43,6 @@ class Planar(Joint):
     def labels(self) -> tuple[Label, ...]:
         """`x`, `y`, `angle`."""
         return (Label("x", "m"), Label("y", "m"), Label("angle", "rad"))
-
-    @property
-    def is_planar(self) -> bool:
-        """True."""
-        return True
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """A shift in the plane, then a turn about z."""

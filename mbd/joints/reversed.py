@@ -29,6 +29,8 @@ class Reversed(Joint):
 
     joint: Joint
 
+    is_reversed = True
+
     @property
     def name(self) -> str:  # type: ignore[override]
         """The name of the joint."""
@@ -73,11 +75,6 @@ class Reversed(Joint):
     def is_planar(self) -> bool:
         """As the joint."""
         return self.joint.is_planar
-
-    @property
-    def is_reversed(self) -> bool:
-        """True."""
-        return True
 
     @property
     def is_vector(self) -> bool:

@@ -48,6 +48,8 @@ class Screw(Joint):
     stiffness: float = 0.0
     rest: float = 0.0
 
+    is_planar = False  # it turns about the direction in which it shifts
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", unit_vector(self.axis, f"axis of '{self.name}'"))
         object.__setattr__(self, "pitch", number(self.pitch, f"pitch of '{self.name}'"))
@@ -60,11 +62,6 @@ class Screw(Joint):
     def labels(self) -> tuple[Label, ...]:
         """`angle`."""
         return (Label("angle", "rad"),)
-
-    @property
-    def is_planar(self) -> bool:
-        """False: it turns about the direction in which it shifts."""
-        return False
 
     def parameters(self) -> dict[str, float]:
         """`pitch`, and those of spring and loss."""

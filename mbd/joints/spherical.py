@@ -52,13 +52,16 @@ class Spherical(Joint):
     stiffness: float = 0.0
     anatomy: str = ""
 
+    labels = ORIENTATION
+    velocity_labels = ANGULAR_VELOCITY
+    orientation = 0
+    is_vector = False
+    is_planar = False
+    is_elastic = True
+    defaults = (1.0, 0.0, 0.0, 0.0)
+
     def __post_init__(self) -> None:
         self.validate()
-
-    @property
-    def labels(self) -> tuple[Label, ...]:
-        """`orientation.w`, `.x`, `.y`, `.z`."""
-        return ORIENTATION
 
     def resistance(self, rates: Sequence[Scalar], scope: Scope) -> list[Scalar]:
         """One loss acts against ω, losses by label about their axes."""
@@ -70,36 +73,6 @@ class Spherical(Joint):
     def is_isotropic(self) -> bool:
         """Whether it has one loss."""
         return isinstance(self.loss, Loss)
-
-    @property
-    def velocity_labels(self) -> tuple[Label, ...]:
-        """`angular_velocity.x`, `.y`, `.z`."""
-        return ANGULAR_VELOCITY
-
-    @property
-    def orientation(self) -> int:
-        """0."""
-        return 0
-
-    @property
-    def is_vector(self) -> bool:
-        """False."""
-        return False
-
-    @property
-    def is_planar(self) -> bool:
-        """False."""
-        return False
-
-    @property
-    def is_elastic(self) -> bool:
-        """True."""
-        return True
-
-    @property
-    def defaults(self) -> tuple[float, ...]:
-        """No rotation."""
-        return (1.0, 0.0, 0.0, 0.0)
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """The rotation of the quaternion."""

@@ -43,6 +43,8 @@ class Universal(Joint):
     loss: JointLoss = field(default=None, hash=False)
     anatomy: str = ""
 
+    is_planar = False
+
     def __post_init__(self) -> None:
         axis = unit_vector(self.axis, f"axis of '{self.name}'")
         second = unit_vector(self.second_axis, f"second axis of '{self.name}'")
@@ -56,11 +58,6 @@ class Universal(Joint):
     def labels(self) -> tuple[Label, ...]:
         """`first`, `second`."""
         return (Label("first", "rad"), Label("second", "rad"))
-
-    @property
-    def is_planar(self) -> bool:
-        """False."""
-        return False
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """Two turns."""

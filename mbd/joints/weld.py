@@ -8,7 +8,7 @@ from mbd.bodies.algebra import IDENTITY, ZERO
 from mbd.bodies.base import Frame
 from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
-from mbd.joints.base import Joint, Label
+from mbd.joints.base import Joint
 from mbd.joints.parts import place_rows, turn_rows
 from mbd.tape.node import Scalar
 
@@ -30,18 +30,11 @@ class Weld(Joint):
 
     loss = None
 
+    labels = ()
+    is_planar = True
+
     def __post_init__(self) -> None:
         self.validate()
-
-    @property
-    def labels(self) -> tuple[Label, ...]:
-        """None."""
-        return ()
-
-    @property
-    def is_planar(self) -> bool:
-        """True."""
-        return True
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """Nothing."""

@@ -60,6 +60,9 @@ class ForcePlate(Force):
     during: Any = None
     threshold: float = MIN_PLATE_LOAD
 
+    kind = "applied"
+    is_external = True
+
     def __post_init__(self) -> None:
         name_of(self.name, "ForcePlate")
         frame_of(self.foot, f"foot of ForcePlate '{self.name}'")
@@ -111,16 +114,6 @@ class ForcePlate(Force):
             return np.broadcast_to(self.wrench[0], (len(time), 6)).copy()
         return np.asarray(PchipInterpolator(own, self.wrench)(np.clip(time, own[0], own[-1])))
 
-    @property
-    def kind(self) -> str:
-        """'applied'."""
-        return "applied"
-
-    @property
-    def is_external(self) -> bool:
-        """True."""
-        return True
-
     def mentions(self) -> list[Mention]:
         """Its foot."""
         return [self.foot]
@@ -160,10 +153,7 @@ class Load(Force):
     name: str
     foot: Frame
 
-    @property
-    def kind(self) -> str:
-        """'applied'."""
-        return "applied"
+    kind = "applied"
 
     def mentions(self) -> list[Mention]:
         """Its foot."""

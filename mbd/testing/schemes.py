@@ -137,9 +137,7 @@ class Servo(Force):
     name: str
     joint: Joint
 
-    @property
-    def kind(self) -> str:
-        return "applied"
+    kind = "applied"
 
     def mentions(self) -> list[Any]:
         return [self.joint]

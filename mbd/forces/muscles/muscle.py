@@ -102,6 +102,8 @@ class Muscle(Force):
     smoothing: float = 10.0
     arguments: Any = ("t",)
 
+    kind = "applied"
+
     def __post_init__(self) -> None:
         put = object.__setattr__
         name_of(self.name, "Muscle")
@@ -142,11 +144,6 @@ class Muscle(Force):
     def is_delayed(self) -> bool:
         """Whether its activation is a state."""
         return self.activation_time != 0.0
-
-    @property
-    def kind(self) -> str:
-        """'applied'."""
-        return "applied"
 
     def mentions(self) -> list[Mention]:
         """What its path and its excitation refer to."""
