@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, TypeVar
 
+from mbd.errors import SHOWN
+
 __all__ = ["explained"]
 
 Word = TypeVar("Word")
@@ -67,19 +69,16 @@ def _sentence(
         faults.append(f"{name} needs {', '.join(needed)}")
     shown = [_shown(each) for each in parameters]
     first = next((k for k, each in enumerate(parameters) if each.kind is each.KEYWORD_ONLY), len(parameters))
-    if len(parameters) > MAX_SHOWN:  # those that may be given by place, and what has no default
+    if len(parameters) > SHOWN:  # those that may be given by place, and what has no default
         required = [k for k in range(first, len(parameters)) if parameters[k].default is inspect.Parameter.empty]
         kept = [shown[k] for k in (*range(first), *required)]
         shown = [*kept[:first], "*", *kept[first:], "…"] if first < len(parameters) else kept
     elif first < len(parameters):
         shown.insert(first, "*")
     listed = ", ".join(shown)
-    more = f"; help(mbd.{name}) tells all" if len(parameters) > MAX_SHOWN else ""
+    more = f"; help(mbd.{name}) tells all" if len(parameters) > SHOWN else ""
     return f"{'; '.join(faults) or own_words}; it takes {name}({listed}){more}"
 
-
-MAX_SHOWN = 12
-"""Arguments of a function that are all shown."""
 
 SENSE = {
     "until": ", the end time [s] or the name of an event",

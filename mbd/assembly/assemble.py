@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.assembly.conditions import Condition, conditions
+from mbd.assembly.consistency import ASSEMBLED_RESIDUAL
 from mbd.assembly.contradictions import Attempt, contradictions, infeasible
 from mbd.assembly.doubtful import doubtful
 from mbd.assembly.foot_places import foot_places
@@ -43,9 +44,6 @@ from mbd.notes import doubt
 from mbd.state import State, of_model
 
 __all__ = ["assemble"]
-
-OPEN_GAP = 1e-8
-"""Height [m, rad] above which an open contact is armed from the start."""
 
 
 def assemble(
@@ -360,7 +358,7 @@ def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
     armed = set()
     values = _gaps(work)
     for c, contact in enumerate(work.manager.contacts):
-        lifted = values[c] > OPEN_GAP
+        lifted = values[c] > ASSEMBLED_RESIDUAL
         trailing = bool(contact.when) or contact.name in opened
         if not work.flags[c] and (lifted or (not trailing and values[c] > -MAX_START_DEPTH)):
             armed.add(contact.name)

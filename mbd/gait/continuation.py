@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
@@ -21,6 +20,7 @@ from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.family import Member, across, floquet
 from mbd.gait.floquet import Multipliers
 from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured, numbers_of
+from mbd.gait.newton import MAX_CONTRACTION
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart, Section
@@ -30,8 +30,6 @@ __all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected", "Forbidden", "wa
 
 CORRECTIONS, QUICK = 10, 4
 """Newton corrections of a point, and how many count as few."""
-MAX_CONTRACTION = 0.2
-"""Factor by which a correction must shrink the residual, else its matrix is made again [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +167,7 @@ class Continuation:
         if levels > 2:
             derivative = self._exact(derivative, chart, values)
         matrix = self._matrix(derivative, chart.size) + self.member_part(chart, base, derivative, corrected.value)
-        tangent = _null_vector(matrix)
+        tangent = np.asarray(np.linalg.svd(matrix)[2][-1], dtype=float)  # along which the matrix vanishes
         if before is not None:
             lifted = self.lifted(before, chart)
             tangent = tangent if float(tangent @ lifted) >= 0.0 else -tangent
@@ -271,8 +269,3 @@ def way_of(map_: ReturnMap, arrival: Arrival) -> float:
         return float(np.linalg.norm(map_.forward * arrival.travel))
     lengths = [length for _, _, length in arrival.steps]
     return float(np.sum(lengths)) if lengths else float("nan")
-
-
-def _null_vector(matrix: Matrix) -> NDArray[np.float64]:
-    """The direction in which the matrix vanishes, of length 1."""
-    return np.asarray(np.linalg.svd(matrix)[2][-1], dtype=float)

@@ -18,6 +18,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Frame
 from mbd.configuration import Configuration
 from mbd.dataclass import dataclass
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.joints import Cylindrical, Free, Prismatic, Revolute, Spherical, Translation, Universal
 from mbd.joints.base import Joint
 from mbd.joints.quaternions import quaternion_product
@@ -25,9 +26,6 @@ from mbd.joints.reflected import AsWritten
 from mbd.topology.plan import plan
 
 __all__ = ["Part", "parts_of", "rotation"]
-
-ALIGNMENT_ATOL = 1e-12
-"""Distance of an axis from the vertical up to which it is along it [-], and of places from each other [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +91,7 @@ def parts_of(model: Any, configuration: Configuration, up: Vector) -> list[Part]
     parts: list[Part] = []
     for each in found:
         beside = (each.place - axis) - ((each.place - axis) @ up) * up
-        if float(np.max(np.abs(beside))) <= ALIGNMENT_ATOL:
+        if float(np.max(np.abs(beside))) <= ROUND_OFF_RTOL:
             beside = np.zeros(3)
         elif each.held:
             return None
@@ -180,7 +178,7 @@ def _shifted(chain: _Chain, q: int, v: int, directions: Matrix) -> _Chain:
 def _closed(chain: _Chain, up: Vector, beyond: list[Part]) -> list[_Turned] | None:
     """The parts of a chain and of the joint at its end; None where the chain cannot follow a turn."""
     along = chain.along
-    if not len(chain.q) or np.max(np.abs(along - np.outer(up, up @ along))) <= ALIGNMENT_ATOL:
+    if not len(chain.q) or np.max(np.abs(along - np.outer(up, up @ along))) <= ROUND_OFF_RTOL:
         return [_Turned(chain.place, True, beyond)] if beyond else []
     if np.linalg.matrix_rank(along, tol=1e-9) < along.shape[1]:
         return None
@@ -198,7 +196,7 @@ def _inverse(along: Matrix) -> Matrix:
 
 
 def _is_along(one: Any, other: Vector) -> bool:
-    return bool(abs(abs(float(np.array(one, dtype=float) @ other)) - 1.0) <= ALIGNMENT_ATOL)
+    return bool(abs(abs(float(np.array(one, dtype=float) @ other)) - 1.0) <= ROUND_OFF_RTOL)
 
 
 def _axes(frame: Frame) -> Matrix:

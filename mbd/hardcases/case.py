@@ -13,7 +13,12 @@ from typing import Any
 from mbd.dataclass import dataclass
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["Curve", "Figure", "HardCase", "Outcome", "definition", "hard_case"]
+__all__ = ["CLOSURE_ATOL", "ROUND_OFF", "Curve", "Figure", "HardCase", "Outcome", "definition", "hard_case"]
+
+ROUND_OFF = 1e-10
+"""What round-off and the tolerance of Newton's method may leave [m, rad, m/s, -]."""
+CLOSURE_ATOL = 1e-8
+"""Gap of a joint [m] and angle between parallel links [rad] that are allowed beside singular poses."""
 
 
 @dataclass(frozen=True)

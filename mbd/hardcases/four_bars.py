@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import CLOSURE_ATOL, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.crossings import crossing
 from mbd.hardcases.references import distance_to, quantity
@@ -18,8 +18,6 @@ from mbd.hardcases.schemes import DAMPED, EVERY, holds_positions_only
 
 __all__ = ["CASES", "four_bars"]
 
-CLOSURE_ATOL = 1e-8
-"""How far cranks may be from parallel [rad] and joints from closed [m]."""
 ENERGY_RTOL = 1e-3
 """Most change of energy that the definition allows [-]; a scheme of order 2 is far below it."""
 ERROR_FACTOR = 0.4

@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
+from mbd.hardcases.case import ROUND_OFF, Curve, Figure, Outcome, hard_case
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 
 __all__ = ["CASES"]
-
-ERROR_RTOL = 1e-10
-"""Of errors relative to the largest value: flights are parabolas, which every scheme takes exactly."""
 
 
 @cache
@@ -66,7 +63,7 @@ def errors(id: str, run: Any) -> list[Figure]:
     for name, values in found.items():
         wanted = published(id, name)
         off = size(values - wanted) if values.shape == wanted.shape else float("nan")
-        most = max(ERROR_RTOL * size(wanted), 10.0 * accuracy(id, name))
+        most = max(ROUND_OFF * size(wanted), 10.0 * accuracy(id, name))
         figures.append(Figure(f"error of {name} over the limit [-]", off / most, 1.0))
     return figures
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "dumbbell"]
@@ -15,8 +15,6 @@ __all__ = ["CASES", "dumbbell"]
 P5 = "p5-light-link-in-space"
 PHASE_FACTOR = 0.5
 """Error of the phase that is allowed to schemes of order two, over (ω dt)² ω t [-]."""
-ROUND_OFF_FACTOR = 1e-10
-"""The same to those of higher order [-]."""
 
 
 def dumbbell(cut: str = "all") -> tuple[mbd.Model, mbd.State]:
@@ -50,7 +48,7 @@ def judge_dumbbell(integrator: Any) -> Outcome:
     off = float(np.max(np.abs(run["other.center"] - circle)))
     length = np.linalg.norm(run["other.center"] - run["one.center"], axis=1) - L
     tension = np.linalg.norm(run["second.reaction_force"], axis=1) / (0.5 * M * omega**2 * L) - 1.0
-    phase = PHASE_FACTOR * (omega * dt) ** 2 * omega * until if integrator.order() == 2 else ROUND_OFF_FACTOR
+    phase = PHASE_FACTOR * (omega * dt) ** 2 * omega * until if integrator.order() == 2 else ROUND_OFF
     figures = [
         Figure("error of the place [m]", off, 0.5 * L * phase),
         Figure("change of the length [m]", float(np.max(np.abs(length))), 1e-12),

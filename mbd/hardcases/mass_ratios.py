@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.crossings import falls
 from mbd.hardcases.references import quantity
@@ -19,8 +19,6 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "bob_on_link", "heavy_below_light"]
 
 J4, J5 = "j4-mass-ratio-1e6", "j5-near-massless-link"
-GAP_ATOL = 1e-10
-"""Gap of a joint [m] that is allowed."""
 RESOLVING = {2: ((1e-6, 2.5e-7), 5e-7), 3: ((1e-6, 5e-7), 1e-6), 8: ((2e-6, 1e-6), 2e-6)}
 """Steps [s] that resolve the snap of the light mass through the straight line, in minimal and in absolute coordinates,
 of schemes of that order at least; the limits are the same for all."""
@@ -76,7 +74,7 @@ def judge_mass_ratio(integrator: Any) -> Outcome:
     figures = found.figures(limits, dict.fromkeys(limits, reference.accuracy), better=True)
     for what, limit in limits.items():
         figures.append(Figure(f"{what} at dt = {middle:g} s, absolute coordinates", apart[what], ABSOLUTE * limit))
-    figures.append(Figure("gap of the joints at any step [m]", gap, GAP_ATOL))
+    figures.append(Figure("gap of the joints at any step [m]", gap, ROUND_OFF))
     figures.append(Figure("energy gained in silence at large steps [-]", max(silent), ENERGY_GAIN_RTOL))
     return Outcome(figures, [*curves, *found.curves()])
 

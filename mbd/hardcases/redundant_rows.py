@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import CLOSURE_ATOL, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.references import distance_to, quantity
 from mbd.hardcases.schemes import EVERY
@@ -18,8 +18,6 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "bricard", "parallel_cranks"]
 
 J2, B4 = "j2-parallel-fourbar-redundant", "b4-iftomm-a04-bricard"
-ROW_ATOL = 1e-8
-"""How far a row may be from holding [m, rad]."""
 CRANK, PLACE, ENERGY = 0.4, 0.1, 0.05
 """Factors of the allowance of errors of order 2, with √(g/L): of the crank angle, of P3, of the energy."""
 MAX_MULTIPLIER = 10.0
@@ -98,8 +96,8 @@ def judge_parallel_cranks(integrator: Any) -> Outcome:
             Figure("wrong count of redundant rows in the notes", max(_miscount(run, spare.value) for run in runs), 0),
             Figure("runs that do not say that multipliers are not unique", sum(not _warned(run) for run in runs), 0),
             Figure("largest multiplier over the weight [-]", _largest(runs) / weight, MAX_MULTIPLIER),
-            Figure("cranks out of parallel [rad]", skew, ROW_ATOL),
-            Figure("rows that do not hold [m]", max(run.violation.length for run in runs), ROW_ATOL),
+            Figure("cranks out of parallel [rad]", skew, CLOSURE_ATOL),
+            Figure("rows that do not hold [m]", max(run.violation.length for run in runs), CLOSURE_ATOL),
         ],
         [Curve("crank angle [rad]", finest.time, finest["base 0.angle"]), *found.curves()],
     )
@@ -135,7 +133,7 @@ def judge_bricard(integrator: Any) -> Outcome:
             Figure("wrong count of freedoms by the note of what is redundant", free, 0),
             Figure("runs that do not say that multipliers are not unique", sum(not _warned(run) for run in runs), 0),
             Figure("largest multiplier over the weight [-]", _largest(runs) / weight, MAX_MULTIPLIER),
-            Figure("rows that do not hold [m, rad]", apart, ROW_ATOL),
+            Figure("rows that do not hold [m, rad]", apart, CLOSURE_ATOL),
         ],
         [Curve("height of P3 [m]", finest.time, finest["rod 2.tip.y"]), *found.curves()],
     )

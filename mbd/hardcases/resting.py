@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import EPS, force_floor
 from mbd.hardcases.references import quantity
 from mbd.hardcases.schemes import EVERY
@@ -18,8 +18,6 @@ __all__ = ["CASES", "block", "table"]
 J11, J11B = "j11-four-legged-table", "j11b-block-two-contacts"
 UNTIL, STEPS = 10.0, (1e-2, 1e-3)
 """Time of rest, and the steps it is tried with [s]."""
-MAX_DRIFT = 1e-10
-"""Most that anything at rest may move [m, rad]."""
 
 
 def table(
@@ -87,7 +85,7 @@ def judge_table(integrator: Any) -> Outcome:
             for what, value in found.items():
                 worst[what] = max(worst.get(what, 0.0), float(np.max(value)))
     limits = {what: 1.0 for what in worst} | {"first leg outside of its admissible range [N]": 0.0,
-                                              "drift [m, rad]": MAX_DRIFT}  # fmt: skip
+                                              "drift [m, rad]": ROUND_OFF}  # fmt: skip
     return Outcome(
         [
             *(Figure(what, worst[what], limit) for what, limit in limits.items()),
@@ -124,7 +122,7 @@ def judge_block(integrator: Any) -> Outcome:
         [
             Figure("error of the forces over its round-off [-]", off, 1.0),
             Figure("error of their sum over its round-off [-]", resultant, 1.0),
-            Figure("drift [m, rad]", drift, MAX_DRIFT),
+            Figure("drift [m, rad]", drift, ROUND_OFF),
             Figure("switches of contacts", events, 0),
             Figure("runs that tell a redundancy that is none, or do not tell one that is", wrong, 0),
         ],

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import CLOSURE_ATOL, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.crossings import crossing
 from mbd.hardcases.references import distance_to, quantity
@@ -20,8 +20,6 @@ __all__ = ["CASES", "equal_slider_crank", "parallelogram"]
 J3, J3B = "j3-slider-crank-equal-lengths", "j3b-fourbar-flattening"
 ENERGY_JUMP_RTOL = 1e-6
 """Relative change of energy that one passage of a singular pose may make [-]."""
-CLOSURE_ATOL = 1e-8
-"""Gap of a joint [m] and angle between parallel links [rad] that are allowed."""
 JUMP_WINDOW = 0.02
 """Time [s] before and after a singular pose within which a jump of energy is looked for."""
 CRANK, FLAT = 0.6, 0.2

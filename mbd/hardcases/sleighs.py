@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.references import distance_to, quantity
 from mbd.hardcases.schemes import EVERY
@@ -17,8 +17,6 @@ from mbd.hardcases.schemes import EVERY
 __all__ = ["CASES", "knife_edge", "sleigh"]
 
 D1, D2 = "d1-chaplygin-sleigh", "d2-knife-edge-incline"
-SLIP_ATOL = 1e-10
-"""Sideways speed [m/s] that a blade may have: round-off and Newton's tolerance."""
 SLEIGH, EDGE, FORCE = 0.4, 1.0, 0.01
 """Factors of the allowance of errors: of the sleigh, of the knife edge, of its multiplier, which has order 3."""
 
@@ -109,7 +107,7 @@ def judge_sleigh(integrator: Any) -> Outcome:
                 abs(speed - float(final.value)),
                 allowance(SLEIGH, rate, dt, final.size),
             ),
-            Figure("slip [m/s]", max(float(np.max(np.abs(run["blade.residual"]))) for run in runs.values()), SLIP_ATOL),
+            Figure("slip [m/s]", max(float(np.max(np.abs(run["blade.residual"]))) for run in runs.values()), ROUND_OFF),
         ],
         [Curve("rate of turning [rad/s]", finest.time, finest["body.angle.rate"]), *found.curves()],
     )
@@ -152,7 +150,7 @@ def judge_knife_edge(integrator: Any) -> Outcome:
                 abs(float(run["body.y"][-1] / run.time[-1]) - float(drift.value)),
                 allowance(EDGE, rate, dt, drift.size),
             ),
-            Figure("slip [m/s]", max(slips), SLIP_ATOL),
+            Figure("slip [m/s]", max(slips), ROUND_OFF),
         ],
         [Curve("path: y over x", run["body.x"], run["body.y"], "downhill [m]", "sideways [m]"), *found.curves()],
     )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import mbd
-from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import EPS, deviation, force_floor, study
 from mbd.hardcases.references import quantity
 from mbd.hardcases.schemes import EVERY
@@ -20,8 +20,6 @@ __all__ = ["CASES", "circle"]
 J1 = "j1-tiny-steps-index3"
 ERROR_CONSTANT = 0.5
 """C of the multiplier error C dt² over m g²/L; the worst scheme needs about half of it [-]."""
-CONSTRAINT_RTOL = 1e-10
-"""|constraint| over L that is allowed at every step [-]."""
 NEAR, NEAR_STEP = 1e-8, 1e-6
 """Places must be this accurate [m] at steps of this size [s] and below."""
 UNREACHABLE_TOLERANCE = 1e-17
@@ -77,7 +75,7 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
                deviation(steps, found.errors["error of the tension [N]"], floors, higher), 0.15),
         Figure("error of the tension over C dt² and its round-off floor [-]", max(over), 1.0),
         Figure("error of the tension at the start [N]", max(begun), first.accuracy),
-        Figure("|constraint| over L [-]", max(off), CONSTRAINT_RTOL),
+        Figure("|constraint| over L [-]", max(off), ROUND_OFF),
     ]  # fmt: skip
     if hasattr(integrator, "tolerance"):
         figures.append(_refusal(integrator, model, start, min(numbers["dts"])))

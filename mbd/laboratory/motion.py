@@ -135,7 +135,7 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
     names = [c.name for c in equations.coordinates]
     missing = [name for name in names if name not in columns]
     whole = equations.configuration
-    if missing and not any(not row.is_velocity for k, row in _bilateral(equations)):
+    if missing and all(equations.rows[k].is_velocity for k in equations.bilateral):
         raise ModelError(
             f"motion: the coordinate {missing[0]!r} of '{equations.name}' is missing"
             f"{f', and {len(missing) - 1} more' if missing[1:] else ''}; give values of all of them at the times"
@@ -336,7 +336,7 @@ def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
         parts = value.components
         if len(parts) != width:
             raise ModelError(f"motion: {key!r} needs {width} components, its Samples have {len(parts)}")
-        return [_Column(*(_of_samples(part, time, order) for order in (0, 1, 2))) for part in parts]
+        return [_Column(*(np.asarray(part(time, order), dtype=float) for order in (0, 1, 2))) for part in parts]
     try:
         table = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
@@ -361,10 +361,6 @@ def _require_finite(given: Mapping[str, Any], time: Vector) -> None:
             )
         if not np.isfinite(np.sum(table)):
             raise ModelError(f"motion: the values of {key!r} are too large, up to {np.abs(table).max():.3g}")
-
-
-def _of_samples(signal: Samples, time: Vector, order: int) -> Vector:
-    return np.asarray(signal(time, order), dtype=float)
 
 
 def derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:
@@ -437,8 +433,6 @@ class _Spline:
 
 
 # loops --------------------------------------------------------------------------------------------------------------
-def _bilateral(equations: Equations) -> list[tuple[int, Any]]:
-    return [(k, equations.rows[k]) for k in equations.bilateral]
 
 
 def _closed(

@@ -12,7 +12,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError, ModelError, TraceError, UnknownNameError
 from mbd.integrators import Integrator
-from mbd.optimization.points import Point, Source, failed, table_point
+from mbd.optimization.points import DIFFERENCE_STEP, Point, Source, failed, table_point
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.sensitivities import sensitivities
 from mbd.sensitivity.starts import unknown_name
@@ -24,8 +24,6 @@ from mbd.tape.node import Tape
 __all__ = ["RunSource"]
 
 Functions = Mapping[str, Callable[[Any], Mapping[str, Any]]]
-MIN_DIFFERENCE = 1e-3
-"""Least of three differences of a quantity whose function cannot be recorded, over its value or 1 [-]."""
 
 
 @dataclass(eq=False)
@@ -119,6 +117,6 @@ class RunSource(Source):
 
 def _numerical(function: Callable[[Any], Mapping[str, Any]], key: str, value: float) -> tuple[float, float]:
     """Value and rate of a function of plain numbers, by central differences of the sixth order."""
-    h = MIN_DIFFERENCE * (abs(value) or 1.0)
+    h = DIFFERENCE_STEP * (abs(value) or 1.0)
     slopes = [(function(value + k * h)[key] - function(value - k * h)[key]) / (2.0 * k * h) for k in (1, 2, 3)]
     return float(function(value)[key]), float(1.5 * slopes[0] - 0.6 * slopes[1] + 0.1 * slopes[2])

@@ -96,10 +96,7 @@ def _constraints(problem: Problem, method: str) -> Any:
         def over(u: Vector) -> Vector:
             return np.asarray(sign * (value(u)[rows] - end[rows]))
 
-        def its_slope(u: Vector) -> Any:
-            return sign * slope(u)[rows]
-
-        return {"type": kind, "fun": over, "jac": its_slope}
+        return {"type": kind, "fun": over, "jac": lambda u: sign * slope(u)[rows]}
 
     return [one(kind, sign, rows, end) for kind, sign, rows, end in kinds if np.any(rows)]
 

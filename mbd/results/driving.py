@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations, Row
 from mbd.results.balance import MAX_SAMPLES, Balance
 from mbd.results.record import Rows
@@ -32,8 +33,6 @@ __all__ = ["drives_of", "driving_rows", "forces_told", "is_wholly_driven", "own_
 
 FORCE_RTOL = 1e-5
 """Force of a drive, over the terms that cancel in it, below which it is measured by these [-]."""
-FREE_MOTION_RTOL = 1e-9
-"""Part of a coordinate in a motion that all rows allow from which it is free [-]."""
 
 
 def driving_rows(equations: Equations) -> tuple[int, ...]:
@@ -146,4 +145,4 @@ def is_wholly_driven(run: Trajectory) -> bool:
     scaled: Matrix = B[:, bilateral, : equations.n_v] / np.where(weight > 0.0, weight, 1.0)[:, None]
     size = np.linalg.norm(scaled, axis=2, keepdims=True)
     unit = np.divide(scaled, size, out=np.zeros_like(scaled), where=size > 0.0)
-    return bool(np.max(np.sum(np.linalg.svd(unit, compute_uv=False) > FREE_MOTION_RTOL, axis=1)) == equations.n_v)
+    return bool(np.max(np.sum(np.linalg.svd(unit, compute_uv=False) > EQUAL_RTOL, axis=1)) == equations.n_v)

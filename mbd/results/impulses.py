@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mbd.dataclass import dataclass
 from mbd.notebook import table
 from mbd.results.facts import Facts
-from mbd.results.record import EventRecord
+from mbd.results.record import MAX_SHOWN_EVENTS, EventRecord
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -18,9 +18,6 @@ __all__ = ["Impulse", "Impulses", "impulses_of"]
 
 WAYS = ("forward", "sideways")
 """Directions in which a disk or a ball rolls."""
-
-MAX_SHOWN = 40
-"""Impulses that are shown; of more, the first and the last."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +56,12 @@ class Impulses(list[Impulse]):
     def __repr__(self) -> str:
         if not self:
             return "no impulses"
-        hidden, half = max(len(self) - MAX_SHOWN, 0), MAX_SHOWN // 2
+        hidden, half = max(len(self) - MAX_SHOWN_EVENTS, 0), MAX_SHOWN_EVENTS // 2
         shown = [*map(_line, self[:half]), f"  … {hidden} more", *map(_line, self[-half:])]
         return "\n".join(["  time [s]    impulse", *(shown if hidden else map(_line, self))])
 
     def _repr_html_(self) -> str:
-        hidden, half = max(len(self) - MAX_SHOWN, 0), MAX_SHOWN // 2
+        hidden, half = max(len(self) - MAX_SHOWN_EVENTS, 0), MAX_SHOWN_EVENTS // 2
         shown = [*self[:half], *self[-half:]] if hidden else self
         rows = [(f"{one.time:.6f}", one.event, one.name, one.part, f"{one.impulse:.4g}", one.unit) for one in shown]
         titles = ("time [s]", "event", "taken by", "part", "impulse", "unit")

@@ -18,8 +18,8 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-from mbd.results.polynomials import Index, Places
-from mbd.results.quadrature import CHUNK, stretches
+from mbd.results.polynomials import CHUNK, Index, Places
+from mbd.results.quadrature import stretches
 
 __all__ = ["MAX_ERROR_RATIO", "Osculation", "osculating"]
 

@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.results.balance import Balance, Flags, Held, saddle
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
@@ -30,8 +31,6 @@ MIN_SINGULAR_VALUE = 0.005
 
 Inertia is no part of it: in its metric the rows at the two ends of a light link depend on each other.
 """
-CORRECTION_RTOL = 1e-12
-"""Correction, of coordinates of size 1, that is no matter whatever the next one is [-]."""
 
 
 class Projection:
@@ -73,9 +72,9 @@ class Projection:
         for _ in range(3):  # an error of 0.01 is round-off after the third
             x, sound = self._correction(kept, led, aim)
             size = np.max(np.abs(x), axis=1, initial=0.0)
-            good &= sound & ((size < 0.5 * before) | (size <= CORRECTION_RTOL))
+            good &= sound & ((size < 0.5 * before) | (size <= ROUND_OFF_RTOL))
             led, before = replace(led, q=self._moved(led.q, x)), size
-            if np.all((size <= CORRECTION_RTOL) | ~good):
+            if np.all((size <= ROUND_OFF_RTOL) | ~good):
                 break
         change, sound = self._correction(kept, led, aim_rate, rates=True)
         good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)

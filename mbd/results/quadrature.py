@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.equal import EQUAL_RTOL
+from mbd.results.polynomials import CHUNK
 
 __all__ = ["cumulative", "cumulative_of_many", "stretches"]
 
@@ -22,8 +23,6 @@ ROWS_WITH_RATES, ROWS_WITHOUT = 4, 8
 """Rows that the polynomial goes through: eight conditions either way."""
 MAX_LENGTH_RATIO = 8.0
 """Neighbouring intervals whose lengths differ by more than this factor lie on no common polynomial [-]."""
-CHUNK = 4096
-"""Intervals whose weights are solved for together."""
 
 Index = NDArray[np.intp]
 

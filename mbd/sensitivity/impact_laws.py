@@ -15,7 +15,7 @@ from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.kernel.contact.impact import APPROACH_RTOL, MAX_IMPACTS
 from mbd.sensitivity.motion import Mode, Motion
-from mbd.sensitivity.phases import BRANCH_RTOL, DERIVATIVE_RTOL, Law, OneSided, Unknown, chosen, speeds, undecided
+from mbd.sensitivity.phases import DERIVATIVE_RTOL, Law, OneSided, Unknown, chosen, speeds, undecided
 from mbd.sensitivity.programs import Programs
 
 __all__ = ["Struck", "poisson", "sequential"]
@@ -91,7 +91,7 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
         if most <= APPROACH_RTOL * fastest or most < 1e-14:
             edges = [
                 c for c, k in normal.items()
-                if c not in held and abs(speed[k]) <= BRANCH_RTOL * fastest
+                if c not in held and abs(speed[k]) <= EQUAL_RTOL * fastest
                 and np.any(np.abs(of_speed[k]) > DERIVATIVE_RTOL * size)
             ]  # fmt: skip
             if edges:

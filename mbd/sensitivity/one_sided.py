@@ -15,6 +15,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.projection import project
 from mbd.bodies.values import is_number
+from mbd.equal import EQUAL_RTOL, INSTANT_RTOL
 from mbd.errors import MbdError, OneSidedError
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode, Motion, Rates
@@ -24,14 +25,10 @@ from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.state import State
 from mbd.tape.node import Node
 
-__all__ = ["END_RTOL", "refuse_sided_end", "refuse_sided_start", "sided_end", "with_both_sides"]
+__all__ = ["refuse_sided_end", "refuse_sided_start", "sided_end", "with_both_sides"]
 
-END_RTOL = 1e-10
-"""Share of a run within which an event counts as one at its start or end [-]."""
 ROUND_OFF, GRAZE = 1e-12, 1e-7
 """Velocity over the sum of its terms that is rest, and rate of a guard over its terms below which it grazes [-]."""
-GUARD_RTOL = 1e-9
-"""Change of a guard over the sum of its terms below which a direction leaves it where it is [-]."""
 STEP, LEVELS = 1e-4, 4
 """Change of what a run is differentiated by, over it or 1, to the runs on each side, and how many, each half as far."""
 JUMP_RTOL = 1e-6
@@ -56,7 +53,7 @@ class _Watched:
             np.abs(slopes) @ np.abs(still),
         )
         changes = np.max(np.abs(slopes @ Z), axis=1, initial=0.0)
-        self.moves = changes > GUARD_RTOL * np.max(np.abs(slopes) @ np.abs(Z), axis=1, initial=0.0)
+        self.moves = changes > EQUAL_RTOL * np.max(np.abs(slopes) @ np.abs(Z), axis=1, initial=0.0)
 
     def firing(self, within: float) -> Iterator[str]:
         """Names of the contacts and events that fire within so short a time, or would do if nothing were changed."""
@@ -107,7 +104,7 @@ def refuse_sided_start(rows: RunRows, programs: Programs, motion: Motion, mode: 
     """
     if not _is_any(programs):
         return
-    watched, within = _Watched(programs, motion, mode, rates), END_RTOL * _duration(rows)
+    watched, within = _Watched(programs, motion, mode, rates), INSTANT_RTOL * _duration(rows)
     if names := dict.fromkeys(watched.starting()):
         raise sided(
             f"{_listed(names)} starts at rest and slides at once, and a change of its velocity decides which way"
@@ -125,7 +122,7 @@ def refuse_sided_end(
     """
     until, end = rows.record.settings.get("until"), float(rows.record.time[-1])
     latest: Any = until[-1] if isinstance(until, tuple | list) else until
-    within = END_RTOL * _duration(rows)
+    within = INSTANT_RTOL * _duration(rows)
     if not is_number(latest) or end < float(latest) - within or not _is_any(programs):
         return
     names = [name for name, before in instants if end - before.t <= within and np.any(before.tangent.t != 0.0)]

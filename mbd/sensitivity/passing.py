@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import INSTANT_RTOL
 from mbd.equations.equations import Guard
 from mbd.equations.switching_times import instant_slopes
 from mbd.errors import CapabilityError
@@ -19,7 +20,7 @@ from mbd.integrators.stepping import own_scheme
 from mbd.kernel.records import TABLE
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.sensitivity.motion import Motion, Rates, Tangent
-from mbd.sensitivity.one_sided import END_RTOL, sided_end
+from mbd.sensitivity.one_sided import sided_end
 from mbd.sensitivity.passed import Instant, Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.resets import after_reset
@@ -28,7 +29,7 @@ from mbd.sensitivity.tangent.margins import refuse_turning_points
 from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
 from mbd.simulation.run.idle import keep_idle
-from mbd.simulation.simulate import INSTANT_RTOL
+from mbd.simulation.simulate import BRIEF_TIME_SHARE
 
 __all__ = ["AnotherRun", "Charted", "seed", "tangent_run"]
 
@@ -144,7 +145,8 @@ def tangent_run(
 
     if visit is not None:
         for row in range(len(rows.record.time)):
-            visit(row, *_with_mode(rows, row, at_row(row)))
+            motion, rates = at_row(row)
+            visit(row, motion, rows.mode(row), rates)
     if not located:
         return Passed(end[0], last, end[1])
     known = {row: at_row(row) for row in {0, *(each - 1 for each in rows.events)}}
@@ -164,10 +166,6 @@ def seed(
     of_e = np.array([restitutions.get(name, np.zeros(count)) for name in names]).reshape(len(names), count)
     of_q = charted.base(np.array(q)) @ start.q
     run.seed(start.p[:, some], of_q[:, some], start.y[:, some], start.anchors[:, some], of_e[:, some])
-
-
-def _with_mode(rows: RunRows, row: int, found: tuple[Motion, Rates]) -> tuple[Motion, Any, Rates]:
-    return found[0], rows.mode(row), found[1]
 
 
 def _motion(charted: Charted, numbers: Mapping[str, tuple[Vector, Matrix]], of_p: Matrix) -> tuple[Motion, Rates]:
@@ -190,7 +188,7 @@ def _again(rows: RunRows) -> TangentRun:
     if dt is None:
         own |= {name: settings[name] for name in FOLLOWING}
         length = 1.0 if isinstance(until, str | tuple) else (float(until) - float(start.time)) or 1.0
-        dt = INSTANT_RTOL * min(length, 1.0)
+        dt = BRIEF_TIME_SHARE * min(length, 1.0)
     end, stop = end_of(until, rows.manager, dt, start.time)
     known = dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
     model = SimpleNamespace(parameters=known)
@@ -252,7 +250,7 @@ def _refuse_event_at_end(rows: RunRows, run: TangentRun) -> None:
     counts = len(rows.run.events), len(run.events)
     last = (rows.run.events if counts[0] > counts[1] else run.events)[-1]
     end, start = float(rows.record.time[-1]), float(rows.record.time[0])
-    if counts[0] != counts[1] and end - last.time <= END_RTOL * (end - start):
+    if counts[0] != counts[1] and end - last.time <= INSTANT_RTOL * (end - start):
         raise sided_end([last.name], end)
 
 

@@ -45,7 +45,7 @@ FIRST_STEP_SHARE = 0.1
 """Longest step that follows its error in a first run, over the length of the run [-]."""
 MIN_STEP_LIMIT_RATIO = 0.01
 """Least by which that shrinks where less error is allowed: it bounds the steps of a motion that needs none [-]."""
-INSTANT_RTOL = 1e-3
+BRIEF_TIME_SHARE = 1e-3
 """A short time where steps follow their error, over the length of the run or 1 s: for differences, and as `dt` [-]."""
 REST_SPEED = 1e-6
 """Approach speed [m/s, rad/s] below which a contact closes without rebound and releases nobody: ends Zeno sequences."""
@@ -209,7 +209,7 @@ class _Motion:
             # shrinks and grows as steps do, so that runs of a motion so easy that its steps are the longest have others
             share = min(max((allowed / first) ** power, MIN_STEP_LIMIT_RATIO), MAX_STEP_SHARE / FIRST_STEP_SHARE)
             more = {"tol": tol, "tol_of": names, "driven": driven, "allowed": allowed, "longest": longest * share}
-            run, trajectory, problem = self.run(INSTANT_RTOL * min(length, 1.0), more, most)
+            run, trajectory, problem = self.run(BRIEF_TIME_SHARE * min(length, 1.0), more, most)
             return Trial(allowed, trajectory, problem, run, run.room, widest=share == MAX_STEP_SHARE / FIRST_STEP_SHARE)
 
         found = calibrated(trial, tol, first, finer, scheme.order(), names)

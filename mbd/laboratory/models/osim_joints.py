@@ -29,6 +29,7 @@ from mbd.laboratory.models.osim_file import (
 )
 from mbd.laboratory.models.osim_functions import Linear, function_of
 from mbd.laboratory.models.xml import Element
+from mbd.laboratory.quaternion_rates import UNIT_LENGTH_ATOL
 
 __all__ = ["connect", "end_at", "joints_of", "tree_of", "turned"]
 
@@ -49,8 +50,6 @@ MOTIONS: dict[str, tuple[tuple[str, tuple[float, float, float]], ...]] = {
 """What each coordinate of a joint does, in the order of the coordinates."""
 ORDER = ("translation1", "translation2", "translation3", "rotation1", "rotation2", "rotation3")
 """Motions one after another: shifts along axes of the parent, then turns about axes that move along."""
-UNIT_LENGTH_ATOL = 1e-3
-"""By how much the length of an axis may differ from 1, as printed digits make it [-]."""
 
 
 def joints_of(file: OsimFile, bodies: dict[str, Element]) -> list[OsimJoint]:

@@ -148,7 +148,7 @@ def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list
         return ()
 
     named: dict[str, Callable[[], Sequence[Node]]] = {
-        "accelerations": lambda: _all_accelerations(mechanism), "guards": lambda: programs.guards(equations),
+        "accelerations": lambda: mechanism._accelerations, "guards": lambda: programs.guards(equations),
         "scales": none, "compose": none if vector else lambda: programs.compose(equations) or (), "terms": none,
         "increment_rates": none if vector else lambda: programs.increment_rates(equations),
         "chart_end": none if vector else lambda: chart_end(equations),
@@ -157,10 +157,6 @@ def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list
     found = [Derivative(mechanism, name, outputs, places) for name, outputs in named.items()]
     held = (*WITHOUT, "a", "s", "lam", "c")
     return [*found, Derivative(mechanism, BALANCE, lambda: balance(mechanism), places, without=held)]
-
-
-def _all_accelerations(mechanism: Mechanism) -> Sequence[Node]:
-    return mechanism._accelerations
 
 
 def balance(mechanism: Mechanism) -> list[Node]:

@@ -81,8 +81,8 @@ def batch(
     base, states, columns = given_starts(starts)
     scheme = HHT(alpha=0.05) if integrator is None else integrator
     names, faults = names_given(results, "results", "quantities, such as ['hip.angle']")
-    changes, more = columns_of({**base.parameters, **(parameters or {})} if _maps(parameters) else parameters,
-                               "parameters")  # fmt: skip
+    changed = {**base.parameters, **(parameters or {})} if isinstance(parameters, Mapping | None) else parameters
+    changes, more = columns_of(changed, "parameters")
     options = {"contact": contact, "impact": impact, "locate": locate, "store": 1, "rest_speed": rest_speed,
                "backend": backend}  # fmt: skip
     if faults or more:
@@ -106,10 +106,6 @@ def worker_count(workers: Any) -> int:
     if isinstance(workers, bool) or not isinstance(workers, int) or not 1 <= workers <= 1024:
         raise ModelError(f"workers must be a number of threads from 1 to 1024, or None, not {shown(workers)}")
     return workers
-
-
-def _maps(values: Any) -> bool:
-    return values is None or isinstance(values, Mapping)
 
 
 def _length(columns: Mapping[str, Vector]) -> int:

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbd.equal import EQUAL_RTOL
+
 if TYPE_CHECKING:
     from mbd.simulation.run.stepper import Stepper
 
 __all__ = ["consistent_forces"]
 
-ROUND_OFF_RTOL = 1e-9
-"""Part of what a push gives the gap alone below which it gives none, as in the kernel [-]."""
 NONE, SEVERAL = "no consistent contact force", "more than one consistent contact force"
 
 
@@ -37,7 +37,7 @@ def consistent_forces(stepper: Stepper, contact: int) -> tuple[str, str]:
     free += terms.bias[normal]
     inertia = np.diag(terms.M)
     alone = float(np.sum(np.divide(terms.B[normal] ** 2, inertia, out=np.zeros(n), where=inertia > 0.0)))
-    if not (np.isfinite(free) and gained < -ROUND_OFF_RTOL * alone):  # other contacts hold it
+    if not (np.isfinite(free) and gained < -EQUAL_RTOL * alone):  # other contacts hold it
         return NONE, ""
     each, push = f": each newton of it gives {gained:.3g} m/s² of the gap, so that ", abs(free / gained)
     if free < 0.0:
