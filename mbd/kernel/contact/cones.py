@@ -84,14 +84,9 @@ def aim_along(K: Frictions, f: int, values: Reals, first: int) -> None:
 
 
 def aim_as_pulled(K: Frictions, f: int, lam: Reals) -> None:
-    """The group of friction f slides along its multipliers; where all are zero, along those that K.lean remembers."""
-    pulled = False
+    """The group of friction f slides along its multipliers."""
     for g in range(K.leader[f], K.leader[f] + K.group_size[f]):
         K.slip[g] = lam[K.friction_row[g]]
-        pulled = pulled or K.slip[g] != 0.0
-    for g in range(K.leader[f], K.leader[f] + K.group_size[f]):
-        if not pulled:
-            K.slip[g] = K.lean[g]
     aim(K, f)
 
 

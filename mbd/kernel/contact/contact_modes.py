@@ -15,12 +15,22 @@ from mbd.kernel.codes import (
     NOT_KNOWN_YET,
     SLIP,
 )
+from mbd.kernel.contact.branches import solve_directed
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import aim, follows, hold_directions, set_loose, set_sticking
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.contact.jams import stop_slide
 from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Switching
-from mbd.kernel.stepping.restart import active_rows, capture, evaluate, row_speed, take_consistent
+from mbd.kernel.stepping.restart import (
+    active_rows,
+    capture,
+    evaluate,
+    note_scales,
+    raise_scales,
+    restore_scales,
+    row_speed,
+    take_consistent,
+)
 
 __all__ = ["REST_SPEED", "resolve_contact_modes"]
 
@@ -39,6 +49,7 @@ def resolve_contact_modes(K: Switching) -> int:
     for _ in range(K.n_contacts):
         if status >= 0:
             break
+        K.looks_ahead = 0
         status = stop_slide(K, -1 - status)
         if status == 0:
             status = choose_modes(K)
@@ -91,7 +102,16 @@ def choose_modes(K: Switching) -> int:
         if K.kind[c] == 0:
             if (K.closed[c] == 1 and K.opens[c] == 0) or (K.closed[c] == 0 and K.touched[c] == 1):
                 K.free[c] = 1
-    return find_branches(K)
+    if K.looks_ahead == 0:
+        return find_branches(K)
+    # nothing that tells them apart acts yet: they are those of the forces that follow
+    note_scales(K)
+    evaluate(K, K.time_ahead, K.q_ahead, K.y_ahead)
+    raise_scales(K, False)
+    status = find_branches(K)
+    restore_scales(K)
+    evaluate(K, K.time, K.q, K.y)
+    return status if status != 0 else solve_directed(K, 0)
 
 
 def find_branches(K: Balance) -> int:

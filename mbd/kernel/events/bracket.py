@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, OPEN_FORCE, OPEN_GAP, OPEN_PULL, PRESS, SLIP, STICK, WATCH
+from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, OPEN_FORCE, OPEN_GAP, OPEN_PULL, PRESS, SLIP, STICK, WATCH
 from mbd.kernel.contact.cones import along
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, guard_value, pull_round_off
 from mbd.kernel.events.hermite import first_guess
 from mbd.kernel.events.refine import enough, refine
-from mbd.kernel.records import ContactForces, Guards, Kernel, Sizes
+from mbd.kernel.records import ContactForces, Guards, Kernel, Sizes, Switching
 from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate, put_on_rows
+from mbd.kernel.stepping.restart import largest_force
+from mbd.kernel.stepping.scales import FORCE_ULPS
 
 __all__ = ["bracket", "flag_of"]
 
 MAX_HALVINGS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
+CLEAR_FORCE_RATIO = 1e-8
+"""Part of the largest force by which a force is clearly beyond what it may be [-]."""
 SURFACE_RTOL = 1e-10
 """Part of its terms within which a gap is at rest on its surface [-]."""
 
@@ -30,9 +34,8 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         K.event_after = high
         return 0
     d_high = guard_rate(K, kind, index)
-    if kind == SLIP:  # the direction of the pull, which may be none yet at the near end
-        for g in range(K.leader[index], K.leader[index] + K.group_size[index]):
-            K.lean[g] = K.impulse[K.friction_row[g]]
+    if kind == SLIP or kind == OPEN_PULL:
+        note_ahead(K, high)
     # the near end, further on where the guard begins at the root of its last event
     status = candidate_at(K, low)
     if status != 0:
@@ -50,6 +53,7 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
             if status <= 0:
                 return -status
         if low == 0.0:
+            K.looks_ahead = 1 if kind == SLIP or kind == OPEN_PULL else 0
             event_at_start(K)
         f_low = guard_value(K, kind, index, K.time + low)
     if f_low <= 0.0:
@@ -99,6 +103,8 @@ def root_tolerance(K: ContactForces, kind: int, index: int, f_low: float, f_high
     """
     if kind == CLOSE:
         return float(gap_tolerance(K, index))
+    if kind == OPEN_PULL:
+        return FORCE_ULPS * EPS * largest_force(K)
     if kind == PRESS or kind == OPEN_FORCE:
         return float(enough(K, kind, index, f_low, f_high))
     if kind == SLIP:
@@ -111,7 +117,9 @@ def begins_at_root(K: ContactForces, kind: int, index: int, f_low: float, f_high
     near = root_tolerance(K, kind, index, f_low, f_high)
     if f_low > 0.0:
         return f_low <= near and kind != CLOSE
-    return kind == STICK or kind == CLOSE or kind == PRESS or (kind == SLIP and f_low >= -near)
+    if kind == SLIP or kind == OPEN_PULL:
+        return f_low >= -near
+    return kind == STICK or kind == CLOSE or kind == PRESS
 
 
 def take_end(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
@@ -155,9 +163,19 @@ def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> floa
         status = event_candidate(K, low, K.time + low)
         if status != 0:
             return -float(status)
-        if guard_value(K, kind, index, K.time + low) > tiny:
+        value = guard_value(K, kind, index, K.time + low)
+        if value > tiny:
             return low
+        if (kind == SLIP or kind == OPEN_PULL) and value < -CLEAR_FORCE_RATIO * largest_force(K):
+            note_ahead(K, low)
     return 0.0
+
+
+def note_ahead(K: Switching, place: float) -> None:
+    """Keep the candidate at a distance from the accepted state, where forces tell apart what they do not there."""
+    K.time_ahead = K.time + place
+    K.q_ahead[: K.n_q] = K.q1[: K.n_q]
+    K.y_ahead[: K.n] = K.y1[: K.n]
 
 
 def parts_slowly(K: Kernel, c: int, high: float) -> int:

@@ -13,6 +13,7 @@ from mbd.kernel.codes import (
     NO_IMPACT,
     OPEN_FORCE,
     OPEN_PULL,
+    SLIP,
     WATCH,
 )
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
@@ -108,6 +109,8 @@ def handle_event(K: Kernel) -> int:
     kind = K.event_kind
     index = K.event_index
     first = K.n_logged
+    if (kind != SLIP and kind != OPEN_PULL) or K.event_after > 0.0:
+        K.looks_ahead = 0
     at_start = K.event_after <= 0.0 and K.stabilized == 0 and (kind == OPEN_FORCE or kind == OPEN_PULL)
     if at_start:  # the accepted row, which does not pull, is the one before
         store_row(K)

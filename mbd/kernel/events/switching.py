@@ -274,6 +274,9 @@ def switch(K: Switching) -> int:
             stop_together(K, index)
         elif K.friction_contact[index] >= 0 and K.row_unit[K.friction_row[index]] == 1:
             stop_spin(K, index)
+    elif K.looks_ahead == 1:  # all contacts and frictions choose together
+        mark_touching(K)
+        return 0
     elif kind == SLIP:
         set_loose(K, index, 3)
         set_sticking(K, index, 0)

@@ -60,9 +60,7 @@ class Frictions(Contacts):
     slip: Reals = reals(lambda s: s.n_frictions, kept=True)  # sign of sliding; of a group the cosines of its direction
     hold: Reals = reals(lambda s: s.n_frictions, kept=True)  # how much of these counts: see `mbd.kernel.contact.cones`
     own_hold: Reals = reals(lambda s: s.n_frictions)  # the same of a step whose directions are found by continuation
-    lean: Reals = reals(
-        lambda s: s.n_frictions, kept=True
-    )  # along which each slid last, or pulls as its slip is located
+    lean: Reals = reals(lambda s: s.n_frictions, kept=True)  # the direction in which each slid last
     across: Reals = reals(lambda s: s.n_frictions)  # γ left across directions that are held, over ‖γ‖ before the step
     limit: Reals = reals(lambda s: s.n_frictions)  # largest friction
     base_limit: Reals = reals(lambda s: s.n_frictions)  # the same at zero multipliers
@@ -108,6 +106,10 @@ class Events(SchemeAbilities):
     event_after: float = place("detail")  # its distance from the start of the step [s]
     event_kind: int = place("state")  # −1: none
     event_index: int = place("state")
+    looks_ahead: int = place("state")  # 1: what acts now does not tell who pushes and sticks; what follows does,
+    time_ahead: float = place("clock")  # which is that at this time,
+    q_ahead: Reals = reals(lambda s: s.n_q, kept=True)  # in this state
+    y_ahead: Reals = reals(lambda s: s.n, kept=True)
     seen: Reals = reals(  # who was closed, stuck, … at an earlier switch of this instant, and the state
         lambda s: 1 + 2 * s.n_contacts + 2 * s.n_frictions + s.n_guards + s.n_q + s.n, kept=True
     )

@@ -83,6 +83,7 @@ def restart(K: Kernel) -> int:
         update_armed(K)
     if K.n_cones > 0:
         let_directions_go(K)
+    K.looks_ahead = 0
     return 0
 
 
