@@ -123,7 +123,7 @@ def _works(
         trapezoid = _trapezoid(record.time, value)
         unsure = np.abs(np.diff(work) - trapezoid)
         if power.lost is not None:
-            work = _of_stop(columns, power.lost, work, unsure, least)
+            work = _of_stop(columns, power.lost, value, work, unsure, least)
         elif power.kind in SPENT:
             work = never_giving(work, value, trapezoid)
         if power.name == "moving coordinates":
@@ -168,12 +168,15 @@ def _withheld_if_unsure(part: Part, doubt: float, least: float) -> Part:
     return replace(part, energy=np.full(len(part.energy), np.nan), withheld=reason)
 
 
-def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, least: float) -> Vector:
+def _of_stop(
+    columns: ModelColumns, lost: Lost, given: Vector, direct: Vector, unsure: Vector, least: float
+) -> Vector:  # fmt: skip
     """Work of a penalty contact: ∫ p ġ dt of the impacts whose rows tell it, else −U(g) and what was lost.
 
     ∫ p ġ dt is the more accurate where rows resolve an impact, as they balance forces; of a few rows it may be
     anything. What a contact still holds as it opens, and what it holds as it closes, as rubber that was struck before,
-    is its own: neither is given to the mechanism at that instant.
+    is its own: neither is given to the mechanism at that instant. Where what pushes is met between two rows, as the
+    surface of rubber that comes back, the power p ġ `given` has a kink there, and −U(g) tells the work.
     """
     time, closed = columns.record.time, columns.record.closed[:, lost.contact].astype(bool)
     nodes = [node for node in (lost.elastic, lost.value, lost.rate) if node is not None]
@@ -200,7 +203,8 @@ def _of_stop(columns: ModelColumns, lost: Lost, direct: Vector, unsure: Vector, 
     allowed += held[begins]
     np.add.at(allowed, episode[1:], np.maximum(put_in, 0.0))
     is_known = (doubt <= MAX_WORK_ERROR * size) & (gain <= allowed)
-    return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]], np.diff(direct), steps))])
+    is_met = (given[:-1] == 0.0) & (given[1:] != 0.0) & (held[:-1] > 0.0)
+    return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]] & ~is_met, np.diff(direct), steps))])
 
 
 def _refined(

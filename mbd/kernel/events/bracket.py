@@ -7,7 +7,7 @@ from mbd.kernel.contact.cones import along
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, guard_value, pull_round_off
 from mbd.kernel.events.hermite import first_guess
 from mbd.kernel.events.refine import enough, refine
-from mbd.kernel.records import ContactForces, Guards, Kernel, Sizes, Switching
+from mbd.kernel.records import ContactForces, Guards, Kernel, Sizes
 from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate, put_on_rows
 from mbd.kernel.stepping.restart import largest_force
 from mbd.kernel.stepping.scales import FORCE_ULPS
@@ -171,7 +171,7 @@ def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> floa
     return 0.0
 
 
-def note_ahead(K: Switching, place: float) -> None:
+def note_ahead(K: Guards, place: float) -> None:
     """Keep the candidate at a distance from the accepted state, where forces tell apart what they do not there."""
     K.time_ahead = K.time + place
     K.q_ahead[: K.n_q] = K.q1[: K.n_q]
