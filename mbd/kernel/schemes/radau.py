@@ -314,7 +314,8 @@ def judge_raised(K: Kernel, h: float, t1: float, m: int, tolerance: float, stuck
         if left <= 1.0:
             K.n_stagnations += 1
             return 0
-        if stuck:  # earlier, one good correction makes the next look like the last
+        # earlier, one good correction makes the next look like the last; below EPS nothing but luck is left
+        if stuck or K.tolerance < EPS:
             K.failure_size = left
             return TOO_TIGHT
     status = NOT_CONVERGED
