@@ -36,7 +36,7 @@ settings.register_profile("thorough", parent=settings.get_profile("ci"), derando
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 
-WITHOUT_KERNEL = ("test_layers.py", "tape", "topology", "bodies", "forces", "equations")
+WITHOUT_KERNEL = ("test_layers.py", "tape", "topology", "bodies", "equations", "forces")
 """Parts of the tests that call no compiled kernel, or seldom, those last."""
 
 

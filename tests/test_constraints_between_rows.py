@@ -48,6 +48,7 @@ def assert_rows_hold(run: mbd.Trajectory, seed: int = 1) -> None:
     assert np.max(rate) <= np.max(fastest) + ROUND_OFF
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", SCHEMES)
 @pytest.mark.parametrize(
     ("kind", "seed"), [("loop", 1), ("redundant", 1), ("redundant", 2), ("standing", 2), ("turning", 1), ("turning", 5)]

@@ -68,6 +68,7 @@ def test_every_scheme_judges_cases_by_turns():
     assert set().union(*(quick(place, case) for place, case in enumerate(CASES))) == set(SCHEMES)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("case", "name"), EVERY)
 def test_what_must_hold_in_a_hard_case_holds(case: HardCase, name: str):
     outcome = case.judge(scheme(name))

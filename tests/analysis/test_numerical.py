@@ -73,6 +73,7 @@ def test_damping_and_elongation_are_those_of_the_exact_matrix(name):
     assert [each.elongation for each in found] == pytest.approx(longer, abs=1e-10)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", SCHEMES)
 def test_the_radius_at_infinity_is_reached_though_roots_are_multiple_there(name):
     assert measured(name).rho_inf == pytest.approx(I1[f"rho_infinity | {name}"].value, abs=2e-5)

@@ -45,6 +45,7 @@ def bouncing(seed, **event):
     return model, start, sign, falling * (1.0 + 2.1 * restitution * (1.0 + restitution)) + 0.05, speed
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("backend", ["llvm", "python"])
 @pytest.mark.parametrize("contact", ["events", "nonsmooth"])
 @pytest.mark.parametrize("direction", [-1, 0, 1])

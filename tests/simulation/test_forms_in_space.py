@@ -199,6 +199,7 @@ Law = Callable[[Scene, Integrator, str, Path, int], None]
 LAWS: tuple[Law, ...] = (files, halves, texts, twins, batches, orientations)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
 @pytest.mark.parametrize(("kind", "joint", "seed"), QUICK)
 def test_one_run_in_two_forms(kind, joint, seed, law, tmp_path):

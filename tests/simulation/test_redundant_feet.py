@@ -233,6 +233,7 @@ def stool_with_an_arm(seed):
     return model, mbd.assemble(model, {"place.z": 0.3}, closed=[f"foot {k}" for k in range(3)])
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_explicit_steps_share_a_load_among_feet_once_while_a_joint_slides(seed):
     """Forces that feet in their cones share were shared out again, by another rule: their sum was another one."""

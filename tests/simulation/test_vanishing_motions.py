@@ -44,6 +44,7 @@ def works(scene: Scene, scheme: str, step: Any) -> None:
         np.testing.assert_allclose(run[coordinate], wanted, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("kind", DRIVEN)
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_driven_mechanisms_rest_move_and_are_held(scheme: str, kind: str) -> None:
@@ -60,6 +61,7 @@ def test_driven_mechanisms_do_whatever_they_are_asked_for(scheme: str, kind: str
             works(driven(kind, seed, SI, ("auto", "all")[seed % 2]), scheme, step)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("kind", BALANCED)
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_balanced_mechanisms_keep_their_energy(scheme: str, kind: str) -> None:
@@ -94,6 +96,7 @@ def keeps_energy(scene: Scene, scheme: str, step: Any) -> None:
     assert np.ptp(run.energy.total) <= bound * kinetic[0] + 1e-13 * (1.0 + np.max(kinetic)), (scene.model, step)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("scheme", ["HHT", "RadauIIA"])
 @pytest.mark.parametrize("units", OTHER_UNITS, ids=repr)
 def test_units_do_not_matter(units: Units, scheme: str) -> None:
