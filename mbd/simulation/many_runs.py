@@ -163,7 +163,8 @@ class ManyRuns:
                 self._leave()
             except KeyboardInterrupt:
                 self.interrupted = done = True
-            steps = max(MIN_STEPS, min(2 * steps, int(steps * CALL_TIME / max(perf_counter() - begun, 1e-6))))
+            if v.steps_left <= 0:
+                steps = max(MIN_STEPS, min(2 * steps, int(steps * CALL_TIME / max(perf_counter() - begun, 1e-6))))
         return self._ends(int(v.run), lines)
 
     def none(self) -> Ends:

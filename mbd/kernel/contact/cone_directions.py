@@ -167,12 +167,12 @@ def newton_turns(K: Balance, level: int, count: int) -> int:
             return status
         find_misses(K, count)
         for i in range(count):
-            K.side_matrix[i * count + j] = (K.cone_miss[i] + K.cone_turn[i]) / DIFFERENCE_ANGLE
+            K.cone_slope[i * count + j] = (K.cone_miss[i] + K.cone_turn[i]) / DIFFERENCE_ANGLE
         keep_directions(K, False)
-    if factor(K.side_matrix, count, K.side_pivots) != 0:
+    if factor(K.cone_slope, count, K.side_pivots) != 0:
         K.cone_turn[:count] = 0.0
         return 0
-    solve(K.side_matrix, count, K.side_pivots, K.cone_turn)
+    solve(K.cone_slope, count, K.side_pivots, K.cone_turn)
     return 0
 
 

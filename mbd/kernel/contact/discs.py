@@ -51,7 +51,7 @@ def disc_slack(K: Complementarity, i: int, unknowns: int) -> float:
 
 
 def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
-    """g_i′ into K.disc_slope, and what κ_i g_i″ and κ_i/s_i g_i′ g_i′ᵀ bring into K.side_matrix."""
+    """g_i′ into K.disc_slope, and what κ_i g_i″ and κ_i/s_i g_i′ g_i′ᵀ bring into K.disc_matrix."""
     width = K.n_disc_unknowns
     limit = disc_value(K, DISC_SIZE * i + 3, unknowns)
     x = disc_value(K, DISC_SIZE * i, unknowns) / limit
@@ -74,7 +74,7 @@ def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
         if first == 0.0 and second == 0.0 and third == 0.0 and slope == 0.0:
             continue
         for k in range(unknowns):
-            K.side_matrix[j * unknowns + k] += (
+            K.disc_matrix[j * unknowns + k] += (
                 steep * slope * K.disc_slope[i * width + k]
                 + bend * first * (K.disc_map[o + k] - x * K.disc_map[o_l + k])
                 + bend * second * (K.disc_map[o + width + k] - y * K.disc_map[o_l + k])
@@ -85,10 +85,10 @@ def find_slopes(K: Complementarity, i: int, unknowns: int) -> None:
 def find_step(K: Complementarity, unknowns: int, discs: int, smallest: bool, target: float) -> int:
     """The step of Newton's method, of y into K.disc_step and of κ into K.disc_change; 1 if there is none."""
     width = K.n_disc_unknowns
-    K.side_matrix[: unknowns * unknowns] = 0.0
+    K.disc_matrix[: unknowns * unknowns] = 0.0
     if smallest:
         for j in range(unknowns):
-            K.side_matrix[j * unknowns + j] = 1.0
+            K.disc_matrix[j * unknowns + j] = 1.0
     for i in range(discs):
         find_slopes(K, i, unknowns)
     for j in range(unknowns):
@@ -98,9 +98,9 @@ def find_step(K: Complementarity, unknowns: int, discs: int, smallest: bool, tar
         for i in range(discs):
             value += target / K.disc_left[i] * K.disc_slope[i * width + j]
         K.disc_step[j] = -value
-    if factor(K.side_matrix, unknowns, K.side_pivots) != 0:
+    if factor(K.disc_matrix, unknowns, K.side_pivots) != 0:
         return 1
-    solve(K.side_matrix, unknowns, K.side_pivots, K.disc_step)
+    solve(K.disc_matrix, unknowns, K.side_pivots, K.disc_step)
     for i in range(discs):
         along = 0.0
         for j in range(unknowns):

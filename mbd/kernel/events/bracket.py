@@ -25,6 +25,7 @@ SURFACE_RTOL = 1e-10
 def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
     """Root of the fired guard between two distances from the accepted state; K.event_after its distance."""
     K.n_locations += 1
+    K.looks_ahead = 0
     # the far end, with velocities on the rows: has the guard fired at all?
     put_on_rows(K, K.time + high)
     f_high = guard_value(K, kind, index, K.time + high)

@@ -39,7 +39,8 @@ class Complementarity(SchemeAbilities):
     past_time: float = place("detail")  # that they cover
     n_repeats: int = place("state")  # of a non-smooth step
     cone_who: Integers = integers(lambda s: s.n_frictions)  # of each unknown angle, the group whose direction it turns
-    side_matrix: Reals = reals(lambda s: max(s.n_frictions, s.n_disc_unknowns) ** 2)  # of small systems beside `kkt`
+    disc_matrix: Reals = reals(lambda s: s.n_disc_unknowns * s.n_disc_unknowns)  # of a step within discs
+    cone_slope: Reals = reals(lambda s: s.n_frictions * s.n_frictions)  # of misses by turns
     side_pivots: Integers = integers(lambda s: max(s.n_unknowns, s.n_frictions, s.n_disc_unknowns))
     cone_across: Reals = reals(lambda s: 3 * s.n_frictions)  # of each, the vector along which it turns
     cone_miss: Reals = reals(lambda s: s.n_frictions)  # of each, part of γ across the direction

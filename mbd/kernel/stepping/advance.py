@@ -39,6 +39,8 @@ def begin(K: Kernel) -> int:
         return FULL
     while K.restart_due > 0:
         visible = K.restart_due == 1
+        if visible:  # somebody may have changed the state or a parameter
+            K.looks_ahead = 0
         first = K.n_logged
         if K.n_machines > 0:
             status = take_transitions(K)
