@@ -30,6 +30,12 @@ PLACES = [(0.06, -0.05, 0.08), (-0.07, -0.2, -0.05), (0.03, -0.3, 0.1)]
 """Markers on each segment [m]; 40 of them are taken."""
 
 
+def _second(task: Callable[[], float]) -> float:
+    """Seconds of a call right behind another one, as for trials of a session, whatever other tasks left in caches."""
+    task()
+    return task()
+
+
 def measure(repeats: int) -> list[Figure]:
     """Microseconds of a frame."""
     person = mbd.human(70.0, 1.75)
@@ -57,7 +63,7 @@ def measure(repeats: int) -> list[Figure]:
     if tool is not None:
         tasks["filmed"] = partial(processor_seconds, mbd.inverse_dynamics, model, _filmed(model, FRAMES))
         tasks["opensim"] = tool
-    samples = interleaved(tasks, repeats)
+    samples = interleaved({name: partial(_second, task) for name, task in tasks.items()}, repeats)
     other = samples["pinocchio"].least / FRAMES * 1e6 if calls is not None else None
     yardstick, ratio = ("", None) if other is None else ("rnea from Python", 1.2)
     moments, postures = samples["moments"], samples["postures"]
