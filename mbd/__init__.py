@@ -327,10 +327,8 @@ if not TYPE_CHECKING:  # type checkers know the names above, and that there are 
             return importlib.import_module(f"mbd.{name}")
         if name in _HOME:
             from mbd.arguments import explained
-            from mbd.free_memory import all_kept
 
-            with all_kept():
-                home = importlib.import_module(_HOME[name])
+            home = importlib.import_module(_HOME[name])
             value = getattr(home, name)
             if home.__name__ != "mbd.tape.functions":  # which laws call in every step
                 value = explained(value)

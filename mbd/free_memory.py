@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import gc
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["ASSUMED_BYTES", "all_kept", "available", "size_in_words"]
+__all__ = ["ASSUMED_BYTES", "available", "size_in_words"]
 
 ASSUMED_BYTES = 4.0e9
 """Taken for the free memory where the system does not tell it [bytes]."""
@@ -19,19 +16,6 @@ PROC, CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
 def available() -> float:
     """Free memory [bytes]: what the system has, and no more than limits of control groups and of the process leave."""
     return max(min(_of_system(), _of_groups(), _of_process()), 0.0)
-
-
-@contextmanager
-def all_kept() -> Iterator[None]:
-    """While modules are read and equations derived, all of which stays, nobody searches it for garbage again and again:
-    a sixth of the time of a fresh process."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def size_in_words(size: float) -> str:

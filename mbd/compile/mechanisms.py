@@ -12,7 +12,6 @@ from mbd.compile.forking import free_in_child
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
-from mbd.free_memory import all_kept
 from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
 from mbd.topology.description import Description
@@ -129,8 +128,7 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
     described = model
     if tunable:
         described = model.with_tunable(*sorted(tunable))
-    with all_kept():
-        made = Mechanism(derive(described), backend)
+    made = Mechanism(derive(described), backend)
     if made.backend.note:
         doubt(made.backend.note, of=PROCESS)
     if tunable:

@@ -79,20 +79,3 @@ def test_a_parameter_folded_into_the_equations_keeps_no_model():
     del model, start
     gc.collect()
     assert [reference() for reference in references if reference() is not None] == []
-
-
-@pytest.mark.parametrize("enabled", [True, False])
-def test_garbage_is_searched_for_after_a_derivation_as_before(enabled):
-    """Also after one that was refused; a user who has turned the search off keeps it off."""
-    before = gc.isenabled()
-    try:
-        (gc.enable if enabled else gc.disable)()
-        model, start, *_ = loop()
-        assert gc.isenabled() == enabled
-        mbd.simulate(model, start, dt=0.01, until=0.01)
-        assert gc.isenabled() == enabled
-        with pytest.raises(mbd.ModelError):
-            mbd.assemble(mbd.Model("nothing"))
-        assert gc.isenabled() == enabled
-    finally:
-        (gc.enable if before else gc.disable)()
