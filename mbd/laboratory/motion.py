@@ -433,8 +433,6 @@ class _Spline:
 
 
 # loops --------------------------------------------------------------------------------------------------------------
-
-
 def _closed(
     model: Any, mechanism: Mechanism, motion: Motion, missing: list[str], changed: Mapping[str, float]
 ) -> Motion:

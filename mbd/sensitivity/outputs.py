@@ -18,7 +18,7 @@ __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
 
 RESULT_RTOL = 1e-7
 """Difference of a result from that of the run, over its size, that is round-off [-]."""
-MOST_ROWS = 64
+MAX_CHECKED_ROWS = 64
 """Rows from which the size of a result is known."""
 
 
@@ -92,7 +92,7 @@ def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]
     )
 
 
-def _at_rows(rows: RunRows, found: Passed, names: Sequence[str], most: int = MOST_ROWS) -> dict[str, Vector]:
+def _at_rows(rows: RunRows, found: Passed, names: Sequence[str], most: int = MAX_CHECKED_ROWS) -> dict[str, Vector]:
     """Named results at some rows of the run and the last one, evaluated together."""
     single, columns = list[str](), rows.run.columns
     for name in names:

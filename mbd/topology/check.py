@@ -335,7 +335,7 @@ def rule_faults(model: Ruled) -> list[str]:
 def machine_faults(
     model: Machined, check: Callable[[Any], ParameterCheck], geometry: Collection[str] = ()
 ) -> list[str]:  # fmt: skip
-    """Parameters that modes and sampled laws set, and that do not exist, belong to bodies or may not have the value.
+    """Parameters that modes and sampled laws set: that do not exist, belong to bodies, or get a value out of bounds.
 
     check : of the model's parameters; geometry : names of those that bodies are made of
     """

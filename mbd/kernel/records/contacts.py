@@ -106,9 +106,9 @@ class Events(SchemeAbilities):
     event_after: float = place("detail")  # its distance from the start of the step [s]
     event_kind: int = place("state")  # −1: none
     event_index: int = place("state")
-    looks_ahead: int = place("state")  # 1: what acts now does not tell who pushes and sticks; what follows does,
-    time_ahead: float = place("clock")  # which is that at this time,
-    q_ahead: Reals = reals(lambda s: s.n_q, kept=True)  # in this state
+    looks_ahead: int = place("state")  # 1: forces now do not tell which contacts push and stick
+    time_ahead: float = place("clock")  # instant of forces that do [s]
+    q_ahead: Reals = reals(lambda s: s.n_q, kept=True)  # coordinates then
     y_ahead: Reals = reals(lambda s: s.n, kept=True)
     seen: Reals = reals(  # who was closed, stuck, … at an earlier switch of this instant, and the state
         lambda s: 1 + 2 * s.n_contacts + 2 * s.n_frictions + s.n_guards + s.n_q + s.n, kept=True
