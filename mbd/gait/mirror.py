@@ -62,10 +62,14 @@ class Mirror:
         """Mirror images of velocities (…, n_v), and of increments."""
         return np.asarray(v[..., self.v] if self.reflection is None else self.reflection.v * v[..., self.v])
 
+    def of_changes(self, anchors: Any) -> Matrix:
+        """Mirror images of changes of held values (…, n_anchors), of which the numbers of states have none."""
+        found = np.asarray(anchors)[..., self.anchors]
+        return found if self.reflection is None else np.asarray(self.reflection.anchors * found)
+
     def of_anchors(self, anchors: Any) -> Matrix:
         """Mirror images of held values (…, n_anchors)."""
-        found = np.asarray(anchors)[..., self.anchors]
-        found = found if self.reflection is None else self.reflection.anchors * found
+        found = self.of_changes(anchors)
         for place, numbers in self.states.items():
             found[..., place] = numbers[np.abs(found[..., place]).astype(int)]
         return np.asarray(found)

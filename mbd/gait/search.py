@@ -182,9 +182,9 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
 
 
 def _refined(map_: ReturnMap, chart: Chart, found: MapDerivative, values: Values) -> MapDerivative:
-    """P of a walker in space by the exact derivative of its run, where a pass knows it; its error is what the
-    differences differ by."""
-    if found.missing or not in_space(map_.model):
+    """P by the exact derivative of the run, where a pass knows it, of walkers in space and of those that hold values
+    or first-order states; its error is what the differences differ by."""
+    if found.missing or not (in_space(map_.model) or any(chart.counts[2:])):
         return found
     exact, size = exact_derivative(map_, chart, np.zeros(chart.size), values), chart.size
     if exact is None:

@@ -6,7 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 
-from mbd.arrays import Matrix, Vector
+import numpy as np
+
+from mbd.arrays import Matrix
 from mbd.bodies.values import among, is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of, tunable_model
 from mbd.dataclass import dataclass
@@ -14,7 +16,7 @@ from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
-from mbd.sensitivity.derivative import Differentiated, end_of, passed
+from mbd.sensitivity.derivative import Differentiated, passed
 from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.made_run import made_with
 from mbd.sensitivity.outputs import lines_of, taken_apart, usual
@@ -106,14 +108,24 @@ class Table(Asked):
 
 
 class EndState(Asked):
-    """d(q, v) and dt at the end, as `final_state_derivative` has them; controllers are refused."""
+    """The derivatives of (q, v, z, anchors) and of the time at the end, (n_v + n + A + 1, D); controllers are refused.
+
+    along : (n_v + n + A, D) those of the start
+    """
+
+    def __init__(self, along: Matrix) -> None:
+        super().__init__(())
+        self.along = along
+
+    def _ways(self, known: Mapping[str, float]) -> tuple[list[Any], Sequence[str]]:
+        return [Direction(f"direction {k}", along=column) for k, column in enumerate(self.along.T)], ()
 
     def source(self, model: Any, scheme: Integrator) -> Source | None:
         return None
 
     def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
-        known: tuple[Matrix, Vector] = end_of(found)
-        self.found = known
+        at_end = found.walked.motion.tangent
+        self.found = np.vstack([at_end.q, at_end.y, at_end.anchors, at_end.t])
 
 
 class Carried(Table):

@@ -37,11 +37,13 @@ class Direction:
     name : as it was asked for
     q, y : numbers of the direction of the configuration or the velocity that it is, −1 if it is none
     parameters : rates of change of parameters by name; restitutions : of those of contacts, by name
+    along : derivatives of (q, y, anchors) of a start that stays on its rows so; None: others complete it
     """
 
     name: str
     q: int = -1
     y: int = -1
+    along: Vector | None = None
     parameters: Mapping[str, float] | None = None
     restitutions: Mapping[str, float] | None = None
 
@@ -80,8 +82,10 @@ def restitutions_of(wanted: Sequence[Direction]) -> dict[str, Vector]:
     return found
 
 
-def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]]]) -> list[Direction]:
+def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]] | Direction]) -> list[Direction]:
     """Names, and pairs of a name and the rates of parameters by it, as directions; three of 'hip.orientation'.
+
+    What is a direction already stays.
 
     Raises
     ------
@@ -93,6 +97,9 @@ def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]
     bounces = set(restitution_names(equations)) - known
     found = []
     for each in expanded(equations, wrt):
+        if isinstance(each, Direction):
+            found.append(each)
+            continue
         name, parameters = (each, None) if isinstance(each, str) else each
         wanted = [name] if parameters is None else list(parameters)
         for one in wanted:
@@ -126,6 +133,7 @@ def start_tangent(
     """
     c, count = programs.columns, len(wanted)
     q, y, p = np.zeros((c.n_v, count)), np.zeros((c.n, count)), np.zeros((c.parameters, count))
+    anchors = np.zeros((c.anchors, count))
     names = list(rows.record.parameter_names)
     for k, each in enumerate(wanted):
         if each.q >= 0:
@@ -134,7 +142,11 @@ def start_tangent(
             y[each.y, k] = 1.0
         for name, rate in (each.parameters or {}).items():
             p[programs.places.index(names.index(name)), k] = rate
-    tangent = Tangent(np.zeros(count), q, y, np.zeros((c.anchors, count)), p)
+        if each.along is not None:
+            q[:, k], y[:, k], anchors[:, k] = np.split(each.along, [c.n_v, c.n_v + c.n])
+    tangent = Tangent(np.zeros(count), q, y, anchors, p)
+    if all(each.along is not None for each in wanted):
+        return tangent
     record = rows.record
     motion = Motion(float(rows.ends[0]), np.array(record.q[0]), rows.y(0), rows.start_anchors(), tangent)
     fixed = directions(rows, list(held))

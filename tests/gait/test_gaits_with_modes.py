@@ -10,6 +10,8 @@ import pytest
 
 import mbd
 from mbd.errors import ModelError
+from mbd.gait.exact_derivative import exact_derivative
+from mbd.gait.map_derivative import measured
 
 
 def walker(remembers: bool = False, more: tuple[Any, ...] = ()) -> tuple[mbd.Model, mbd.State]:
@@ -86,6 +88,47 @@ def test_multipliers_do_not_depend_on_where_the_section_is_though_values_are_rem
     names = ("stance.left angle", "stance.right angle")
     run = mbd.simulate(model, strike.state, mbd.RungeKutta853(), dt=0.01, until=2.2 * strike.period)
     np.testing.assert_allclose(run.at(1.5 * strike.period)[names[1]], strike.state["left hip.angle"], atol=1e-8)
+
+
+def one_sided(gait: mbd.LimitCycle, c: Any, h: float) -> Any:
+    """∂(coordinates)/∂c of the return map by one-sided differences of order 4."""
+    columns = []
+    for unit in np.eye(gait.chart.size):
+        there = [measured(gait.map, gait.chart, c + k * h * unit, gait.parameters).c for k in range(5)]
+        columns.append(np.dot([-25.0, 48.0, -36.0, 16.0, -3.0], there) / (12.0 * h))
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize(
+    ("section", "strides", "mirror"),
+    [
+        ("right foot", 1, ("left", "right")), ("grip: soft to firm", 2, ("left", "right")), ("right foot", 2, None),
+        ("passing", 1, None), ("sway", 1, None),
+    ],
+)  # fmt: skip
+def test_return_maps_with_remembered_values_have_exact_derivatives(section: str, strides: int, mirror: Any) -> None:
+    """Timers, sections that watch a remembered value, a state of first order; on the gait and beside it."""
+    random = np.random.default_rng(len(section) + strides)
+    passing = mbd.measure(lambda q, held: q + 0.5 * held, "right hip.angle", "stance.left angle")
+    sway = mbd.measure(lambda v, held: v - 0.2 * held, "right hip.rate", "stance.left angle")
+    model, start = walker(
+        remembers=True, more=(mbd.Event("passing", passing, direction=1), mbd.Event("sway", sway, direction=1))
+    )
+    waist = next(joint for joint in model.joints if joint.name == "waist")
+    inductance = random.uniform(0.1, 0.3)
+    model.apply(mbd.DCMotor("fan", waist, lambda v: -v, 1.0, 0.2, inductance, arguments=["waist.rate"]))
+    start = mbd.assemble(
+        model, dict(zip(start.names, start.q, strict=True)), dict(zip(start.velocity_names, start.v, strict=True)),
+        closed=["left foot"],
+    )  # fmt: skip
+    numbers = {"grip.soft to firm.after": random.uniform(0.2, 0.4), "torso.mass": random.uniform(1.8, 2.2)}
+    strike = mbd.limit_cycle(model, start, section="right foot", parameters=numbers)
+    gait = mbd.limit_cycle(model, strike.state, section=section, mirror=mirror, strides=strides, parameters=numbers)
+    assert gait.map_derivative.how.startswith("exact")
+    for c in (np.zeros(gait.chart.size), 1e-3 * random.uniform(-1.0, 1.0, gait.chart.size)):
+        exact = exact_derivative(gait.map, gait.chart, c, gait.parameters)
+        for h in (2e-4, -2e-4):
+            np.testing.assert_allclose(exact, one_sided(gait, c, h), atol=1e-7 * np.max(np.abs(exact)))
 
 
 def test_runs_of_many_starts_are_those_of_each_to_the_bit() -> None:
