@@ -47,7 +47,7 @@ class Branch:
     """Gaits along a parameter.
 
     parameter : its name; curve : points in order; special : folds, doublings, tori and branch points, located
-    stopped : why it ends where it does
+    stopped : why it ends where it does; complete : False where Ctrl-C ended it
     """
 
     name: str
@@ -57,6 +57,7 @@ class Branch:
     stopped: str
     start: LimitCycle = field(repr=False)
     given: Continuation = field(repr=False)
+    complete: bool = True
 
     def __len__(self) -> int:
         return len(self.curve)
@@ -180,7 +181,7 @@ def branch(
     Pseudo-arclength continuation goes around folds. Where a test function of a fold, a doubling, a torus (Neimark &
     Sacker) or a branch point changes sign, the point is located; so are those from which on other events happen (a foot
     scuffs, a knee no longer locks) or a foot that a rule holds would have to pull. The branch ends at `to`; where the
-    walk is lost, which its `stopped` says; or after so many points.
+    walk is lost, which its `stopped` says; or after so many points. Ctrl-C keeps the points that are found.
 
     Parameters
     ----------
@@ -201,30 +202,40 @@ def branch(
         for arguments that cannot be meant: no gait, a parameter that is none or that changes nothing.
     """
     given, first = _begun(gait, parameter, to, steps, step, friction)
-    watched = watched_feet(gait.map, friction)
     toward = np.sign(to - first.value)
     if first.tangent[-1] * toward < 0.0:
         first = _turned(first)
-    curve, special, stopped = [first], list[SpecialPoint](), ""
-    margins = _margins(given, watched, first)
+    curve, special, complete = [first], list[SpecialPoint](), True
     ds = FIRST_DISTANCE if step is None else float(step)
+    try:
+        stopped = _grown(given, curve, special, to, steps, ds, watched_feet(gait.map, friction))
+    except KeyboardInterrupt:
+        stopped, complete = f"interrupted after {len(curve)} points", False
+    return Branch(gait.name, parameter, tuple(curve), tuple(special), stopped, gait, given, complete)
+
+
+def _grown(
+    given: Continuation, curve: list[BranchPoint], special: list[SpecialPoint], to: float, steps: int, ds: float,
+    watched: list[Margin],
+) -> str:  # fmt: skip
+    """Add points and special points to those of a branch until it ends, and say why it does."""
+    parameter, toward = given.name, np.sign(to - curve[0].value)
+    margins = _margins(given, watched, curve[0])
     while len(curve) < steps:
         last = curve[-1]
         made = _next(given, last, ds)
         if isinstance(made, Forbidden):
             value = given.last_allowed(last.value, made.value)
             curve += _last(given, last, value, made.value)
-            stopped = f"ends at {parameter} = {value:.9g}: beyond it {made}"
-            break
+            return f"ends at {parameter} = {value:.9g}: beyond it {made}"
         if isinstance(made, str):
             limit = limit_beyond(given, last)
             special += [] if limit is None else [limit]
-            stopped = _ended(given, last, limit, made)
-            break
+            return _ended(given, last, limit, made)
         new, taken, quick = made
         beyond = (new.value - to) * toward >= 0.0
-        between, complete = special_points(given, last, new, taken)
-        if not (complete or changed_events(last.events, new.events)) and taken > MIN_DISTANCE_RATIO * FIRST_DISTANCE:
+        between, all_located = special_points(given, last, new, taken)
+        if not (all_located or changed_events(last.events, new.events)) and taken > MIN_DISTANCE_RATIO * FIRST_DISTANCE:
             ds = 0.5 * taken
             continue
         if changed_events(last.events, new.events):
@@ -237,12 +248,10 @@ def branch(
         if beyond:
             guess = taken * last.tangent * (to - last.value) / (new.value - last.value or 1.0)
             curve += _last(given, last, to, new.value, guess) or [new]
-            stopped = f"reached {parameter} = {to:g}"
-            break
+            return f"reached {parameter} = {to:g}"
         curve.append(new)
         ds = min(taken * (1.5 if quick else 1.0), MAX_DISTANCE)
-    stopped = stopped or f"ended after {len(curve)} points"
-    return Branch(gait.name, parameter, tuple(curve), tuple(special), stopped, gait, given)
+    return f"ended after {len(curve)} points"
 
 
 def _margins(given: Continuation, watched: list[Margin], point: BranchPoint) -> Margins:

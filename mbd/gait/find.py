@@ -65,11 +65,13 @@ class GaitSearch:
     """What a search found.
 
     gaits : different ones, stable ones first, then by falling speed; tries : every start with its outcome
+    complete : False where Ctrl-C ended it
     """
 
     name: str
     gaits: tuple[LimitCycle, ...]
     tries: tuple[Try, ...]
+    complete: bool = True
 
     @property
     def gait(self) -> LimitCycle:
@@ -106,7 +108,8 @@ class GaitSearch:
 
     def _lines(self) -> Iterator[str]:
         found = "1 gait" if len(self.gaits) == 1 else f"{len(self.gaits)} gaits"
-        yield f"{self.name}: {found} in {self._tries_made()}: {self._counts()}"
+        ended = "" if self.complete else " (interrupted)"
+        yield f"{self.name}: {found} in {self._tries_made()}{ended}: {self._counts()}"
         for number, gait in enumerate(self.gaits):
             reached = sum(each.gait == number for each in self.tries)
             yield f"  {gait!r}, from {reached} {'try' if reached == 1 else 'tries'}"
@@ -213,7 +216,7 @@ def find_gait(
     Returns
     -------
     GaitSearch
-        whose `gait` is the first stable one; no try is lost, whatever came of it.
+        whose `gait` is the first stable one; no try is lost, whatever came of it. Ctrl-C keeps those that are made.
 
     Raises
     ------
@@ -227,31 +230,36 @@ def find_gait(
     every, shown_bar = flag(all_gaits, "all_gaits of find_gait"), flag(progress, "progress of find_gait")
     names = [_title(group, name) for group, name, _ in ranges]
     hunt: _Hunt | None = None
-    tried: list[Try] = []
+    tried, complete = list[Try](), True
     with share_bar(shown_bar) as bar:
-        for point in points:
-            draw = _drawn(fixed, ranges, point)
-            start = _assembled(model, draw, closed, open, anchors, backend)
-            if hunt is None and isinstance(start, State):
-                given, settings = {**draw["parameters"]}, {"dt": dt, "tol": tol, "longest": longest}
-                check_arguments(start, scheme, strides, settings, given, functions, (), "return")
-                kind = (section, mirror, strides)
-                map_ = map_of(model, start, scheme, dt or FIRST_STEP, kind, given, functions, modulo, longest, backend)
-                hunt = _Hunt(map_, tol, dt, member=member)
-                for other in points if ranges else ():
-                    hunt.map.require({**hunt.map.values, **_drawn(fixed, ranges, other)["parameters"]})
-            tried.append(_tried(hunt, draw, start, names))
-            if bar is not None:
-                bar(len(tried), len(points))
-            if not every and hunt is not None and any(gait.stability == "stable" for gait in hunt.found):
-                break
+        try:
+            for point in points:
+                draw = _drawn(fixed, ranges, point)
+                start = _assembled(model, draw, closed, open, anchors, backend)
+                if hunt is None and isinstance(start, State):
+                    given, settings = {**draw["parameters"]}, {"dt": dt, "tol": tol, "longest": longest}
+                    check_arguments(start, scheme, strides, settings, given, functions, (), "return")
+                    kind = (section, mirror, strides)
+                    map_ = map_of(
+                        model, start, scheme, dt or FIRST_STEP, kind, given, functions, modulo, longest, backend
+                    )
+                    hunt = _Hunt(map_, tol, dt, member=member)
+                    for other in points if ranges else ():
+                        hunt.map.require({**hunt.map.values, **_drawn(fixed, ranges, other)["parameters"]})
+                tried.append(_tried(hunt, draw, start, names))
+                if bar is not None:
+                    bar(len(tried), len(points))
+                if not every and hunt is not None and any(gait.stability == "stable" for gait in hunt.found):
+                    break
+        except KeyboardInterrupt:
+            complete = False
     if hunt is None:
-        return GaitSearch(getattr(model, "name", ""), (), tuple(tried))
+        return GaitSearch(getattr(model, "name", ""), (), tuple(tried), complete)
     order = sorted(range(len(hunt.found)), key=lambda k: _rank(hunt.found[k]))
     place = {old: new for new, old in enumerate(order)} | {-1: -1}
     return GaitSearch(
         getattr(model, "name", ""), tuple(hunt.found[k] for k in order),
-        tuple(Try(each.values, each.outcome, place[each.gait]) for each in tried),
+        tuple(Try(each.values, each.outcome, place[each.gait]) for each in tried), complete,
     )  # fmt: skip
 
 

@@ -45,7 +45,7 @@ class PointCurve:
     """Special points of one kind over a second parameter.
 
     parameters : names of the one that is found and of the other; over : values of the other; points : in order
-    stopped : why it ends where it does
+    stopped : why it ends where it does; complete : False where Ctrl-C ended it
     """
 
     name: str
@@ -56,6 +56,7 @@ class PointCurve:
     points: tuple[SpecialPoint, ...]
     stopped: str
     given: Continuation = field(repr=False)
+    complete: bool = True
 
     def __len__(self) -> int:
         return len(self.points)
@@ -106,13 +107,16 @@ def follow(branch: Any, point: Any, parameter: str, to: float, steps: int) -> Po
     given, value = _begun(branch, point, parameter, to, steps)
     over, found, why = [value], [point], ""
     step = (float(to) - value) / steps
-    share = 1.0
+    share, complete = 1.0, True
     while abs(over[-1] - to) > 1e-12 * abs(to - value):
         left = to - over[-1]
         move = left if abs(left) <= abs(share * step) * (1.0 + 1e-9) else share * step
         there = replace(given, values={**given.values, parameter: over[-1] + move})
         try:
             new = _next(there, over, found, over[-1] + move)
+        except KeyboardInterrupt:
+            complete = False
+            break
         except (MbdError, np.linalg.LinAlgError) as error:
             new, why = None, str(error)
         if new is None:
@@ -124,11 +128,14 @@ def follow(branch: Any, point: Any, parameter: str, to: float, steps: int) -> Po
         found.append(new)
         share = min(1.0, 2.0 * share)
     reached = abs(over[-1] - to) <= 1e-12 * abs(to - value)
-    stopped = f"reached {parameter} = {to:g}" if reached else (
-        f"ends at {parameter} = {over[-1]:.9g}: beyond it no such point was found near" + (f" ({why})" if why else "")
-    )  # fmt: skip
+    stopped = f"ends at {parameter} = {over[-1]:.9g}: beyond it no such point was found near"
+    stopped += f" ({why})" if why else ""
+    if not complete:
+        stopped = f"interrupted after {len(found)} points"
+    elif reached:
+        stopped = f"reached {parameter} = {to:g}"
     names = (given.name, parameter)
-    return PointCurve(branch.name, point.kind, point.what, names, tuple(over), tuple(found), stopped, given)
+    return PointCurve(branch.name, point.kind, point.what, names, tuple(over), tuple(found), stopped, given, complete)
 
 
 def _begun(branch: Any, point: Any, parameter: Any, to: Any, steps: Any) -> tuple[Continuation, float]:

@@ -98,7 +98,7 @@ def test_a_study_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         study(10, file=path, workers=2)
 
 
-def test_an_interrupted_study_keeps_what_is_decided(monkeypatch):
+def test_an_interrupted_study_keeps_what_is_decided_in_its_file_too(monkeypatch, tmp_path):
     """Ctrl-C in the third return of all starts: those that the first two decided keep their outcomes."""
     from mbd.gait.basin.walks import Walks
 
@@ -112,11 +112,18 @@ def test_an_interrupted_study_keeps_what_is_decided(monkeypatch):
 
     monkeypatch.setattr(Walks, "_caught", interrupted)
     study.cache_clear()
-    found = study(10)
+    found = study(10, file=tmp_path / "basin.jsonl")
     study.cache_clear()
     done = found.outcome != "not decided"
     assert not found.complete and 0 < np.count_nonzero(done) < done.size
     assert np.array_equal(found.outcome[done], whole.outcome[done]) and found.steps.max() == 3
+    decide, sizes = Walks.decide, []
+    monkeypatch.setattr(
+        Walks, "decide", lambda self, lines, *rest: sizes.append(len(lines)) or decide(self, lines, *rest)
+    )
+    again = study(10, file=tmp_path / "basin.jsonl")
+    assert sizes == [np.count_nonzero(~done)] and again.complete and same(again, whole)
+    assert same(study(10, file=tmp_path / "basin.jsonl"), whole) and len(sizes) == 1
 
 
 def _counted(made):
@@ -124,9 +131,9 @@ def _counted(made):
 
     keep = Store.keep
 
-    def counting(self, first, block):
+    def counting(self, first, *rest):
         made.append(first)
-        keep(self, first, block)
+        keep(self, first, *rest)
 
     return counting
 

@@ -22,6 +22,7 @@ from mbd.notebook import table
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.along import along
 from mbd.sensitivity.starts import unknown_name
+from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
@@ -155,6 +156,7 @@ def fit(
     Returns
     -------
     Fit
+        of the best trial where Ctrl-C ended the search
 
     Raises
     ------
@@ -188,9 +190,15 @@ def fit(
     if not np.all(np.isfinite(first)):
         raise SimulationError(f"the run with the guesses does not reach the data: {search.problem}", search.run)
     order = order_of(search.run)
-    found = search.least(guess, low, high)
-    if order_of(search.made(found.x)) != order:
-        found = min(found, search.least_over_growing_spans(guess, low, high), key=lambda each: float(each.cost))
+    try:
+        found = search.least(guess, low, high)
+        if order_of(search.made(found.x)) != order:
+            found = min(found, search.least_over_growing_spans(guess, low, high), key=lambda each: float(each.cost))
+    except KeyboardInterrupt:
+        if search.best is None:
+            raise
+        found = search.best
+        search.at, search.run = found.x, found.run
     return search.concluded(found)
 
 
@@ -227,6 +235,18 @@ def _end(data: Data, until: Any, dt: Any, tol: Any) -> float:
     return float(until)
 
 
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A trial of a search, in the words of `scipy.optimize.least_squares`."""
+
+    x: Vector
+    fun: Vector
+    jac: Matrix
+    run: Trajectory
+    status: int = 0
+    message: str = "interrupted; this is the best trial so far"
+
+
 @dataclass
 class _Search:
     """Runs for given values, and their differences from the data."""
@@ -245,6 +265,7 @@ class _Search:
     problem: str = ""
     run: Trajectory | None = None
     at: Vector | None = None
+    best: _Trial | None = None
 
     def check(self) -> None:
         """Names that the model does not have, all at once; parameters that are 0 or ±1 become inputs."""
@@ -281,6 +302,8 @@ class _Search:
             )  # fmt: skip
         except MbdError as error:
             self.problem = str(error)
+        if self.run is not None and stopped(self.run):
+            raise KeyboardInterrupt
         return self.run
 
     def residuals(self, values: Vector) -> Vector:
@@ -337,7 +360,10 @@ class _Search:
         for name in self.data.events:
             line = found.of_instant(name.split(".time")[0], instants_of(run)[name])
             parts.append(line[None] / self.data.scales[name])
-        return np.vstack(parts)
+        jacobian, residuals = np.vstack(parts), self.residuals(values)
+        if self.best is None or residuals @ residuals < self.best.fun @ self.best.fun:
+            self.best = _Trial(values.copy(), residuals, jacobian, run)
+        return jacobian
 
     def concluded(self, found: Any) -> Fit:
         """What the search has found."""

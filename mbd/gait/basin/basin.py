@@ -15,10 +15,11 @@ from mbd.arrays import Vector
 from mbd.bodies.values import flag, is_finite_number, named_number_faults, shown
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.gait.basin.axes import Grid, grid_of, study_of
+from mbd.gait.basin.kinds import NUMBER
 from mbd.gait.basin.made import Made
 from mbd.gait.basin.result import Basin
 from mbd.gait.basin.store import Store, digest_of
-from mbd.gait.basin.walks import Decided
+from mbd.gait.basin.walks import Decided, Numbers
 from mbd.gait.cycle import LimitCycle
 from mbd.progress import share_bar
 from mbd.results.identity import identity_of_model
@@ -170,12 +171,25 @@ def _decided(made: Made, steps: int, store: Store | None, bar: Any) -> tuple[Dec
         for first in range(0, total, BLOCK_SIZE):
             last = min(first + BLOCK_SIZE, total)
             block = found.part(first, last)
-            if store is None or not store.fill(first, block):
-                made.decide(np.arange(first, last), steps, block)
-                if store is not None:
-                    store.keep(first, block)
+            left = np.arange(last - first) if store is None else store.fill(first, block)
+            if len(left):
+                _decide(made, first, left, steps, block, store)
             if bar is not None:
                 bar(last, total)
     except KeyboardInterrupt:
         complete = False
     return found, complete
+
+
+def _decide(made: Made, first: int, left: Numbers, steps: int, block: Decided, store: Store | None) -> None:
+    """Decide the starts of a block that are left, and store it; also what is decided when Ctrl-C ends that."""
+    found, waiting = Decided.of(len(left)), left
+    try:
+        made.decide(first + left, steps, found)
+        waiting = left[:0]
+    finally:
+        block.take(left, found)
+        if len(waiting):
+            waiting = np.flatnonzero(block.kind == NUMBER["not decided"])
+        if store is not None:
+            store.keep(first, block, waiting)

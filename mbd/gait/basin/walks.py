@@ -21,7 +21,7 @@ from mbd.simulation.batch.runner import Runner
 from mbd.simulation.many_runs import Ends, start_line
 from mbd.state import State
 
-__all__ = ["Decided", "Walks"]
+__all__ = ["Decided", "Numbers", "Walks"]
 
 Numbers = NDArray[np.int64]
 
@@ -44,6 +44,11 @@ class Decided:
     def part(self, first: int, last: int) -> Decided:
         """That of some starts; what is noted there is noted here."""
         return Decided(*(getattr(self, name)[first:last] for name in ("kind", "attractor", "steps", "time")))
+
+    def take(self, places: Numbers, other: Decided) -> None:
+        """Note what became of the starts at these places."""
+        for name in ("kind", "attractor", "steps", "time"):
+            getattr(self, name)[places] = getattr(other, name)
 
 
 @dataclass(eq=False)
@@ -143,7 +148,8 @@ class Walks:
             for attractor, ball in several:
                 held = here[ball.holds(*self.parts(lines[here]))] if len(here) else here
                 fresh = held[~inside[held]]
-                found.kind[left[fresh]], found.attractor[left[fresh]] = NUMBER["walks"], attractor
+                found.attractor[left[fresh]] = attractor  # before the kind: Ctrl-C may come between any two lines
+                found.kind[left[fresh]] = NUMBER["walks"]
                 inside[fresh] = True
         return left[~inside], lines[~inside]
 
