@@ -6,11 +6,14 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from time import process_time
+from typing import TypeVar
 
 from benchmarks.peers.scenes import Scene
 from mbd.arrays import Matrix, Vector
 
 __all__ = ["Attempt", "Outcome", "Result", "Sweep", "measured", "seconds"]
+
+T = TypeVar("T")
 
 MOST_REPEATS = 5
 BUDGET = 0.1
@@ -41,10 +44,14 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Attempt:
-    """A setting in words, and a run with it; each call builds what it needs, untimed."""
+    """A setting in words, and a run with it; each call builds what it needs, untimed.
+
+    from_words : makes the model anew, runs it and reads the values, where `run` does not
+    """
 
     label: str
     run: Callable[[], Outcome]
+    from_words: Callable[[], object] | None = None
 
 
 Sweep = list[Attempt]
@@ -53,7 +60,10 @@ Sweep = list[Attempt]
 
 @dataclass(frozen=True)
 class Result:
-    """What a setting gave; `fault` says why there is no error."""
+    """What a setting gave; `fault` says why there is no error.
+
+    words : processor time from the words of the model to the values, in a process that has done so before
+    """
 
     scene: str
     system: str
@@ -64,6 +74,7 @@ class Result:
     steps: int | None = None
     repeats: int = 0
     fault: str = ""
+    words: float | None = None
 
 
 def seconds(task: Callable[[], object]) -> float:
@@ -82,11 +93,20 @@ def _error(scene: Scene, outcome: Outcome) -> float:
     return scene.error(outcome.values, exact(scene, outcome.times))
 
 
-def _repeated(attempt: Attempt) -> tuple[list[Outcome], float]:
-    began, outcomes = process_time(), [attempt.run()]
-    while len(outcomes) < MOST_REPEATS and process_time() - began < BUDGET:
-        outcomes.append(attempt.run())
-    return outcomes, min(outcome.seconds for outcome in outcomes)
+def _repeated(attempt: Attempt) -> tuple[list[Outcome], float, float]:
+    """Runs, the least time of a loop, and the least time from words to values."""
+    outcomes, least = _calls(attempt.run)
+    if attempt.from_words is not None:
+        _, least = _calls(attempt.from_words)
+    return outcomes, min(outcome.seconds for outcome in outcomes), least
+
+
+def _calls(task: Callable[[], T]) -> tuple[list[T], float]:
+    """What calls gave, as many as their budget allows, and the least processor time of one."""
+    began, found, taken = process_time(), list[T](), list[float]()
+    while not found or (len(found) < MOST_REPEATS and process_time() - began < BUDGET):
+        taken.append(seconds(lambda: found.append(task())))
+    return found, min(taken)
 
 
 def measured(scene: Scene, system: str, sweeps: Iterable[Sweep]) -> Iterator[Result]:
@@ -95,7 +115,7 @@ def measured(scene: Scene, system: str, sweeps: Iterable[Sweep]) -> Iterator[Res
         for attempt in sweep:
             busy = process_time()
             try:
-                outcomes, least = _repeated(attempt)
+                outcomes, least, words = _repeated(attempt)
                 error = _error(scene, outcomes[-1])
             except Exception as problem:  # whatever a system raises is a result of it
                 said = f"{type(problem).__name__}: {problem}".splitlines()[0][:160]
@@ -107,7 +127,7 @@ def measured(scene: Scene, system: str, sweeps: Iterable[Sweep]) -> Iterator[Res
             fault = "" if math.isfinite(error) else "not finite, or not all of it"
             yield Result(
                 scene.name, system, attempt.label, error if not fault else None, least, min(wholes, default=None),
-                outcomes[-1].steps, len(outcomes), fault,
+                outcomes[-1].steps, len(outcomes), fault, words,
             )  # fmt: skip
             if least > CAP:
                 break

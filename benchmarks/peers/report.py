@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.peers.command import SYSTEMS, Comparison
@@ -18,7 +19,23 @@ GROUPS = {
     "S7": "In space",
 }  # fmt: skip
 """Sections and pictures: scenes whose names begin so."""
-LOOP, CALL = "mbd, loop", "mbd, call"
+
+
+@dataclass(frozen=True)
+class Column:
+    """Times of a system: `timed` says which of a `Result`."""
+
+    title: str
+    system: str
+    timed: str
+
+    def seconds_of(self, result: Result) -> float:
+        """The time of a result; infinite where it was not taken."""
+        spent: float | None = getattr(result, self.timed)
+        return float("inf") if spent is None else spent
+
+
+LOOP, CALL = Column("mbd, loop", "mbd", "seconds"), Column("mbd, call", "mbd", "whole")
 
 HEAD = """# Beside other systems
 
@@ -29,6 +46,8 @@ motions: equations derived by hand, integrated by DOP853 at 1e-13 with impacts l
 - **Times** are processor times of one thread, the best of up to five runs. They exclude import, model building and
   reading of results. `mbd` has two columns: *call* is `mbd.simulate` as you call it, once the model is compiled;
   *loop* is the time inside its kernel.
+- **From words** is the time from the words of a model to the values that are compared, in a process that has done
+  the same before: the model is built anew, run and read each time. Compiled code is there, equations are not.
 - **Errors** are the largest absolute difference from the reference at any output time. Each scene says what is
   compared.
 - **A cell** is the time of the fastest setting that reaches the error. A dash means that no setting tried reached it,
@@ -63,11 +82,12 @@ the settings that gave no result, with the message of the system.
 
 def page(comparison: Comparison) -> str:
     """The page of the documentation."""
-    parts = [HEAD, _participants(comparison)]
+    parts = [HEAD, _participants(comparison), _firsts(comparison)]
     for group, (title, names) in _groups(comparison).items():
         parts += [
             f"## {title}\n", _described(names), f"![Time of each system against its error](peers/{group}.png)\n",
-            table(comparison, names),
+            table(comparison, names, _columns(comparison)),
+            "From words:\n", table(comparison, names, _from_words(comparison)),
         ]  # fmt: skip
     if comparison.starts:
         parts.append(_start_up(comparison))
@@ -94,22 +114,56 @@ def _described(names: Sequence[str]) -> str:
     return "\n".join(f"- {name}: {SCENES[name].title}; compared: {SCENES[name].shown}" for name in names) + "\n"
 
 
-def table(comparison: Comparison, names: Iterable[str]) -> str:
+def table(comparison: Comparison, names: Sequence[str], columns: Iterable[Column]) -> str:
     """Times to each error, a row for each scene and error, and the least error reached."""
-    systems = [system.name for system in SYSTEMS if system.name in comparison.versions]
-    columns = [CALL, LOOP, *systems[1:]] if systems[:1] == ["mbd"] else systems
-    columns = [column for column in columns if any(_reached(comparison, name, column, float("inf")) for name in names)]
-    lines = ["| scene, error | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
+    columns = [each for each in columns if any(_reached(comparison, name, each, float("inf")) for name in names)]
+    lines = ["| scene, error | " + " | ".join(each.title for each in columns) + " |", "|---" * (len(columns) + 1) + "|"]
     for name in names:
         for error in TOLERANCES:
-            cells = [_time(_reached(comparison, name, column, error), column) for column in columns]
+            cells = [_time(_reached(comparison, name, each, error), each) for each in columns]
             lines.append(f"| {name} ≤ {error:g} | " + " | ".join(cells) + " |")
-        least = [
-            min((r.error for r in _of(comparison, name, column) if r.error is not None), default=None)
-            for column in columns
-        ]
+        least = [min((r.error for r in _of(comparison, name, each) if r.error is not None), default=None)
+                 for each in columns]  # fmt: skip
         lines.append(f"| {name}, least error | " + " | ".join("-" if e is None else f"{e:.1e}" for e in least) + " |")
     return "\n".join(lines) + "\n"
+
+
+def _columns(comparison: Comparison) -> list[Column]:
+    """Loops of all, and the call of `mbd`."""
+    present = [system.name for system in SYSTEMS if system.name in comparison.versions]
+    own = [CALL, LOOP] if "mbd" in present else []
+    return [*own, *(Column(name, name, "seconds") for name in present if name != "mbd")]
+
+
+def _from_words(comparison: Comparison) -> list[Column]:
+    """Those of the systems that have words."""
+    with_words = [system.name for system in SYSTEMS if system.starts and system.name in comparison.versions]
+    return [Column(name, name, "words") for name in with_words]
+
+
+def _firsts(comparison: Comparison) -> str:
+    """In how many of the cells that another system reaches, too, `mbd` is the fastest."""
+    words = _from_words(comparison)
+    loops = [Column(each.system, each.system, "seconds") for each in words]
+    loop, call, from_words = (
+        _first(comparison, own, [each for each in others if each.system != "mbd"])
+        for own, others in ((LOOP, loops), (CALL, loops), (Column("mbd", "mbd", "words"), words))
+    )
+    return (
+        f"`mbd` is the fastest system in {loop} cells by its loop, in {call} by its call, and in {from_words} from "
+        "words. Cells that no other system reaches are not counted, nor is what is written by hand.\n"
+    )
+
+
+def _first(comparison: Comparison, own: Column, others: Sequence[Column]) -> str:
+    cells = [(name, error) for name in _scenes(comparison) for error in TOLERANCES]
+    first = list[bool]()
+    for name, error in cells:
+        mine, *theirs = (_reached(comparison, name, each, error) for each in (own, *others))
+        times = [each.seconds_of(found) for each, found in zip(others, theirs, strict=True) if found is not None]
+        if mine is not None and times:
+            first.append(own.seconds_of(mine) <= min(times))
+    return f"{sum(first)} of {len(first)}"
 
 
 def _scenes(comparison: Comparison) -> list[str]:
@@ -117,26 +171,20 @@ def _scenes(comparison: Comparison) -> list[str]:
     return [name for name in SCENES if name in ran]
 
 
-def _of(comparison: Comparison, scene: str, column: str) -> list[Result]:
-    system = "mbd" if column in (LOOP, CALL) else column
-    return [r for r in comparison.results if (r.scene, r.system) == (scene, system) and r.error is not None]
+def _of(comparison: Comparison, scene: str, column: Column) -> list[Result]:
+    return [r for r in comparison.results if (r.scene, r.system) == (scene, column.system) and r.error is not None]
 
 
-def _seconds(result: Result, column: str) -> float:
-    spent = result.whole if column == CALL else result.seconds
-    return float("inf") if spent is None else spent
-
-
-def _reached(comparison: Comparison, scene: str, column: str, error: float) -> Result | None:
+def _reached(comparison: Comparison, scene: str, column: Column, error: float) -> Result | None:
     """The fastest result within an error."""
     good = [r for r in _of(comparison, scene, column) if r.error is not None and r.error <= error]
-    return min(good, key=lambda r: _seconds(r, column), default=None)
+    return min(good, key=column.seconds_of, default=None)
 
 
-def _time(result: Result | None, column: str) -> str:
+def _time(result: Result | None, column: Column) -> str:
     if result is None:
         return "-"
-    spent = _seconds(result, column)
+    spent = column.seconds_of(result)
     return f"{spent * 1e3:.2g} ms" if spent < 0.0995 else f"{spent:.2g} s"
 
 

@@ -178,14 +178,29 @@ def test_a_system_that_fails_is_a_result_and_not_the_end():
 
 def test_the_table_shows_the_fastest_that_reaches_an_error_and_a_dash_where_none_does():
     results = (
-        Result("S1", "mbd", "fine", 1e-7, 2.0, 3.0, 100, 1), Result("S1", "mbd", "coarse", 1e-4, 1e-3, 2e-3, 10, 1),
-        Result("S1", "mujoco", "RK4", 1e-2, 0.5, None, 10, 1),
+        Result("S1", "mbd", "fine", 1e-7, 2.0, 3.0, 100, 1, words=4.0),
+        Result("S1", "mbd", "coarse", 1e-4, 1e-3, 2e-3, 10, 1, words=0.06),
+        Result("S1", "mujoco", "RK4", 1e-2, 0.5, None, 10, 1, words=0.6),
+        Result("S1", "mujoco", "RK4, finer", 1e-4, 1.5e-3, None, 20, 1, words=0.05),
     )  # fmt: skip
     text = report.page(Comparison(results, {"mbd": "1", "mujoco": "2"}, {}, ("drake",), "a machine"))
     assert "| S1 ≤ 0.001 | 2 ms | 1 ms |" in text
     assert "| S1 ≤ 1e-06 | 3 s | 2 s |" in text
     assert "| S1 ≤ 1e-09 | - | - |" in text
+    assert "| S1 ≤ 0.001 | 60 ms | 50 ms |" in text
+    assert "fastest system in 1 of 1 cells by its loop, in 0 of 1 by its call, and in 0 of 1 from words" in text
     assert "Not installed, and left out: drake." in text
+
+
+def test_a_model_that_run_keeps_is_made_anew_to_time_words():
+    scene = SCENES["S1"]
+    made = list[int]()
+    busy = lambda: sum(range(300_000)) and None  # noqa: E731
+    slow = Attempt("kept", lambda: Outcome(scene.reference, 1e-3, 10), lambda: made.append(1) or busy())
+    built = Attempt("built", lambda: busy() or Outcome(scene.reference, 1e-3, 10))
+    found = list(measured(scene, "own", [[slow, built]]))
+    assert made
+    assert all(each.words > each.seconds for each in found)
 
 
 def test_an_integrator_that_does_not_exist_is_left_out(monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from time import process_time
@@ -55,17 +56,26 @@ def once(scene: Scene, case: Posed, setting: Setting) -> Outcome:
 
 def attempts(scene: Scene) -> list[Sweep]:
     """Every scheme of the table; each model is derived, and the code of its modes made, before anything is timed."""
-    cases = [("", posed(scene))]
+    makers = {"": partial(posed, scene)}
     if scene.name in BY_HINGES:
-        cases.append(("three hinges, ", in_space(tree(scene.name).by_hinges)))
+        makers["three hinges, "] = partial(in_space, tree(scene.name).by_hinges)
     found = []
-    for words, case in cases:
+    for words, made in makers.items():
+        case = made()
         for sweep in settings(scene, bool(words)):
             with suppress(mbd.MbdError):  # a setting that fails says so when it is measured
                 once(scene, case, sweep[0])
                 background.finish()
-            found.append([Attempt(words + one.label, partial(once, scene, case, one)) for one in sweep])
+            found.append([
+                Attempt(words + one.label, partial(once, scene, case, one), partial(_from_words, scene, made, one))
+                for one in sweep
+            ])  # fmt: skip
     return found
+
+
+def _from_words(scene: Scene, made: Callable[[], Posed], setting: Setting) -> Outcome:
+    """A run of a model that is new in this process."""
+    return once(scene, made(), setting)
 
 
 def first_step(scene: Scene) -> None:
