@@ -1,0 +1,1 @@
+"""Laws, references and cases of the project: a package, as libraries exist that install one of the same name."""
