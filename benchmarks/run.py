@@ -19,6 +19,7 @@ from benchmarks import (
     derivatives,
     gait,
     laboratory,
+    machines,
     people,
     startup,
     steps,
@@ -37,6 +38,7 @@ GROUPS = (
     "watching",
     "gait",
     "cycles",
+    "machines",
     "basins",
     "derivatives",
     "compiling",
@@ -82,6 +84,8 @@ def measure(repeats: int, groups: Iterable[str] = GROUPS) -> Record:
         figures += watching.measure(repeats)
     if "cycles" in groups:
         figures += cycles.measure(repeats)
+    if "machines" in groups:
+        figures += machines.measure(repeats)
     if "basins" in groups:
         figures += basins.measure(repeats)
     if "derivatives" in groups:
