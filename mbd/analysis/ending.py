@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.analysis.gait import gait
 from mbd.arrays import Vector
-from mbd.equal import EQUAL_RTOL
+from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL
 from mbd.notebook import Text
 from mbd.results.summary import cost, entries, of_the_swing, strategy
 
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
 __all__ = ["Summary", "ending", "summary"]
-
-REST_ENERGY_RATIO = 1e-6
-"""Kinetic energy over its largest of the run, below which a mechanism rests [-]."""
 
 
 FALLEN_HEIGHT_RATIO = 0.5
@@ -89,7 +86,7 @@ def _rest(run: Trajectory) -> str:
     most, last = float(np.max(kinetic)), float(np.max(kinetic[run.time >= run.time[-1] - span]))
     if most == 0.0:
         return "at rest throughout"
-    if not last <= REST_ENERGY_RATIO * most:
+    if not last <= NOMINAL_RTOL * most:
         return ""
     return (
         f"came to rest: kinetic energy below {last:.2g} J, {last / most:.1g} of its largest, for the last {span:.3g} s"

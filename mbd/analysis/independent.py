@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.dependence import RANK_RTOL
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL, NOMINAL_RTOL
 
 __all__ = ["Independent", "independent", "row_sizes"]
 
-MIN_INERTIA_RATIO = 1e-6
-"""Inertia, relative to the largest, below which coordinates count alike in the choice [-]."""
 ROW_RTOL = 1e-10
 """Size of a row, relative to the largest, below which it acts on nothing [-]."""
 ORDER_PREFERENCE = 1e-6
@@ -49,11 +47,11 @@ def independent(M: Matrix, B: Matrix, turning: Matrix, velocity: Any, n_z: int =
     """
     n_v = len(M)
     inertia = np.abs(np.diag(M))
-    heaviness = np.sqrt(np.maximum(inertia, MIN_INERTIA_RATIO * np.max(inertia, initial=0.0)) + 1e-300)
+    heaviness = np.sqrt(np.maximum(inertia, NOMINAL_RTOL * np.max(inertia, initial=0.0)) + 1e-300)
     weights = heaviness * (1.0 + ORDER_PREFERENCE * np.arange(n_v)[::-1])
     size = row_sizes(B)[:, None]
     B, turning = B / size, turning / size
-    negligible = RANK_RTOL * float(np.max(np.abs(B / weights), initial=1e-300))
+    negligible = HALF_PRECISION_RTOL * float(np.max(np.abs(B / weights), initial=1e-300))
     by_place = _pivots(B[~velocity] / weights, negligible)
     places = [k for k in range(n_v) if k not in by_place]
     T = np.zeros((n_v, len(places)))

@@ -10,18 +10,13 @@ from mbd.analysis.independent import Independent, row_sizes
 from mbd.analysis.instant import Instant
 from mbd.analysis.ports import Input, Output
 from mbd.arrays import Matrix
-from mbd.assembly.dependence import RANK_RTOL
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL, NOMINAL_RTOL
 from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError
 
 __all__ = ["LinearMotion", "Prescribed", "linear_motion", "multiplier_map", "singular"]
-
-CURVATURE_RTOL = 1e-6
-"""Part of a second derivative along the free motions, relative, below which dependent rows agree nearby too [-]."""
-RESIDUAL_RTOL = 1e-8
-"""Part of a prescribed motion, relative, that rows may leave over [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +149,7 @@ def _followed(found: Instant, terms: LinearTerms, chosen: Independent, given: Pr
     change[by_place] = _solved(B[held][:, by_place], -place[held])
     change[[n_v + k for k in by_speed]] = _solved(B[:, by_speed], -(speed + turning @ change[:n_v]))
     place = np.where(held[:, None], B @ change[:n_v] + place, 0.0)
-    left = np.abs(np.vstack([place, B @ change[n_v : 2 * n_v] + turning @ change[:n_v] + speed])) > RESIDUAL_RTOL
+    left = np.abs(np.vstack([place, B @ change[n_v : 2 * n_v] + turning @ change[:n_v] + speed])) > HALF_PRECISION_RTOL
     if np.any(left):
         names = ", ".join(repr(name) for name, bad in zip(given.names, np.any(left, axis=0), strict=True) if bad)
         lines = np.any(left.reshape(2, len(B), s), axis=(0, 2))
@@ -183,9 +178,9 @@ def _multipliers(
     from scipy.linalg import null_space
 
     size = row_sizes(terms.R.T)
-    open_ones = null_space(terms.R / size, rcond=RANK_RTOL) / size[:, None]
+    open_ones = null_space(terms.R / size, rcond=HALF_PRECISION_RTOL) / size[:, None]
     sizes = np.maximum(np.max(np.abs(ports.multiplier), axis=1, initial=0.0), 1e-300)
-    loose = np.max(np.abs(ports.multiplier @ open_ones), axis=1, initial=0.0) > CURVATURE_RTOL * sizes
+    loose = np.max(np.abs(ports.multiplier @ open_ones), axis=1, initial=0.0) > NOMINAL_RTOL * sizes
     if np.any(loose):
         names = ", ".join(repr(each.name) for each, is_loose in zip(outputs, loose, strict=True) if is_loose)
         titles = ", ".join(title for title, flag in zip(found.titles, flags, strict=True) if flag)
@@ -217,12 +212,12 @@ def singular(found: Instant, terms: LinearTerms, chosen: Independent) -> list[st
     held = np.flatnonzero(~found.velocity)
     n_v, free = len(terms.K.T), chosen.basis[: len(terms.K.T), : len(chosen.places)]
     forces = terms.R[:, held] / row_sizes(terms.R[:, held].T)
-    for idle in null_space(forces, rcond=RANK_RTOL).T if len(held) else ():
+    for idle in null_space(forces, rcond=HALF_PRECISION_RTOL).T if len(held) else ():
         extra = np.zeros(len(found.rows))
         extra[held] = idle / row_sizes(terms.R[:, held].T) * max(1.0, float(np.max(np.abs(found.lam), initial=0.0)))
         bent = [(found.terms(part).K - terms.K)[:n_v] for part in (extra, *np.diag(extra)[held])]
         size = sum(float(np.max(np.abs(each), initial=0.0)) for each in bent)  # what is left of rows may be round-off
-        if np.max(np.abs(free.T @ bent[0] @ free), initial=0.0) > CURVATURE_RTOL * size:
+        if np.max(np.abs(free.T @ bent[0] @ free), initial=0.0) > NOMINAL_RTOL * size:
             lost = [found.titles[k] for k in held[np.abs(idle) > 1e-6]]
             return [
                 f"the constraint Jacobian loses rank at this posture only ({', '.join(lost)}), where branches of "

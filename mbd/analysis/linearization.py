@@ -17,6 +17,7 @@ from mbd.analysis.state_space import StateSpace
 from mbd.arrays import ComplexArray, Matrix, Vector
 from mbd.configuration import Configuration
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 from mbd.later import later
 from mbd.notes import doubt
 
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["Linearization", "NaturalMode"]
-
-EQUILIBRIUM_RTOL = 1e-6
-"""Acceleration, relative to what a unit displacement and the present speeds would cause, that counts as none [-]."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +188,7 @@ class Linearization:
         count = len(self.picked)
         moved = np.abs(self.x[:count]) + [float(place < n_v) for place in self.picked]
         caused = np.abs(self.A[rates][:, :count]) @ moved
-        return bool(np.all(np.abs(self.drift[list(self.picked)][rates]) <= EQUILIBRIUM_RTOL * np.maximum(caused, 1e-3)))
+        return bool(np.all(np.abs(self.drift[list(self.picked)][rates]) <= NOMINAL_RTOL * np.maximum(caused, 1e-3)))
 
     def rhs(self, t: float, y: Vector) -> Vector:
         """``ẏ`` of the nonlinear motion, y = (q, v, z), with the contacts of the state: for `solve_ivp`.

@@ -21,24 +21,16 @@ from mbd.assembly.initial_pose import opening
 from mbd.assembly.machines import first_anchors, hold, store_first, without_held
 from mbd.assembly.manager import manager_of
 from mbd.assembly.named_projection import nearest_positions, nearest_velocities
-from mbd.assembly.posture import (
-    RESIDUAL_RTOL,
-    Posture,
-    capture,
-    close_nearby,
-    close_positions,
-    close_velocities,
-    position_rows,
-)  # fmt: skip
+from mbd.assembly.posture import Posture, capture, close_nearby, close_positions, close_velocities, position_rows
 from mbd.assembly.turns import choose_turns, name_wrapped, nearest_turns
 from mbd.assembly.whole_values import as_given, spelled_out, three_of_four
 from mbd.bodies.values import flag, named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL
 from mbd.equations.equations import Equations
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
-from mbd.joints.orientations import ORTHONORMAL_ATOL
 from mbd.kernel.stepping.begin_run import MAX_START_DEPTH
 from mbd.notes import doubt
 from mbd.state import State, of_model
@@ -241,21 +233,21 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     free = np.ones((2, equations.n_v), dtype=bool)
     _hold(free, held_q, held_v)
     misfit = close_positions(work, rows, free[0])
-    if project and np.max(np.abs(misfit), initial=0.0) > RESIDUAL_RTOL and work.places and work.mechanism.vector:
+    if project and np.max(np.abs(misfit), initial=0.0) > EQUAL_RTOL and work.places and work.mechanism.vector:
         reached, work.q = work.q.copy(), q.copy()
         if nearest_positions(work, rows, named.q):
             misfit = np.zeros(len(misfit))
         else:
             work.q = reached
-    if np.max(np.abs(misfit), initial=0.0) <= RESIDUAL_RTOL:
-        nearest_turns(work, rows, named.q, RESIDUAL_RTOL)
+    if np.max(np.abs(misfit), initial=0.0) <= EQUAL_RTOL:
+        nearest_turns(work, rows, named.q, EQUAL_RTOL)
     never = infeasible(work, rows, q, misfit, model, named=bool(work.places or held_q))
     if never:
         return never
     capture(work)
     speed_misfit = close_velocities(work, free[1])
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
-    if project and np.max(np.abs(speed_misfit), initial=0.0) > RESIDUAL_RTOL * speed and work.rates:
+    if project and np.max(np.abs(speed_misfit), initial=0.0) > EQUAL_RTOL * speed and work.rates:
         work.y = y.copy()
         if nearest_velocities(work, work.active_rows, named.v):
             speed_misfit = np.zeros(len(speed_misfit))
@@ -270,12 +262,12 @@ def _closed_as_named(work: Posture, named: _Named) -> bool:
     free = np.ones((2, work.equations.n_v), dtype=bool)
     _hold(free, held_q, held_v)
     choose_turns(trial, rows)
-    if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= RESIDUAL_RTOL:
+    if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= EQUAL_RTOL:
         return False
-    nearest_turns(trial, rows, named.q, RESIDUAL_RTOL)
+    nearest_turns(trial, rows, named.q, EQUAL_RTOL)
     capture(trial)
     speed = 1.0 + float(np.max(np.abs(trial.y[: work.equations.n_v]), initial=0.0))
-    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= RESIDUAL_RTOL * speed:
+    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= EQUAL_RTOL * speed:
         return False
     capture(trial)
     work.q, work.y, work.anchors = trial.q, trial.y, trial.anchors
@@ -312,7 +304,7 @@ def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
         given, names = [k for k in own if k in named.q], ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
         if 0 < len(given) < len(own):
             faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
-    return faults or [f"position: {fault}" for fault in equations.configuration.misplaced(q, ORTHONORMAL_ATOL)]
+    return faults or [f"position: {fault}" for fault in equations.configuration.misplaced(q, NOMINAL_RTOL)]
 
 
 def _gaps(work: Posture) -> Vector:

@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import NOMINAL_RTOL
 from mbd.equations.equations import Row
 
-__all__ = ["MAX_RESIDUAL", "residuals", "violations"]
+__all__ = ["residuals", "violations"]
 
-MAX_RESIDUAL = 1e-6
-"""Residual of a row [m, rad], over the size of its terms up to 1, above which a state is not consistent; that of its
-rate [m/s, rad/s], over the size of its terms up to the larger of 1 and the speed."""
 ASSEMBLED_RESIDUAL = 1e-8
 """The same residuals below which it always is: ten times what an assembly leaves."""
 
@@ -47,8 +45,8 @@ def violations(
     for k in active:
         h, rate, h_size, rate_size = (float(value) for value in found[:, k])
         left = (0.0, 0.0) if usual is None else (2.0 * abs(float(usual[0, k])), 2.0 * abs(float(usual[1, k])))
-        if not abs(h) <= max(ASSEMBLED_RESIDUAL, MAX_RESIDUAL * min(1.0, h_size), left[0]):
+        if not abs(h) <= max(ASSEMBLED_RESIDUAL, NOMINAL_RTOL * min(1.0, h_size), left[0]):
             faults.append(f"{rows[k].title} is violated by {h:.3g} {rows[k].unit}".rstrip())
-        elif not abs(rate) <= max(ASSEMBLED_RESIDUAL * fast, MAX_RESIDUAL * min(fast, rate_size), left[1]):
+        elif not abs(rate) <= max(ASSEMBLED_RESIDUAL * fast, NOMINAL_RTOL * min(fast, rate_size), left[1]):
             faults.append(f"{rows[k].title} is violated by {rate:.3g} {rows[k].unit}/s in its velocity")
     return faults

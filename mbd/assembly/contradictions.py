@@ -10,8 +10,9 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.assembly.conflicts import loops_of
 from mbd.assembly.infeasibility import MAX_CONFLICTING_SETS, Held, named_conflict, position_conflicts, velocity_conflict
-from mbd.assembly.posture import RESIDUAL_RTOL, Posture
+from mbd.assembly.posture import Posture
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL
 
 __all__ = ["Attempt", "contradictions", "infeasible"]
 
@@ -50,7 +51,7 @@ def infeasible(work: Posture, rows: Sequence[int], start: Vector, misfit: Vector
     misfit : what is left of the rows and of named positions
     named : whether values were held, so that the rows alone might close
     """
-    if np.max(np.abs(misfit), initial=0.0) <= RESIDUAL_RTOL or not np.isfinite(misfit).all():
+    if np.max(np.abs(misfit), initial=0.0) <= EQUAL_RTOL or not np.isfinite(misfit).all():
         return []
     return [str(each) for each in position_conflicts(work, rows, start, loops_of(model), tried=not named)]
 
@@ -60,12 +61,12 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
     equations, rows, misfit, speed_misfit = work.equations, attempt.rows, attempt.misfit, attempt.speed_misfit
     active = work.active_rows
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
-    fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > RESIDUAL_RTOL * speed)
+    fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > EQUAL_RTOL * speed)
     if fast and np.isfinite(speed_misfit).all():
         conflict = velocity_conflict(work, loops_of(model))
         if conflict is not None:
             return [str(conflict)]
-    sets = _sets(work, attempt, bool(np.max(np.abs(misfit), initial=0.0) > RESIDUAL_RTOL), fast, model)
+    sets = _sets(work, attempt, bool(np.max(np.abs(misfit), initial=0.0) > EQUAL_RTOL), fast, model)
     h = dict(zip(rows, misfit, strict=False))
     rate = dict(zip(active, speed_misfit, strict=False))
     wanted = [
@@ -76,7 +77,7 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
         f"{'' if condition.name.endswith('.rate') else which}{condition.name!r} = {condition.target:.9g} cannot be "
         f"reached: off by {off:.6g}; name fewer values" + sets.get(repr(condition.name), "")
         for which, condition, off in wanted
-        if not abs(off) <= RESIDUAL_RTOL * speed
+        if not abs(off) <= EQUAL_RTOL * speed
     ]
     for k in active:
         row = equations.rows[k]
@@ -86,7 +87,7 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
                 f"{row.title} is not finite at the start: check roots, logarithms and divisions, and "
                 "whether a disk lies flat, which touches with all its edge"
             )
-        elif abs(position) > RESIDUAL_RTOL or abs(velocity) > RESIDUAL_RTOL * speed:
+        elif abs(position) > EQUAL_RTOL or abs(velocity) > EQUAL_RTOL * speed:
             place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
             found.append(
                 f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "

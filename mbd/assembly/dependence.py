@@ -8,11 +8,10 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL
 
 __all__ = ["MIN_COEFFICIENT", "Dependence", "dependences", "rank_of"]
 
-RANK_RTOL = 1e-8
-"""Singular value of the row-normalised B, relative to the largest, that counts as zero [-]."""
 MIN_COEFFICIENT = 1e-7
 """Coefficient below which a row does not take part in a dependence [-]."""
 
@@ -58,7 +57,7 @@ def rank_of(B: Matrix) -> int:
     if not B.size:
         return 0
     sizes = np.linalg.svd(normalised(B), compute_uv=False)
-    return int(np.count_nonzero(sizes > RANK_RTOL * max(float(sizes[0]), 1e-300)))
+    return int(np.count_nonzero(sizes > HALF_PRECISION_RTOL * max(float(sizes[0]), 1e-300)))
 
 
 def dependences(B: Matrix, titles: Sequence[str]) -> tuple[Dependence, ...]:
@@ -82,7 +81,7 @@ def dependences(B: Matrix, titles: Sequence[str]) -> tuple[Dependence, ...]:
         left = row - basis.T @ (basis @ row)
         left = left - basis.T @ (basis @ left)
         size = float(np.linalg.norm(left))
-        if size > RANK_RTOL * max(float(np.linalg.norm(row)), 1e-300):
+        if size > HALF_PRECISION_RTOL * max(float(np.linalg.norm(row)), 1e-300):
             basis = np.vstack([basis, left / size])
             kept.append(k)
             continue

@@ -13,13 +13,11 @@ from mbd.assembly.posture import Posture
 from mbd.bodies.values import is_finite_number, shown
 from mbd.constraints.touchdown import Touchdown
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.state import State
 
 __all__ = ["FootPlaces", "foot_places"]
-
-HEIGHT_ATOL = 1e-6
-"""Height of a foot beside the ground up to which a place counts as on it [m]."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class FootPlaces:
         faults = [
             f"anchors: {name!r} stands at y = {start[point]:.6g} m, not at y = {y:.6g} m"
             for name, (point, y) in self.heights.items()
-            if abs(start[point] - y) > HEIGHT_ATOL
+            if abs(start[point] - y) > NOMINAL_RTOL
         ]
         if faults:
             raise AssemblyError(faults)
@@ -86,7 +84,7 @@ def foot_places(model: Any, anchors: Any, closed: Collection[str]) -> FootPlaces
         values, measure = words[name].held_at([float(value) for value in place]), getattr(words[name], "measure", None)
         if values is not None:
             held[name] = np.array(values, dtype=float)
-            if abs(float(place[1])) > HEIGHT_ATOL:
+            if abs(float(place[1])) > NOMINAL_RTOL:
                 faults.append(f"anchors: {name!r} stands on level ground, y = 0, got y = {float(place[1]):.3g} m")
         elif isinstance(measure, Touchdown):
             point = measure.point.full_name

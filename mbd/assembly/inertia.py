@@ -13,6 +13,7 @@ from mbd.assembly.islands import alike_islands, islands_of_rows
 from mbd.assembly.not_finite import first_cause, tape_inputs
 from mbd.assembly.posture import Posture
 from mbd.compile.mechanism import AccelerationTerms
+from mbd.equal import ROUND_OFF_RTOL
 
 __all__ = ["lost_inertia", "lost_sentence", "undetermined"]
 
@@ -20,8 +21,6 @@ ENERGY_RTOL = 1e-26
 """Kinetic energy of a motion, over what M adds up for it, below which it is that of round-off in velocities [-]."""
 LOST_ENERGY_RTOL = 1e-17
 """The same below which not a digit of it is left in M, a tenth of the round-off in its entries [-]."""
-MIN_SINGULAR_RATIO = 1e-12
-"""Smallest singular value of the equations, over the largest, above which no motion is asked for its energy [-]."""
 
 
 def undetermined(work: Posture) -> list[str]:
@@ -85,11 +84,11 @@ def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
     for islands in alike_islands(scaled, n):
         _, sizes, right = np.linalg.svd(scaled[islands[:, :, np.newaxis], islands[:, np.newaxis]])
         largest = max(largest, float(np.max(sizes)))
-        for place, k in zip(*np.nonzero(sizes < len(matrix) * MIN_SINGULAR_RATIO), strict=True):
+        for place, k in zip(*np.nonzero(sizes < len(matrix) * ROUND_OFF_RTOL), strict=True):
             motion = np.zeros(len(matrix))
             motion[islands[place]] = right[place, k]
             found.append((float(sizes[place, k]), motion / scale))
-    weak = [(size / largest, motion) for size, motion in found if size / largest < MIN_SINGULAR_RATIO]
+    weak = [(size / largest, motion) for size, motion in found if size / largest < ROUND_OFF_RTOL]
     return sorted(weak, key=lambda each: -each[0])
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
 from mbd.assembly.conflicts import HELD_ROW_WEIGHT, Conflict, Member, irreducible, linear_conflict, member_of, solvable
-from mbd.assembly.posture import RESIDUAL_RTOL, Posture, close_positions, descend, descents
+from mbd.assembly.posture import Posture, close_positions, descend, descents
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL
 
 __all__ = ["Held", "acceleration_conflict", "named_conflict", "position_conflicts", "velocity_conflict"]
 
@@ -99,7 +100,7 @@ def _conflict(work: Posture, start: Vector, rows: Sequence[int], loops: Loops, s
 def _closes(work: Posture, start: Vector, rows: Sequence[int], places: Sequence[Condition], free: Matrix) -> bool:
     """Whether positions satisfy some of the rows and named results."""
     trial = replace(work, q=start.copy(), places=tuple(places), anchors=work.anchors.copy())
-    return bool(np.max(np.abs(close_positions(trial, rows, free)), initial=0.0) <= RESIDUAL_RTOL)
+    return bool(np.max(np.abs(close_positions(trial, rows, free)), initial=0.0) <= EQUAL_RTOL)
 
 
 def _nearest(
@@ -129,7 +130,7 @@ def velocity_conflict(work: Posture, loops: Loops) -> Conflict | None:
     y[: equations.n_v] = 0.0
     terms = work.terms(y=y)
     right = -terms.rate[active]
-    tolerance = RESIDUAL_RTOL * (1.0 + float(np.max(np.abs(right), initial=0.0)))
+    tolerance = EQUAL_RTOL * (1.0 + float(np.max(np.abs(right), initial=0.0)))
     members = [member_of(equations.rows[k], equations, loops) for k in active]
     units = [equations.rows[k].unit for k in active]
     return linear_conflict(terms.B[active][:, : equations.n_v], right, members, units, "velocity", tolerance)
@@ -204,4 +205,4 @@ def _moves(work: Posture, y: Vector, rows: Sequence[int], wanted: Sequence[Condi
     unit = np.eye(n_v)[[k for each in held for k in each.moves]]
     right = np.concatenate([-rate, [each.value for each in held]])
     scale = 1.0 + float(np.max(np.abs(right), initial=0.0))
-    return solvable(np.vstack([B, unit]), right, RESIDUAL_RTOL * scale)
+    return solvable(np.vstack([B, unit]), right, EQUAL_RTOL * scale)

@@ -13,20 +13,12 @@ from mbd.assembly.conflicts import Conflict, loops_of
 from mbd.assembly.dependence import Dependence, dependences, rank_of
 from mbd.assembly.infeasibility import acceleration_conflict, position_conflicts, velocity_conflict
 from mbd.assembly.manager import manager_of
-from mbd.assembly.posture import (
-    RESIDUAL_RTOL,
-    Posture,
-    capture,
-    close_nearby,
-    close_positions,
-    close_velocities,
-    move,
-    position_rows,
-)
+from mbd.assembly.posture import Posture, capture, close_nearby, close_positions, close_velocities, move, position_rows
 from mbd.bodies.values import named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.state import State, malformed
 
@@ -163,7 +155,7 @@ def _examined(model: Any, work: Posture, given: bool) -> Mobility:
     rows, free = position_rows(work), np.ones(work.equations.n_v, dtype=bool)
     misfit = close_positions(work, rows, free) if not given else _off(work, rows)
     conflicts: list[Conflict] = []
-    if np.max(np.abs(misfit), initial=0.0) > RESIDUAL_RTOL:
+    if np.max(np.abs(misfit), initial=0.0) > EQUAL_RTOL:
         conflicts = position_conflicts(work, rows, start, loops, tried=not given)
     capture(work)
     active = work.active_rows
@@ -255,7 +247,7 @@ def _generic(work: Posture, rows: list[int], active: list[int], here: Matrix) ->
         step *= 0.2 / float(np.linalg.norm(step)) * (-1.0 if step @ last < 0.0 else 1.0)  # on, not to and fro
         last = step
         move(walker, step)
-        if np.max(np.abs(close_nearby(walker, rows, free)), initial=0.0) > RESIDUAL_RTOL:
+        if np.max(np.abs(close_nearby(walker, rows, free)), initial=0.0) > EQUAL_RTOL:
             walker.q = before
             continue
         capture(walker)

@@ -16,8 +16,8 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
-from mbd.assembly.posture import RESIDUAL_RTOL, Posture, close_nearby, close_positions, move
-from mbd.equal import RANK_RTOL
+from mbd.assembly.posture import Posture, close_nearby, close_positions, move
+from mbd.equal import EQUAL_RTOL, RANK_RTOL
 
 __all__ = ["nearest_positions", "nearest_velocities"]
 
@@ -38,7 +38,7 @@ def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, fl
     places, work.places = work.places, ()
     free = np.ones(work.equations.n_v, dtype=bool)
     try:
-        if np.max(np.abs(close_positions(work, rows, free)), initial=0.0) > RESIDUAL_RTOL:
+        if np.max(np.abs(close_positions(work, rows, free)), initial=0.0) > EQUAL_RTOL:
             return False
         off, slopes = _off(work, places, named)
         damping = 1e-3
@@ -46,7 +46,7 @@ def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, fl
             q, anchors = work.q.copy(), work.anchors.copy()
             change = _step(_jacobian(work, rows), off, slopes, damping)
             move(work, change / max(1.0, 2.0 * float(np.max(np.abs(change), initial=0.0))))
-            closed = np.max(np.abs(close_nearby(work, rows, free)), initial=0.0) <= RESIDUAL_RTOL
+            closed = np.max(np.abs(close_nearby(work, rows, free)), initial=0.0) <= EQUAL_RTOL
             new, new_slopes = _off(work, places, named)
             if closed and new @ new < off @ off:
                 off, slopes, damping = new, new_slopes, max(0.2 * damping, 1e-12)
@@ -79,7 +79,7 @@ def nearest_velocities(work: Posture, rows: Sequence[int], named: Mapping[int, f
     work.y[:n_v] += first + free @ np.linalg.lstsq(slopes @ free, wanted, rcond=RANK_RTOL)[0]
     terms = work.terms()
     speed = 1.0 + float(np.max(np.abs(work.y[:n_v]), initial=0.0))
-    return bool(np.max(np.abs(terms.rate[list(rows)]), initial=0.0) <= RESIDUAL_RTOL * speed)
+    return bool(np.max(np.abs(terms.rate[list(rows)]), initial=0.0) <= EQUAL_RTOL * speed)
 
 
 def _jacobian(work: Posture, rows: Sequence[int]) -> Matrix:

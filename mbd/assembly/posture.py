@@ -11,18 +11,15 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.orientation import faced
 from mbd.assembly.pose import Posture
 from mbd.assembly.turns import choose_turns, hold_directions
+from mbd.equal import EQUAL_RTOL, SMALL_SUM_RTOL
 
 __all__ = [
-    "Posture", "RESIDUAL_RTOL", "capture", "close_nearby", "close_positions", "close_velocities", "damped_step",
+    "Posture", "capture", "close_nearby", "close_positions", "close_velocities", "damped_step",
     "descend", "descents", "move", "position_rows",
 ]  # fmt: skip
 
-RESIDUAL_RTOL = 1e-9
-"""Largest row residual [m, rad, m/s, rad/s] of a start, relative to 1 or the speed, that counts as consistent."""
 REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
-DERIVATIVE_ATOL = 1e-14
-"""Derivative [m/rad, -] of a row below which a coordinate does not act on it: what cancellation leaves of zero."""
 MAX_LEVER = 2.0
 """Derivative of a row over what rows are off, up to which it may come from that alone; √3 at most [1/rad]."""
 MAX_STEPS_TO_HALVE = 20
@@ -51,7 +48,7 @@ def _involved(B: Matrix, free: Matrix, missing: float = 0.0) -> Any:
     missing : what the rows are off: a base that carries all they compare turns that along, and changes it by no more
     """
     size = float(np.max(np.abs(B), initial=0.0))
-    least = max(1e-12 * size, DERIVATIVE_ATOL, MAX_LEVER * missing)
+    least = max(1e-12 * size, SMALL_SUM_RTOL, MAX_LEVER * missing)
     return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > least))
 
 
@@ -80,7 +77,7 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     start = work.q.copy()
     choose_turns(work, rows)
     misfit = _newton(work, rows, free, start)
-    if np.max(np.abs(misfit)) <= RESIDUAL_RTOL:
+    if np.max(np.abs(misfit)) <= EQUAL_RTOL:
         return misfit
     first, angles, moved = work.q, _angles(work), work.equations.configuration.compose
     turns = np.random.default_rng(0).uniform(-1.5, 1.5, (12, len(free)))
@@ -88,15 +85,15 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
         work.q = moved(start, np.where(free & angles, turn, 0.0))
         choose_turns(work, rows)
         again = _newton(work, rows, free, start)
-        if np.max(np.abs(again)) <= RESIDUAL_RTOL:
+        if np.max(np.abs(again)) <= EQUAL_RTOL:
             return again
     weights = np.ones(len(rows) + len(work.places))
-    for q in descents(work, start, free) if np.max(np.abs(misfit)) > RESIDUAL_RTOL else ():
+    for q in descents(work, start, free) if np.max(np.abs(misfit)) > EQUAL_RTOL else ():
         work.q = q
         missing, _ = descend(work, rows, free, weights)
         if np.max(np.abs(missing)) < NEWTON_RANGE:
             again = _newton(work, rows, free, work.q.copy())
-            if np.max(np.abs(again)) <= RESIDUAL_RTOL:
+            if np.max(np.abs(again)) <= EQUAL_RTOL:
                 return again
     work.q = first
     return misfit
@@ -186,13 +183,13 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             continue
         size = float(np.max(np.abs(h)))
         places = _involved(B, free)
-        if not len(places) and size > RESIDUAL_RTOL and iteration < NUDGES:
+        if not len(places) and size > EQUAL_RTOL and iteration < NUDGES:
             _nudge(work, rows, free)
             continue
         if not np.isfinite(size) or not len(places):
             return h
         least, since = (size, 0) if size < 0.5 * least else (least, since + 1)
-        if since > MAX_STEPS_TO_HALVE and size > RESIDUAL_RTOL:
+        if since > MAX_STEPS_TO_HALVE and size > EQUAL_RTOL:
             if astray:
                 return h
             least, since, astray = np.inf, 0, True

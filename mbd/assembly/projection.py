@@ -12,8 +12,9 @@ from mbd.arrays import Vector
 from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.given_state import given_state
 from mbd.assembly.orientation import reversed_joints
-from mbd.assembly.posture import RESIDUAL_RTOL, Posture, capture, close_nearby, close_velocities, position_rows
+from mbd.assembly.posture import Posture, capture, close_nearby, close_velocities, position_rows
 from mbd.assembly.turns import keep_wrapped
+from mbd.equal import EQUAL_RTOL
 from mbd.errors import AssemblyError
 from mbd.state import State, of_model
 
@@ -91,7 +92,7 @@ def _close(work: Posture) -> None:
     def found() -> Any:
         return residuals(work.mechanism, work.time, work.q, work.y, work.parameters, work.anchors)
 
-    if np.max(np.abs(found()[0, active]), initial=0.0) > RESIDUAL_RTOL:
+    if np.max(np.abs(found()[0, active]), initial=0.0) > EQUAL_RTOL:
         close_nearby(work, position_rows(work), free)
         capture(work)
     close_velocities(work, free)

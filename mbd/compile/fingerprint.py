@@ -28,7 +28,10 @@ from mbd.tape.node import Node, Tape
 
 __all__ = ["fingerprint", "source_digest", "sources_of"]
 
-SOURCES = ("arrays.py", "configuration.py", "scope.py", "bodies", "compile", "equations", "joints", "tape", "trees")
+SOURCES = (
+    "arrays.py", "configuration.py", "equal.py", "scope.py", "bodies", "compile", "equations", "joints", "tape",
+    "trees",
+)  # fmt: skip
 """Of the package: what programs are made by. Joints say how their coordinates compose, bodies have the algebra."""
 
 FIELDS = (

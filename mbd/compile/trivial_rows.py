@@ -17,19 +17,17 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
-from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
+from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL, ROUND_OFF_RTOL
 from mbd.equations.equations import Equations, Row
 from mbd.equations.magnitudes import magnitudes
 from mbd.errors import ModelError
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 
-__all__ = ["DERIVATIVE_ATOL", "parts_of_row", "trivial_rows"]
+__all__ = ["parts_of_row", "trivial_rows"]
 
 SAMPLED_POSES = 3
 """Positions at which rows are looked at [-]."""
-DERIVATIVE_ATOL = 1e-6
-"""Largest derivative of a row, beside 1 and those of others, above which no closer look is needed [m, rad, -]."""
 
 
 @dataclass
@@ -75,7 +73,7 @@ def _found(mechanism: Mechanism, parameters: Vector) -> tuple[frozenset[int], li
         terms = [mechanism.terms_of(block, parameters) for block in blocks]
     B = np.abs(np.stack([each.B[:, :n_v] for each in terms]))
     largest = np.max(B, axis=(0, 2), initial=0.0)
-    bound = DERIVATIVE_ATOL * max(1.0, float(np.max(largest, initial=0.0)))
+    bound = NOMINAL_RTOL * max(1.0, float(np.max(largest, initial=0.0)))
     normals = {contact.rows[0] for contact in equations.contacts if contact.rows}
     doubtful = [k for k in range(len(equations.rows)) if largest[k] <= bound and k not in normals]
     if not doubtful:

@@ -9,15 +9,13 @@ from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.constraints.law import Drag
 from mbd.dataclass import dataclass
+from mbd.equal import MIN_DIVISOR
 from mbd.errors import ModelError
 from mbd.joints.losses.base import StateRates
 from mbd.tape.functions import maximum, minimum, sqrt, where
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Bristles"]
-
-LEAST_SQUARE = 1e-200
-"""What is added to ‖σ₀ z + σ₁ γ‖² before it divides [N²]."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ class Bristles:
             forces = [maximum(minimum(pulls[0], limit), -limit)]
         else:
             square = pulls[0] * pulls[0] + pulls[1] * pulls[1]
-            share = where(square <= limit * limit, 1.0, limit / sqrt(square + LEAST_SQUARE))
+            share = where(square <= limit * limit, 1.0, limit / sqrt(square + MIN_DIVISOR))
             forces = [share * pull for pull in pulls]
         drags = [
             Drag(speed, -force) if single else Drag(speed, -force, f"friction.{part}", True)

@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from mbd.bodies.algebra import cross, derivatives_at, difference, dot, scaled, total
 from mbd.bodies.scope import Scope, Triple
 from mbd.constraints.surfaces import Surface
+from mbd.equal import NOMINAL_RTOL
 from mbd.tape.derivatives import substitute
 from mbd.tape.functions import cos, sin, sqrt, where
 from mbd.tape.node import Node, Scalar
@@ -35,8 +36,6 @@ NO_CONTACT_POINT = (
 
 NEWTON_STEPS = 6
 """Of Newton's method for the place of contact: from 0.4 of the radius of curvature it takes four [-]."""
-PLACE_RTOL = 1e-6
-"""What it may miss of the radius, or of a radian, beside which there is no place [-]."""
 MIN_CURVATURE_MARGIN = 0.02
 """Least share of its curvature by which a ball or a disk is rounder than the valley [-]."""
 
@@ -129,6 +128,6 @@ def edge_on(surface: Surface, center: Triple, axle: Triple, radius: Scalar, scop
 def _where_found(gap: Scalar, missed: Scalar, radius: Scalar, share: Scalar) -> Scalar:
     """The gap where Newton's method has come to a place, and to a minimum; else no number."""
     single: Scalar = where(share > MIN_CURVATURE_MARGIN, gap, math.nan)
-    bound = PLACE_RTOL * radius
+    bound = NOMINAL_RTOL * radius
     found: Scalar = where(missed < bound * bound, single, math.nan)
     return found

@@ -15,8 +15,8 @@ s = (1, 1), (1, 1, 0)  w = γ: opposite to the velocity as it changes within a s
 
 from __future__ import annotations
 
+from mbd.equal import MIN_SQUARED_SPEED
 from mbd.equations.equations import Equations
-from mbd.joints.losses.isotropic import MIN_SQUARED_SPEED
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 

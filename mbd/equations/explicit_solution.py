@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mbd.dataclass import dataclass
+from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.equations.equations import Equations
 from mbd.tape.elimination import Factors, factors
 from mbd.tape.node import Node
@@ -20,9 +21,6 @@ MAX_UNKNOWNS = 64
 """Unknowns above which a system is not eliminated on the tape."""
 MAX_OPERATIONS = 12000
 """Operations of an elimination with one solution above which making its code takes longer than it is likely to save."""
-
-MIN_PIVOT_SHARE = 1e-4
-"""Part of its terms that a pivot must keep, as `LOSS_AT_ONCE` of `mbd.kernel.algebra.ordered` [-]."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ def explicit_solution(
     def eliminated(right: list[list[Node]]) -> Factors | None:
         corner = [tape.zero] * m
         matrix = [M[i] + right[i] for i in range(n)] + [line + corner for line in B]
-        return factors(matrix, n, MAX_OPERATIONS, massless, MIN_PIVOT_SHARE)
+        return factors(matrix, n, MAX_OPERATIONS, massless, DIRECT_PIVOT_RTOL)
 
     turned = [[line[i] for line in B] for i in range(n)]
     first = eliminated(R)

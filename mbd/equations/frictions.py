@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from mbd.constraints.law import Equation
+from mbd.equal import MIN_SQUARED_SPEED
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.equations import Effect, Friction, Row
@@ -14,7 +15,6 @@ from mbd.equations.laws import Laws
 from mbd.equations.states import with_states
 from mbd.errors import CapabilityError
 from mbd.joints.base import Joint
-from mbd.joints.losses.isotropic import MIN_SQUARED_SPEED
 from mbd.tape.derivatives import substitute
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar

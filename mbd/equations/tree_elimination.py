@@ -19,11 +19,11 @@ from dataclasses import field, replace
 from mbd.bodies.algebra import ZERO, cross, difference, dot, rotate, total
 from mbd.bodies.scope import Triple
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematic_proxies import Wrench
 from mbd.equations.kinematics import Moving, carried, joint_motion, spin_of
 from mbd.tape.derivatives import jvps, live, substitute
-from mbd.tape.elimination import MIN_PIVOT_RATIO
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["Branch", "TreeFactors", "tree_factors"]
@@ -303,7 +303,7 @@ class _Elimination:
     def _judge(self, pivot: Node, terms: Node) -> None:
         """A pivot must keep some of its terms, and not have grown out of proportion."""
         size = abs(pivot)
-        holds = (MIN_PIVOT_RATIO * terms < size) & (MIN_PIVOT_RATIO * size < terms)
+        holds = (HALF_PRECISION_RTOL * terms < size) & (HALF_PRECISION_RTOL * size < terms)
         self.sound = self.tape.binary("and", self.sound, holds)
 
     def result(self) -> TreeFactors:

@@ -8,14 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.equal import NOMINAL_RTOL
 from mbd.errors import ModelError
 
 __all__ = ["smoothed"]
 
 MIN_SAMPLES = 5
 """Samples that generalized cross-validation needs at least."""
-SPACING_RTOL = 1e-6
-"""How unevenly samples may be spaced for a filter, relative [-]."""
 
 
 def smoothed(time: Sequence[float], values: Sequence[float], cutoff: float | None, periodic: bool) -> tuple[float, ...]:
@@ -61,7 +60,7 @@ def _filtered(t: Vector, y: Vector, cutoff: float) -> Vector:
     from scipy.signal import butter, sosfiltfilt
 
     widths = np.diff(t)
-    if np.ptp(widths) > SPACING_RTOL * widths.mean():
+    if np.ptp(widths) > NOMINAL_RTOL * widths.mean():
         raise ModelError(
             f"Samples with a cutoff must be evenly spaced, but their distances are {widths.min():.6g} to "
             f"{widths.max():.6g} s; resample them, or leave cutoff out"

@@ -22,7 +22,7 @@ from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.dataclass import dataclass
-from mbd.equal import EQUAL_RTOL
+from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL
 from mbd.equations.equations import Equations, Guard
 from mbd.errors import MbdError, ModelError
 from mbd.gait.machines import in_state
@@ -38,8 +38,6 @@ POSES = (0.4, 0.4, 2.5)
 
 The wide one reaches stops and branches of laws that small motions do not.
 """
-EFFECT_RTOL = 1e-6
-"""Change relative to the largest of its kind from which on a parameter is seen to change something [-]."""
 WIDEST, GROWTH = 1e12, 30.0
 """Change of a parameter, over its value or 1, up to which an effect is looked for, and the factor of the next [-]."""
 
@@ -104,16 +102,16 @@ def moves_sides_alike(
     vector : parameter vector at a value of it; value : its own
     """
     mine, its, starts = _pairs(mechanism, mirror, vector(value))
-    size, h = _sizes(mine, starts), EFFECT_RTOL * (abs(value) or 1.0)
+    size, h = _sizes(mine, starts), NOMINAL_RTOL * (abs(value) or 1.0)
     while h <= WIDEST * max(abs(value), 1.0):
         mine_there, its_there, _ = _pairs(mechanism, mirror, vector(value + h))
         changes = (mine_there - mine, its_there - its, (mine_there - its_there) - (mine - its))
         own, others, apart = (float(np.max(_largest(change, starts) / size)) for change in changes)
         effect = max(own, others)
-        if effect > EFFECT_RTOL:
+        if effect > NOMINAL_RTOL:
             return apart <= 1e-2 * effect  # share of that change that two sides may differ by after it
         h *= GROWTH
-    return _changes_both(mechanism, mirror, vector(value), vector(value + EFFECT_RTOL * (abs(value) or 1.0)))
+    return _changes_both(mechanism, mirror, vector(value), vector(value + NOMINAL_RTOL * (abs(value) or 1.0)))
 
 
 def _changes_both(mechanism: Mechanism, mirror: Mirror, here: Vector, beside: Vector) -> bool:

@@ -13,6 +13,7 @@ from mbd.arrays import Matrix
 from mbd.assembly.assemble import assemble
 from mbd.bodies.values import among, flag, is_finite_number, shown
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 from mbd.errors import AssemblyError, GaitError, MbdError, ModelError, UnknownNameError
 from mbd.gait.arguments import Functions, check_arguments
 from mbd.gait.cycle import LimitCycle
@@ -28,8 +29,6 @@ from mbd.state import State
 
 __all__ = ["GaitSearch", "Try", "find_gait"]
 
-SAME_GAIT_ATOL = 1e-6
-"""Difference of states and periods up to which two gaits are one [m, rad, s]."""
 MAX_PROJECTION = 1.0
 """Distance [m, rad] over which a start is moved onto the section."""
 MAX_TRIES = 1_000_000
@@ -161,8 +160,7 @@ class _Hunt:
         for number, other in enumerate(self.found):
             ahead = other.chart.of(gait.state)
             same = (
-                abs(other.period - gait.period) <= SAME_GAIT_ATOL
-                and np.max(np.abs(ahead), initial=0.0) <= SAME_GAIT_ATOL
+                abs(other.period - gait.period) <= NOMINAL_RTOL and np.max(np.abs(ahead), initial=0.0) <= NOMINAL_RTOL
             )
             if same and other.parameters == gait.parameters:
                 return number

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 
 __all__ = ["Multipliers", "multipliers_of"]
 
@@ -17,10 +18,6 @@ RANK_RTOL = 1e-7
 MAX_RANK_SCALE = 100.0
 """Largest singular value beyond which the errors of P alone tell what a map forgets: strongly unstable gaits have
 large ones and, with them, small ones that are no zeros [-]."""
-ENERGY_RTOL = 1e-6
-"""Misfit of ``∇E P = ∇E`` relative to ∇E up to which energy is kept along the cycle [-]."""
-STABILITY_ATOL = 1e-6
-"""Distance of the largest modulus from 1 within which stability is not decided [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +42,7 @@ class Multipliers:
     @property
     def stability(self) -> str:
         """'stable', 'unstable' or 'marginal'."""
-        doubt = max(STABILITY_ATOL, self.error if np.isfinite(self.error) else 0.0)
+        doubt = max(NOMINAL_RTOL, self.error if np.isfinite(self.error) else 0.0)
         if abs(self.largest - 1.0) <= doubt:
             return "marginal"
         return "stable" if self.largest < 1.0 else "unstable"
@@ -75,7 +72,7 @@ def multipliers_of(P: Matrix, error: Matrix, energy: Matrix | None = None) -> Mu
     trivial: dict[str, tuple[float, ...]] = {}
     if rank < size:
         trivial["forgotten"] = (0.0,) * (size - rank)
-    if energy is not None and np.linalg.norm(energy @ P - energy) <= ENERGY_RTOL * np.linalg.norm(energy):
+    if energy is not None and np.linalg.norm(energy @ P - energy) <= NOMINAL_RTOL * np.linalg.norm(energy):
         kept = int(np.argmin(np.abs(values - 1.0)))
         trivial["energy"] = (float(values[kept].real),)
         values, modes = np.delete(values, kept), np.delete(modes, kept, axis=1)

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import GaitError, ModelError
 from mbd.gait.alike import require_alike
 from mbd.gait.arguments import Functions, check_arguments, increments_named, section_named
@@ -19,7 +20,6 @@ from mbd.gait.floquet import Multipliers
 from mbd.gait.heading import heading_of
 from mbd.gait.machines import counted_from
 from mbd.gait.mirror import mirror_of
-from mbd.gait.newton import ENERGY_RTOL
 from mbd.gait.return_map import ReturnMap
 from mbd.gait.search import Failed, Search, fallen_first, first_found, first_return
 from mbd.gait.section import Chart, section_of
@@ -203,7 +203,7 @@ def _of_family(gait: LimitCycle, start: State) -> LimitCycle:
     if not arrival.outcome.good:
         return gait
     begun, later, found = energy_of(map_, [start, arrival.state, gait.state], values)
-    if not abs(later - begun) <= ENERGY_RTOL * max(abs(begun), abs(later)):
+    if not abs(later - begun) <= HALF_PRECISION_RTOL * max(abs(begun), abs(later)):
         return gait
     family = (
         "nothing takes or gives energy, so that gaits form a family: energy= in J (T + V of the start is "

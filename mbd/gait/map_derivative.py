@@ -16,6 +16,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import SimulationError
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart
@@ -33,8 +34,6 @@ MAX_DIFFERENCES = 3
 """Differences of each direction at most: h, 2h, 4h."""
 ENOUGH, CLOSER = 1e-9, 0.125
 """Error estimate, relative to 1 or the derivative, above which smaller differences are tried, and how much smaller."""
-DIFFERENCE_RTOL = 1e-8
-"""Error estimate, relative to 1 or the derivative, above which they are tried once more [-]."""
 SHRINK, TRIES = 0.1, 4
 """Factor of h where a run beside the base does not arrive, and how often."""
 
@@ -182,7 +181,7 @@ class _Column:
         if last is None:
             good = not bool(np.any(found[1] > ENOUGH * limits))
         else:
-            good = not bool(np.any(found[1] > DIFFERENCE_RTOL * limits))
+            good = not bool(np.any(found[1] > HALF_PRECISION_RTOL * limits))
         self.best = found
         self.step *= CLOSER
         self._tried(len(slopes) == 1 or good)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-from mbd.equal import RANK_RTOL
+from mbd.equal import HALF_PRECISION_RTOL, RANK_RTOL
 from mbd.errors import SimulationError
 from mbd.gait.family import Member, energy_of
 from mbd.gait.map_derivative import Measured, map_derivative, measured, numbers_of
@@ -34,8 +34,6 @@ FINAL_RESIDUAL_RATIO = 0.01
 """Residual over `tol` above which one more step is made at the end [-]."""
 SINGULAR_RTOL = 1e-3
 """Singular value of 1 − P relative to its largest below which gaits near may form a family [-]."""
-ENERGY_RTOL = 1e-8
-"""Relative change of the energy in one return up to which nothing takes or gives any [-]."""
 REST_SPEED_OVER_TOL = 1e3
 """Speed over `tol` below which what repeats itself is rest [-]."""
 
@@ -182,7 +180,7 @@ def _alone(map_: ReturnMap, point: FixedPoint, values: Values) -> str:
     if point.slope is None or point.found is None or len(point.gap) == size:
         return ""
     before, after = energy_of(map_, [point.state, point.found.arrival.state], values)
-    if abs(after - before) <= ENERGY_RTOL * max(abs(before), abs(after)):
+    if abs(after - before) <= HALF_PRECISION_RTOL * max(abs(before), abs(after)):
         return ""
     sizes = np.linalg.svd(point.slope[:size], compute_uv=False)
     if not size or sizes[-1] <= SINGULAR_RTOL * sizes[0]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mbd.analysis.independent import ROW_RTOL
 from mbd.arrays import Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.constraints.expressions import is_expression
@@ -18,8 +19,6 @@ __all__ = ["depends_on_time", "moving_on", "reset_names"]
 
 FAR, FAR_STATES = 20.0, 8
 """How far along a coordinate [m, rad], and at how many states, nothing may change where the tape cannot decide."""
-ROW_ATOL = 1e-10
-"""Change of a row along a coordinate that counts as none, its place of touchdown moved along [m, rad]."""
 
 
 def moving_on(mechanism: Mechanism, parameters: Vector) -> tuple[int, ...]:
@@ -86,7 +85,7 @@ def _changes_nothing(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
             return False
         here, there = here[numeric], there[numeric]  # a gap below the ground is no number, here and there
         largest = max(1.0, float(np.max(np.abs(here), initial=0.0)))
-        if np.max(np.abs(there - here), initial=0.0) > ROW_ATOL * largest:
+        if np.max(np.abs(there - here), initial=0.0) > ROW_RTOL * largest:
             return False
     return True
 
@@ -119,7 +118,7 @@ def _follows(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
         defaults = np.array(mechanism.equations.configuration.defaults)
         q0, q1 = (compose(defaults, end) for end in ends)
         h = [_rows(mechanism, parameters, *pair) for pair in ((q0, q1), (compose(q0, move), compose(q1, move)))]
-        if not np.max(np.abs(h[1] - h[0]), initial=0.0) <= ROW_ATOL:
+        if not np.max(np.abs(h[1] - h[0]), initial=0.0) <= ROW_RTOL:
             return False
     return True
 

@@ -15,7 +15,6 @@ from mbd.joints.quaternions import rotation_of
 __all__ = ["CASES", "coin", "free_body", "gimbal", "top"]
 
 P1, P2, P3, P4 = "p1-free-body-1000s", "p2-gimbal-lock", "p3-top-through-vertical", "p4-coin-near-flat"
-TOLERANCE = 1e-9
 ADAPTIVE = ("RadauIIA", "RungeKutta853")
 SECOND_ORDER = {"schemes": "those of order two would take some ten million steps to keep nine digits"}
 
@@ -48,7 +47,7 @@ def free_body() -> tuple[mbd.Model, mbd.State]:
 def judge_free_body(integrator: Any) -> Outcome:
     """Energy and the vector of angular momentum over 1000 s."""
     numbers = _numbers(P1)
-    run = mbd.simulate(*free_body(), integrator, tol=TOLERANCE, until=numbers["until"])
+    run = mbd.simulate(*free_body(), integrator, tol=EQUAL_RTOL, until=numbers["until"])
     own = np.array(numbers["I"]) * run["ball.angular_velocity"]
     momentum = np.einsum("tij,tj->ti", _rotations(run, "ball"), own)
     over = int(np.count_nonzero(np.diff(np.sign(own[:, 1]))))
@@ -108,7 +107,7 @@ def top() -> tuple[mbd.Model, mbd.State]:
 def judge_top(integrator: Any) -> Outcome:
     """Energy, momenta about the vertical and the axis; it comes to the vertical."""
     numbers = _numbers(P3)
-    run = mbd.simulate(*top(), integrator, tol=TOLERANCE, until=numbers["until"])
+    run = mbd.simulate(*top(), integrator, tol=EQUAL_RTOL, until=numbers["until"])
     own = np.array(numbers["I"]) + numbers["arm"] ** 2 * np.array([1.0, 1.0, 0.0])
     momentum = np.einsum("tij,tj->ti", _rotations(run, "ball"), own * run["ball.angular_velocity"])
     times = np.linspace(0.0, numbers["until"], 20_001)
@@ -141,7 +140,7 @@ def coin() -> tuple[mbd.Model, mbd.State]:
 def judge_coin(integrator: Any) -> Outcome:
     """Its height stays, and its energy."""
     numbers = _numbers(P4)
-    run = mbd.simulate(*coin(), integrator, tol=TOLERANCE, until=numbers["until"])
+    run = mbd.simulate(*coin(), integrator, tol=EQUAL_RTOL, until=numbers["until"])
     height = run["float.y"]
     figures = [
         Figure("change of the height over itself [-]", _change(height), numbers["steady"]),

@@ -9,16 +9,13 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.bodies.values import Vector3, is_number, number, shown, unit_vector
+from mbd.equal import NOMINAL_RTOL
 from mbd.errors import ModelError
 from mbd.joints.euler import SEQUENCES, from_euler, second_from_singular, sequence_of
 from mbd.joints.quaternions import normalised, of_rotation
 
-__all__ = ["ORTHONORMAL_ATOL", "is_orientation", "orientation_doubt", "quaternion_of"]
+__all__ = ["is_orientation", "orientation_doubt", "quaternion_of"]
 
-ORTHONORMAL_ATOL = 1e-6
-"""Most by which the length of a quaternion may be off 1, and the axes of a matrix off each other, by rounding [-]."""
-SINGULARITY_ATOL = 1e-6
-"""Distance from the singularity of an Euler sequence within which a start is in doubt [rad]."""
 SMALL_TURN = math.cos(math.radians(15.0))
 """Scalar of the quaternion of a turn by 30° [-]."""
 ACCEPTED_FORMS = (
@@ -60,7 +57,7 @@ def quaternion_of(value: Any, what: str) -> tuple[float, ...]:
     if array.shape != (4,) or not np.isfinite(array).all():
         raise ModelError(f"{what} must be an orientation, not {shown(value)}; {ACCEPTED_FORMS}")
     length = float(np.linalg.norm(array))
-    if not abs(length - 1.0) <= ORTHONORMAL_ATOL:
+    if not abs(length - 1.0) <= NOMINAL_RTOL:
         near = f"; the nearest is ({', '.join(f'{x:.9g}' for x in array / length)})" if length > 0.0 else ""
         raise ModelError(f"{what} must be a quaternion of length 1, got {shown(value)} of length {length:.9g}{near}")
     return tuple(map(float, normalised(array.tolist())))
@@ -87,7 +84,7 @@ def _of_pair(value: Any, what: str) -> tuple[float, ...]:
 def _of_matrix(R: Vector, what: str) -> tuple[float, ...]:
     """Of a rotation matrix, whose columns are the child's axes in the parent's."""
     off = float(np.max(np.abs(R @ R.T - np.eye(3))))
-    if off > ORTHONORMAL_ATOL:
+    if off > NOMINAL_RTOL:
         raise ModelError(
             f"{what} must be a rotation matrix, of columns of length 1 across each other; R Rᵀ is off 1 by {off:.3g}"
         )
@@ -132,7 +129,7 @@ def orientation_doubt(value: Any, what: str) -> str | None:
     if not (isinstance(value, list | tuple) and len(value) == 2 and isinstance(value[0], str)):
         return None
     sequence = sequence_of(value[0])
-    if sequence is None or second_from_singular(sequence, float(value[1][1])) > SINGULARITY_ATOL:
+    if sequence is None or second_from_singular(sequence, float(value[1][1])) > NOMINAL_RTOL:
         return None
     return (
         f"{what}: the second angle of {value[0]!r} is {float(value[1][1]):.6g} rad, the singularity of that sequence, "

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import TYPE_CHECKING
 
+from mbd import equal
 from mbd.compile.fingerprint import sources_of
 from mbd.kernel.schemes import contract
 
@@ -68,10 +69,10 @@ def mbd_kernel(K: Kernel) -> int:
 
 
 def source_digest() -> str:
-    """Hash of what the kernel is made from: this folder, its printers, schemes from elsewhere and what they import."""
+    """Hash of what it is made from: this folder, `mbd.equal`, printers, schemes from elsewhere and what they import."""
     folder, digest = Path(__file__).parent, hashlib.sha256(repr(contract.SCHEMES).encode())  # the order is the number
     own, trees = sources_of(folder.as_posix()), sources_of((folder.parent / "trees").as_posix())
-    for path in [*own, *sorted({*trees, *_beside(contract.SCHEMES)})]:
+    for path in [*own, str(equal.__file__), *sorted({*trees, *_beside(contract.SCHEMES)})]:
         name = path[len(folder.as_posix()) :] if path in own else path.rpartition("/")[2]
         with open(path, "rb") as file:
             digest.update(f"{name}\n".encode() + file.read())

@@ -11,6 +11,7 @@ import numpy as np
 from mbd.analysis.fitting.fit import bounds
 from mbd.arrays import Vector
 from mbd.bodies.values import among, is_number, shown
+from mbd.equal import HALF_PRECISION_RTOL, NOMINAL_RTOL
 from mbd.errors import ModelError
 from mbd.gait.cycle import LimitCycle
 from mbd.integrators import Integrator
@@ -19,16 +20,13 @@ from mbd.model import Model
 from mbd.optimization.formula import formula
 from mbd.optimization.optimum import Active, Optimum
 from mbd.optimization.points import FunctionSource, GaitSource, Source
-from mbd.optimization.problem import FEASIBILITY_RTOL, Evaluated, Limit, Problem
+from mbd.optimization.problem import Evaluated, Limit, Problem
 from mbd.optimization.runs import Functions, RunSource
-from mbd.optimization.search import EDGE_RTOL, METHODS, searched
+from mbd.optimization.search import METHODS, searched
 from mbd.progress import trial_bar
 from mbd.state import State
 
 __all__ = ["optimize"]
-
-SLOPE_TOLERANCE = 1e-6
-"""Slope that active limits leave over, below which the place is an optimum whatever the method says [-]."""
 
 
 def optimize(
@@ -233,9 +231,9 @@ def _concluded(task: Problem, converged: bool | None, message: str, method: str,
     best = task.best
     assert best is not None
     active, slope = ((), math.nan) if converged is None else _active(task, best)
-    if converged is False and slope <= SLOPE_TOLERANCE:
+    if converged is False and slope <= NOMINAL_RTOL:
         converged, message = True, f"no slope is left; {message}"
-    made, violated = best.point.made, best.violation > max(FEASIBILITY_RTOL, EDGE_RTOL)
+    made, violated = best.point.made, best.violation > max(HALF_PRECISION_RTOL, NOMINAL_RTOL)
     gait = made if isinstance(made, LimitCycle) else None
     values = task.values(best.u)
     if violated:
@@ -261,11 +259,11 @@ def _active(task: Problem, best: Evaluated) -> tuple[tuple[Active, ...], float]:
     gradient, slopes = task.gradient(best) / task.scale, task.slopes(best)[1] / task.scale
     for k, name in enumerate(task.names):
         for side, end in (("lowest", task.low[k]), ("highest", task.high[k])):
-            if abs(x[k] - end) <= EDGE_RTOL * task.scale[k]:
+            if abs(x[k] - end) <= NOMINAL_RTOL * task.scale[k]:
                 found.append((name, side, float(end), np.eye(len(x))[k]))
     for k, limit in enumerate(task.limits):
         for side, end in (("lowest", limit.low), ("highest", limit.high)):
-            if abs(best.limits[k] - end) <= EDGE_RTOL * task.limit_scale[k]:
+            if abs(best.limits[k] - end) <= NOMINAL_RTOL * task.limit_scale[k]:
                 found.append((limit.title, "value" if limit.low == limit.high else side, float(end), slopes[k]))
                 if limit.low == limit.high:
                     break

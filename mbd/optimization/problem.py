@@ -10,14 +10,12 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import CapabilityError, GaitError, MbdError
 from mbd.optimization.formula import Formula
 from mbd.optimization.points import Point, Source, failed
 
 __all__ = ["Evaluated", "FailedTrial", "Limit", "Problem", "Trial", "TrialsSpent"]
-
-FEASIBILITY_RTOL = 1e-8
-"""Violation of a constraint, over its scale, that counts as none [-]."""
 
 
 @dataclass(frozen=True)
@@ -227,6 +225,6 @@ class Problem:
 
     def better(self, one: Evaluated, other: Evaluated) -> bool:
         """Whether one place is better: less violated, or as good there and a smaller objective."""
-        if max(one.violation, other.violation) > FEASIBILITY_RTOL:
+        if max(one.violation, other.violation) > HALF_PRECISION_RTOL:
             return one.violation < other.violation
         return self.objective(one) < self.objective(other)

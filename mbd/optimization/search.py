@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.equal import NOMINAL_RTOL
 from mbd.optimization.problem import Evaluated, FailedTrial, Problem, TrialsSpent
 
 __all__ = ["METHODS", "searched"]
 
 METHODS = ("SLSQP", "trust-constr", "least_squares")
-EDGE_RTOL = 1e-6
-"""Distance from the edge of the box in which a step is looked for, over the box, that is on it [-]."""
 MAX_BOXES = 60
 """Most boxes."""
 
@@ -38,7 +37,7 @@ def searched(problem: Problem, method: str, accuracy: float) -> tuple[bool, str]
             continue
         except TrialsSpent:
             return False, f"{problem.most} trials were made, the most allowed"
-        inside = np.max(np.abs(u - best.u)) < radius * (1.0 - EDGE_RTOL)
+        inside = np.max(np.abs(u - best.u)) < radius * (1.0 - NOMINAL_RTOL)
         if inside or np.isinf(radius):
             return converged, message
         if not problem.better(problem.best, best):

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.python import ArrayFunction, array_function
-from mbd.compile.trivial_rows import DERIVATIVE_ATOL, parts_of_row
+from mbd.compile.trivial_rows import parts_of_row
 from mbd.dataclass import dataclass
-from mbd.equal import REST_SPEED, ROUND_OFF_RTOL
+from mbd.equal import NOMINAL_RTOL, REST_SPEED, ROUND_OFF_RTOL
 from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.equations.magnitudes import magnitudes
@@ -206,7 +206,7 @@ class Balance:
     def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:
         """The rows whose Jacobian exceeds round-off of its parts; redundant ones of joints on one axis are not."""
         largest = np.max(np.abs(B), axis=(0, 2), initial=0.0)
-        bound = DERIVATIVE_ATOL * max(1.0, float(np.max(largest, initial=0.0)))
+        bound = NOMINAL_RTOL * max(1.0, float(np.max(largest, initial=0.0)))
         doubtful = [k for k in every if largest[k] <= bound]
         if not doubtful:
             return every

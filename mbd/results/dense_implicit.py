@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.equal import EQUAL_RTOL
 from mbd.results.dense import SINGULAR_DISTANCE_RATIO, Restepping
 from mbd.results.polynomials import CHUNK, Places, hermite, quintic
 from mbd.results.record import Rows
@@ -27,8 +28,6 @@ __all__ = ["LedSteps"]
 Index = NDArray[np.intp]
 
 NAMES = ("q", "v", "z", "a", "s", "lam")
-SHORT_STEP_RTOL = 1e-9
-"""Difference of a cubic and a quintic over the way in an interval below which its step is short: ω h = 0.025 [-]."""
 
 
 class LedSteps:
@@ -49,7 +48,7 @@ class LedSteps:
         inside = np.flatnonzero(places.step > 0.0)
         which = np.unique(places.lower[inside])
         rough, way = self._rough(rows, which)
-        which, rough = which[rough > SHORT_STEP_RTOL * way], rough[rough > SHORT_STEP_RTOL * way]
+        which, rough = which[rough > EQUAL_RTOL * way], rough[rough > EQUAL_RTOL * way]
         inside = inside[np.isin(places.lower[inside], which)]
         changed = {name: np.array(getattr(found, name)) for name in NAMES}
         for part in np.array_split(inside, -(-len(inside) // CHUNK)) if len(inside) else ():

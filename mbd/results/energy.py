@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.equal import ROUND_OFF_RTOL
+from mbd.equal import ROUND_OFF_RTOL, SMALL_SUM_RTOL
 from mbd.results.columns import ModelColumns
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.powers import Lost, Power, moving_share, powers
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
 
-WORK_RTOL = 1e-14
-"""Difference of two works of an interval, over the largest, that is round-off [-]."""
 MAX_WORK_ERROR = 0.05
 """Error of the work of an impact, over its largest, up to which rows tell it [-]."""
 MIN_GAIN_OVER_ERROR = 10.0
@@ -241,7 +239,7 @@ def _long(
     differ = np.where(known, np.abs(steps - plain), 0.0)
     # few rows make both the same: the trapezoid, or where rates are known a step between two switches
     few = known if rate is None else known & (np.append(0.0, step)[:-1] <= 0.0) & (np.append(step, 0.0)[1:] <= 0.0)
-    differ[few & (differ <= WORK_RTOL * np.max(np.abs(work)))] = np.inf
+    differ[few & (differ <= SMALL_SUM_RTOL * np.max(np.abs(work)))] = np.inf
     long = np.sort(np.argsort(-differ, kind="stable")[:20000])
     return np.asarray(long[differ[long] > least])
 

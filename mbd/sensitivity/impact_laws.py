@@ -12,10 +12,10 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
-from mbd.equal import EQUAL_RTOL
-from mbd.kernel.contact.impact import APPROACH_RTOL, MAX_IMPACTS
+from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, LAW_RTOL
+from mbd.kernel.contact.impact import MAX_IMPACTS
 from mbd.sensitivity.motion import Mode, Motion
-from mbd.sensitivity.phases import DERIVATIVE_RTOL, Law, OneSided, Unknown, chosen, speeds, undecided
+from mbd.sensitivity.phases import Law, OneSided, Unknown, chosen, speeds, undecided
 from mbd.sensitivity.programs import Programs
 
 __all__ = ["Struck", "poisson", "sequential"]
@@ -88,11 +88,11 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
         approach = {c: abs(speed[k]) if c in held else -speed[k] for c, k in normal.items()}
         most = max(approach.values(), default=0.0)
         fastest = max(fastest, most)
-        if most <= APPROACH_RTOL * fastest or most < 1e-14:
+        if most <= LAW_RTOL * fastest or most < 1e-14:
             edges = [
                 c for c, k in normal.items()
                 if c not in held and abs(speed[k]) <= EQUAL_RTOL * fastest
-                and np.any(np.abs(of_speed[k]) > DERIVATIVE_RTOL * size)
+                and np.any(np.abs(of_speed[k]) > HALF_PRECISION_RTOL * size)
             ]  # fmt: skip
             if edges:
                 raise OneSided(undecided([contacts[c].name for c in edges]))
@@ -110,7 +110,7 @@ def sequential(programs: Programs, before: Motion, mode: Mode, who: Struck) -> M
 
 def _refuse_ties(names: Sequence[str], changes: Sequence[Vector], terms: Vector) -> None:
     """Contacts approach equally fast, and a direction tells one of them from another."""
-    if any(np.any(np.abs(change - changes[0]) > DERIVATIVE_RTOL * terms) for change in changes[1:]):
+    if any(np.any(np.abs(change - changes[0]) > HALF_PRECISION_RTOL * terms) for change in changes[1:]):
         listed = " and ".join(repr(name) for name in names)
         raise OneSided(
             f"{listed} approach equally fast in its sequence, and a change decides which strikes first: it has "

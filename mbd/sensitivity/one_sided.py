@@ -15,7 +15,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.projection import project
 from mbd.bodies.values import is_number
-from mbd.equal import EQUAL_RTOL, INSTANT_RTOL
+from mbd.equal import EQUAL_RTOL, INSTANT_RTOL, NOMINAL_RTOL
 from mbd.errors import MbdError, OneSidedError
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode, Motion, Rates
@@ -31,8 +31,6 @@ ROUND_OFF, GRAZE = 1e-12, 1e-7
 """Velocity over the sum of its terms that is rest, and rate of a guard over its terms below which it grazes [-]."""
 STEP, LEVELS = 1e-4, 4
 """Change of what a run is differentiated by, over it or 1, to the runs on each side, and how many, each half as far."""
-JUMP_RTOL = 1e-6
-"""Difference of a result from its limit on a side, relative to 1 or the result, above which it jumps there."""
 MAX_SHOWN = 4
 """Values in the sentence of a refusal at most [-]."""
 
@@ -181,7 +179,7 @@ def with_both_sides(
         for j, name in enumerate(of):
             (below, low), (above, high) = (side[:, j] for side in sides)
             found[name, way.name] = float(below), float(above)
-            jumps = abs(low - high) > JUMP_RTOL * max(1.0, abs(low))
+            jumps = abs(low - high) > NOMINAL_RTOL * max(1.0, abs(low))
             if jumps or not np.isclose(below, above, rtol=1e-6, atol=1e-9):
                 shown.append(f"d({name})/d({way.name}) is {below:.6g} below and {above:.6g} above"
                              + (f", where it jumps from {low:.6g} to {high:.6g}" if jumps else ""))  # fmt: skip

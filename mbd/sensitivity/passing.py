@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.equal import INSTANT_RTOL
+from mbd.equal import INSTANT_RTOL, NOMINAL_RTOL
 from mbd.equations.equations import Guard
 from mbd.equations.switching_times import instant_slopes
 from mbd.errors import CapabilityError
@@ -38,8 +38,6 @@ FOLLOWING = ("allowed", "longest", "driven")
 CLOCK = TABLE.places["time"][1]
 DIFFERENCE_STEP = 1e-4
 """Size of an increment by which q ⊕ x is differentiated with an error of its sixth power [-]."""
-RUN_END_RTOL = 1e-6
-"""Difference of the ends of the run and of that with derivatives, over the largest coordinate or 1, that is none."""
 
 
 class AnotherRun(CapabilityError):
@@ -241,7 +239,7 @@ def _require_same(rows: RunRows, run: TangentRun) -> None:
         raise AnotherRun("the same run with derivatives has other events, by round-off")
     q = rows.record.q[-1]
     off = float(np.max(np.abs(q - run.kernel.q[: len(q)]), initial=0.0))
-    if run.stored != len(rows.record.time) or not off <= RUN_END_RTOL * max(1.0, float(np.max(np.abs(q), initial=0.0))):
+    if run.stored != len(rows.record.time) or not off <= NOMINAL_RTOL * max(1.0, float(np.max(np.abs(q), initial=0.0))):
         raise AnotherRun("the same run with derivatives ends elsewhere, by round-off")
 
 

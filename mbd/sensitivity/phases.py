@@ -15,17 +15,13 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-from mbd.equal import EQUAL_RTOL
-from mbd.kernel.contact.complementarity import LAW_RTOL
+from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, LAW_RTOL
 from mbd.sensitivity.balance import independent, saddle
 from mbd.sensitivity.motion import Mode, Motion, solved
 from mbd.sensitivity.programs import Programs
 from mbd.tape.derivatives import live
 
 __all__ = ["Choice", "Law", "OneSided", "Phase", "Unknown", "chosen", "speeds", "undecided"]
-
-DERIVATIVE_RTOL = 1e-8
-"""Derivative, relative to its terms, that moves off such an edge [-]."""
 
 
 class Unknown(Exception):
@@ -211,7 +207,7 @@ def _faults(programs: Programs, phase: Phase, mode: Mode, choice: Choice, law: L
         equations = programs.equations
         if value < -LAW_RTOL * size:
             found.append((kind, k))
-        elif abs(value) <= EQUAL_RTOL * size and np.max(np.abs(change), initial=0.0) > DERIVATIVE_RTOL * sizes:
+        elif abs(value) <= EQUAL_RTOL * size and np.max(np.abs(change), initial=0.0) > HALF_PRECISION_RTOL * sizes:
             edges.append(equations.contacts[k].name if kind == "contact" else equations.frictions[k].name)
     if edges and not found:
         raise OneSided(undecided(edges))

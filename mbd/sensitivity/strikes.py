@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import OneSidedError
 from mbd.results.record import EventRecord
 from mbd.sensitivity.impact_laws import Struck, poisson, sequential
 from mbd.sensitivity.motion import Mode, Motion
-from mbd.sensitivity.phases import DERIVATIVE_RTOL, OneSided, Unknown
+from mbd.sensitivity.phases import OneSided, Unknown
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
 
@@ -65,7 +66,7 @@ def _refuse_chance(programs: Programs, before: Motion, mode: Mode, who: Struck, 
     found = []
     for c in sorted(who.closing - {fired}):
         terms = np.abs(slopes[c]) @ np.abs(Z)
-        if not mode.closed[c] and np.any(np.abs(slopes[c] @ Z) > DERIVATIVE_RTOL * terms + 1e-12 * np.max(terms)):
+        if not mode.closed[c] and np.any(np.abs(slopes[c] @ Z) > HALF_PRECISION_RTOL * terms + 1e-12 * np.max(terms)):
             found.append(repr(contacts[c].name))
     if found:
         raise OneSided(

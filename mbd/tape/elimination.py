@@ -20,12 +20,10 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import inf
 
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.tape.node import Node, Tape
 
-__all__ = ["MIN_PIVOT_RATIO", "Factors", "Pivot", "factors"]
-
-MIN_PIVOT_RATIO = 1e-8
-"""Part of its terms that a pivot must keep: less, and half of all digits are lost [-]."""
+__all__ = ["Factors", "Pivot", "factors"]
 
 
 @dataclass(frozen=True)
@@ -102,14 +100,14 @@ def factors(
 
     None where the pivots named above do not suffice, a pivot being an exact zero, or where factors and one solution
     take more than about so many operations. `loss` is the part of its terms that a pivot
-    keeps, `MIN_PIVOT_RATIO` by default [-].
+    keeps, `HALF_PRECISION_RTOL` by default [-].
     """
     kinds = [[_kind(entry) for entry in line] for line in matrix]
     tries = (_order(kinds, coordinates, first, massless) for first in (False, True))
     found = [order for order in tries if order is not None]
     if not found or min(found)[0] > most:
         return None
-    work = _Elimination(matrix, coordinates, MIN_PIVOT_RATIO if loss is None else loss)
+    work = _Elimination(matrix, coordinates, HALF_PRECISION_RTOL if loss is None else loss)
     for row, column in min(found)[1]:
         if work.A[row][column].is_zero:
             return None

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mbd.equal import NOMINAL_RTOL
 from mbd.equations import derive
 from mbd.equations.equations import Contact, Equations
 from mbd.equations.programs import ActiveSet, accelerations, constraint_jacobian, mass_matrix, newton, residual
@@ -15,9 +16,6 @@ from mbd.testing.findings import Findings, Verdict
 from mbd.testing.numbers import Numbers, Point, at, block, derivative, inputs
 
 __all__ = ["check_model", "equation_laws"]
-
-DIFFERENCE_RTOL = 1e-6
-"""Tolerance of finite differences of sixth order with a step of 10⁻³ [-]."""
 
 
 def check_model(model: Any, *, postures: int = 2, seed: int = 0) -> Verdict:
@@ -114,11 +112,11 @@ def _effects(findings: Findings, equations: Equations, point: Point) -> None:
         force = at(list(effect.generalized()), point)[: equations.n_v]
         exact = 1e-9
         if effect.potential is not None and effect.power is not None:  # springs beside dampers
-            force, exact = force - _gradient(equations, [effect.potential], point)[0], DIFFERENCE_RTOL
+            force, exact = force - _gradient(equations, [effect.potential], point)[0], NOMINAL_RTOL
         elif effect.potential is not None:
             slope = _gradient(equations, [effect.potential], point)[0]
             hint = "the exact derivative differs from the values of the energy: a kink, or a slope that is not its own"
-            findings.equal("a force with a potential is its gradient", effect.name, force, slope, hint, DIFFERENCE_RTOL)
+            findings.equal("a force with a potential is its gradient", effect.name, force, slope, hint, NOMINAL_RTOL)
         if effect.power is not None:
             power = at([effect.power], point)[0]
             hint = "the velocities of its pairs must be the rates of the places where it acts"
@@ -150,7 +148,7 @@ def _energy(findings: Findings, equations: Equations, point: Point) -> None:
     hint = "an effect is missing from the energies, or velocities are not the rates of positions"
     size = np.abs(parts).sum() + np.abs(given).sum()
     law = "energy balance: v · (M a + f) = d(T + V)/dt − Σ P"
-    findings.equal(law, "power", work, parts.sum() - given.sum(), hint, DIFFERENCE_RTOL, size)
+    findings.equal(law, "power", work, parts.sum() - given.sum(), hint, NOMINAL_RTOL, size)
 
 
 def _rows(findings: Findings, equations: Equations, point: Point) -> None:
@@ -170,17 +168,17 @@ def _rows(findings: Findings, equations: Equations, point: Point) -> None:
     for k, row in enumerate(rows):
         title = f"row {row.title}"
         if row.is_velocity:
-            findings.equal("B = ∂ḣ/∂v of a row on velocities", title, B[k], by_rate[k], hint, DIFFERENCE_RTOL)
+            findings.equal("B = ∂ḣ/∂v of a row on velocities", title, B[k], by_rate[k], hint, NOMINAL_RTOL)
             linear = by_rate[k] @ v + rest[k]
-            findings.equal("a row on velocities is B v + b", title, found[k], linear, hint, DIFFERENCE_RTOL)
+            findings.equal("a row on velocities is B v + b", title, found[k], linear, hint, NOMINAL_RTOL)
             continue
-        findings.equal("B = ∂h/∂q", title, B[k], slopes[k], hint, DIFFERENCE_RTOL, size)
-        findings.equal("ḣ = B v + h_t", title, found[k], slopes[k] @ v + explicit[k], hint, DIFFERENCE_RTOL, size)
+        findings.equal("B = ∂h/∂q", title, B[k], slopes[k], hint, NOMINAL_RTOL, size)
+        findings.equal("ḣ = B v + h_t", title, found[k], slopes[k] @ v + explicit[k], hint, NOMINAL_RTOL, size)
     skipped = n * n + n + 2 * n * R + 2 * R
     bias = at(accelerations(equations), point)[skipped : skipped + R]
     expected = derivative(rates, point, motion)
     hint = "the second derivative of the row differs from its values: a kink in its slope"
-    findings.equal("ḧ = B a + (ḣ)˙ at a = 0", "all rows", bias, expected, hint, 10.0 * DIFFERENCE_RTOL, found)
+    findings.equal("ḧ = B a + (ḣ)˙ at a = 0", "all rows", bias, expected, hint, 10.0 * NOMINAL_RTOL, found)
 
 
 def _contact(findings: Findings, equations: Equations, contact: Contact, point: Point) -> None:
@@ -189,14 +187,14 @@ def _contact(findings: Findings, equations: Equations, contact: Contact, point: 
         motion |= {("v", k): point["a", k] for k in range(equations.n_v)}
     rate = derivative([contact.gap], point, motion)[0]
     hint = "ġ must be the derivative of g along the motion"
-    findings.equal("ġ is the rate of g", title, at([contact.gap_rate], point)[0], rate, hint, DIFFERENCE_RTOL)
+    findings.equal("ġ is the rate of g", title, at([contact.gap_rate], point)[0], rate, hint, NOMINAL_RTOL)
     if contact.force is not None:
         kind = "v" if contact.is_velocity else "x"
         force, slope = at([contact.force], point)[0], _gradient(equations, [contact.gap], point, kind)[0]
         found = at(list(contact.generalized), point)[: equations.n_v]
         hint = "the force acts along ∂g/∂q with equal and opposite parts on both sides"
         law = "a penalty force acts along the gradient of its gap"
-        findings.equal(law, title, found, -force * slope, hint, DIFFERENCE_RTOL, force)
+        findings.equal(law, title, found, -force * slope, hint, NOMINAL_RTOL, force)
 
 
 def _tangent(findings: Findings, equations: Equations, point: Point) -> None:
@@ -221,14 +219,12 @@ def _tangent(findings: Findings, equations: Equations, point: Point) -> None:
         for j in range(n):
             free = {("a", j): 1.0, ("v", j): c_C, ("x", j): c_K}
             change = derivative(out, point, free if j < n_v else {("s", j - n_v): 1.0, ("z", j - n_v): c_C})
-            findings.equal(law, f"column {j} of S", K[:n, j], change[:n], hint, 10.0 * DIFFERENCE_RTOL, scale)
+            findings.equal(law, f"column {j} of S", K[:n, j], change[:n], hint, 10.0 * NOMINAL_RTOL, scale)
             bottom = change[n + m :] if stabilized else change[n : n + m]
-            findings.equal(
-                law, f"column {j} of the rows", factor * K[n:, j], bottom, hint, 10.0 * DIFFERENCE_RTOL, scale
-            )
+            findings.equal(law, f"column {j} of the rows", factor * K[n:, j], bottom, hint, 10.0 * NOMINAL_RTOL, scale)
         for k in range(m):
             change = derivative(out, point, {("lam", k): 1.0})
-            findings.equal(law, f"column of λ {k}", K[:n, n + k], change[:n], hint, DIFFERENCE_RTOL, scale)
+            findings.equal(law, f"column of λ {k}", K[:n, n + k], change[:n], hint, NOMINAL_RTOL, scale)
         if not m:
             return
 
@@ -238,4 +234,4 @@ def _turning(findings: Findings, law: str, turning: Numbers, out: Sequence[Node]
     m, n_v = turning.shape
     for j in range(n_v if m else 0):
         change = derivative(out, point, {("x", j): 1.0})[-m:]
-        findings.equal(law, f"∂ḣ/∂x in column {j}", turning[:, j], change, hint, 10.0 * DIFFERENCE_RTOL, change)
+        findings.equal(law, f"∂ḣ/∂x in column {j}", turning[:, j], change, hint, 10.0 * NOMINAL_RTOL, change)

@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from mbd.equal import HALF_PRECISION_RTOL, NOMINAL_RTOL
 from mbd.equations.equations import Contact, Equations, Friction
 from mbd.results.ledger import SPENT
 from mbd.testing.findings import Findings
 
 __all__ = ["run_laws"]
 
-MULTIPLIER_RTOL = 1e-8
-FRICTION_RTOL = 1e-6
-"""What the multipliers of a step may miss of the law of friction, relative to the largest of that instant."""
 LEDGER_RTOL = 1e-2
 """Largest share of the energy's swing that the books may miss at the step of a check; a missing work is of size 1."""
 
@@ -48,28 +46,28 @@ def _complementarity(findings: Findings, run: Any, contact: Contact, closed: Any
     size = 1.0 + float(np.max(np.abs(force), initial=0.0))
     if contact.kind == "penalty":
         if contact.opens_on == "pull":
-            row = _instant(findings, where, run, force < -MULTIPLIER_RTOL * size)
+            row = _instant(findings, where, run, force < -HALF_PRECISION_RTOL * size)
             sentence = f"{title} pulls: expected p ≥ 0, found {force[row]:.6g} N at a gap of {gap[row]:.3g}"
             hint = "a stop pushes; with release='pull' it must open as its force falls to zero"
-            findings.holds("a penalty pushes", bool(np.all(force >= -MULTIPLIER_RTOL * size)), sentence, hint)
+            findings.holds("a penalty pushes", bool(np.all(force >= -HALF_PRECISION_RTOL * size)), sentence, hint)
         return
     if contact.only_while is None and not contact.when:
-        row = _instant(findings, where, run, gap < -MULTIPLIER_RTOL)
+        row = _instant(findings, where, run, gap < -HALF_PRECISION_RTOL)
         sentence = f"{title} is penetrated: expected g ≥ 0, found {gap[row]:.6g} {contact.unit}"
         hint = "gap() must be continuous and fall through zero as the contact closes"
-        findings.holds("complementarity: gap ≥ 0", bool(np.all(gap >= -MULTIPLIER_RTOL)), sentence, hint)
+        findings.holds("complementarity: gap ≥ 0", bool(np.all(gap >= -HALF_PRECISION_RTOL)), sentence, hint)
     if contact.opens_on == "pull":
-        row = _instant(findings, where, run, force < -MULTIPLIER_RTOL * size)
+        row = _instant(findings, where, run, force < -HALF_PRECISION_RTOL * size)
         sentence = f"{title} pulls: expected p ≥ 0, found {force[row]:.6g}"
         hint = "a contact that would attract must open"
-        findings.holds("complementarity: force ≥ 0", bool(np.all(force >= -MULTIPLIER_RTOL * size)), sentence, hint)
-    wrong = (np.abs(gap) > MULTIPLIER_RTOL) & (np.abs(force) > MULTIPLIER_RTOL * size)
+        findings.holds("complementarity: force ≥ 0", bool(np.all(force >= -HALF_PRECISION_RTOL * size)), sentence, hint)
+    wrong = (np.abs(gap) > HALF_PRECISION_RTOL) & (np.abs(force) > HALF_PRECISION_RTOL * size)
     row = _instant(findings, where, run, wrong)
     sentence = f"{title}: gap {gap[row]:.3g} and force {force[row]:.3g} at once"
     findings.holds("complementarity: gap × force = 0", not wrong.any(), sentence, "only a closed contact pushes")
-    row = _instant(findings, where, run, closed & (np.abs(gap) > MULTIPLIER_RTOL))
+    row = _instant(findings, where, run, closed & (np.abs(gap) > HALF_PRECISION_RTOL))
     sentence = f"{title} is closed with a gap of {gap[row]:.6g} {contact.unit}"
-    stays = bool(np.all(np.abs(gap[closed]) <= MULTIPLIER_RTOL))
+    stays = bool(np.all(np.abs(gap[closed]) <= HALF_PRECISION_RTOL))
     findings.holds("a closed contact stays closed", stays, sentence, "the rows must hold the gap at zero")
 
 
@@ -82,12 +80,12 @@ def _friction(findings: Findings, run: Any, friction: Friction, where: str) -> N
     on = record.closed[:, friction.contact].astype(bool) if friction.contact >= 0 else np.ones(len(along), dtype=bool)
     size = 1.0 + np.max(np.abs(record.lam), axis=1, initial=0.0)
     limit = np.where(on, limit, 0.0)
-    wrong = np.abs(along) > limit + FRICTION_RTOL * size
+    wrong = np.abs(along) > limit + NOMINAL_RTOL * size
     row = _instant(findings, where, run, wrong)
     sentence = f"'{friction.name}' resists with {along[row]:.6g} of at most {limit[row]:.6g}"
     hint = "the friction of a contact is at most μ times its force, and none where it is open"
     findings.holds("friction stays within its limit", not wrong.any(), sentence, hint)
-    wrong = along * rate < -FRICTION_RTOL * size
+    wrong = along * rate < -NOMINAL_RTOL * size
     row = _instant(findings, where, run, wrong)
     sentence = f"'{friction.name}' drives with {-along[row] * rate[row]:.6g} W at a speed of {rate[row]:.6g}"
     findings.holds(
@@ -103,10 +101,10 @@ def _impacts(findings: Findings, run: Any, contact: Contact, where: str) -> None
         push = float(event.impulse[0])
         sentence = f"'{contact.name}' takes an impulse of {push:.6g}; expected ≥ 0"
         findings.holds(
-            "impact: impulses push", push >= -MULTIPLIER_RTOL, sentence, "the gap grows away from the surface"
+            "impact: impulses push", push >= -HALF_PRECISION_RTOL, sentence, "the gap grows away from the surface"
         )
         sentence = f"'{contact.name}' gives {-event.energy_loss:.6g} J in an impact; expected ≤ 0"
-        slack = -MULTIPLIER_RTOL * (1.0 + abs(event.energy_loss))
+        slack = -HALF_PRECISION_RTOL * (1.0 + abs(event.energy_loss))
         hint = "restitution lies between 0 and 1"
         findings.holds("impact: no energy is made", event.energy_loss >= slack, sentence, hint)
 

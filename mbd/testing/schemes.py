@@ -14,6 +14,7 @@ from mbd.arrays import Matrix
 from mbd.bodies.scope import Scope
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL, ROUND_OFF_RTOL
 from mbd.errors import CapabilityError, MbdError, ModelError
 from mbd.forces.base import Action, Force
 from mbd.integrators.base import Integrator
@@ -27,8 +28,6 @@ __all__ = ["check_scheme"]
 
 WITHIN, HIGH = 0.15, 0.75
 """How near the observed order must come to the promised one, and so above 5, where few halvings reach round-off."""
-ERROR_FLOOR = 1e-12
-"""Errors below are round-off, of the scheme or of the reference."""
 RUN_LENGTH = 0.6
 """Length of the runs [s]."""
 STEPS = {1: 0.01, 2: 0.01, 4: 0.04, 5: 0.06}
@@ -36,8 +35,6 @@ STEPS = {1: 0.01, 2: 0.01, 4: 0.04, 5: 0.06}
 LARGE_STEP = 0.2
 PYTHON_STEP = 0.05
 """Step of the runs in Python [s]."""
-TWIN_ATOL = 1e-6
-"""What Newton's iterations in Python and in machine code may leave in steps of that size."""
 TOLERANCES = (1e-3, 1e-5)
 MAX_ERROR_OVER_TOL = 2.0
 """Factor by which the error of a run may exceed the tolerance that it was given."""
@@ -206,8 +203,8 @@ def _orders(findings: Findings, scheme: Integrator, scene: Scene, dt: float, hal
     within = HIGH if promised > 5 else WITHIN
     for k in range(halvings + 1 + MORE_HALVINGS):
         errors.append(_errors(findings, scene.run(scheme, dt=dt / 2**k), exact, 2**k))
-        order = observed_order([each[0] for each in errors], ERROR_FLOOR)
-        if k >= halvings and not (abs(order - promised) > within and errors[-1][0] > 1e3 * ERROR_FLOOR):
+        order = observed_order([each[0] for each in errors], ROUND_OFF_RTOL)
+        if k >= halvings and not (abs(order - promised) > within and errors[-1][0] > 1e3 * ROUND_OFF_RTOL):
             break
     hint = "order() must tell what the scheme reaches; check its start, its formula and Newton's tolerance"
     for place, what, least, most in (
@@ -216,11 +213,11 @@ def _orders(findings: Findings, scheme: Integrator, scene: Scene, dt: float, hal
         (2, "order of the instants of events", promised - MAX_ERROR_BETWEEN_ROWS, np.inf),
     ):
         law, found = f"{what}: within {MAX_ERROR_BETWEEN_ROWS if place else within}", [each[place] for each in errors]
-        order = observed_order(found, ERROR_FLOOR if place == 0 else 10.0 * ERROR_FLOOR)
+        order = observed_order(found, ROUND_OFF_RTOL if place == 0 else 10.0 * ROUND_OFF_RTOL)
         if place == 2 and not scene.events:
             continue
         if np.isnan(order):
-            findings.note(f"{law}, on {scene.title}: every error is below {ERROR_FLOOR:g}; give a larger dt")
+            findings.note(f"{law}, on {scene.title}: every error is below {ROUND_OFF_RTOL:g}; give a larger dt")
             continue
         shown = ", ".join(f"{error:.3g}" for error in found)
         sentence = f"promised {promised}, observed {order:.2f}; errors at dt = {dt:g}, dt/2, …: {shown}"
@@ -317,7 +314,7 @@ def _compiled(findings: Findings, scheme: Integrator, scene: Scene, plain: Any) 
     law, hint = "machine code and Python agree", "its step in Python and its entry are one scheme; see backend='python'"
     for name in ("time", "q", "v", "z"):
         found, expected = getattr(fast.record, name), getattr(plain.record, name)
-        findings.equal(law, f"'{name}' of all rows", found, expected, hint, TWIN_ATOL)
+        findings.equal(law, f"'{name}' of all rows", found, expected, hint, NOMINAL_RTOL)
 
 
 def _tolerance(findings: Findings, scheme: Integrator, scene: Scene) -> None:

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 
 __all__ = ["Form", "Mesh", "equal_inertia", "mesh"]
 
-MOMENT_RTOL = 1e-6
-"""Moments that differ less, over the largest, are equal [-]."""
 
 MIN_HALF_SIZE = 0.03
 """Least half size, over the largest [-]: a disk or a rod is drawn with some thickness."""
@@ -54,7 +53,7 @@ def equal_inertia(mass: float, moments: Sequence[float], kind: str = "") -> Form
     if np.linalg.det(axes) < 0.0:
         axes = -axes
     apart = [abs(principal[(k + 1) % 3] - principal[(k + 2) % 3]) for k in range(3)]
-    equal = [gap < MOMENT_RTOL * largest for gap in apart]
+    equal = [gap < NOMINAL_RTOL * largest for gap in apart]
     if kind == "ball":
         return Form("ball", np.full(3, np.sqrt(2.5 * float(np.mean(principal)) / mass)), axes)
     if kind == "cylinder" or (kind == "" and any(equal) and not all(equal)):

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 from mbd.results.facts import ROUND
 from mbd.results.names import AXES
 from mbd.view.instants import Instants
 from mbd.view.pushes import Push, pushes
-from mbd.view.scenery import PLANE_ATOL, Ground, Scenery, plane_of_motion, scenery
+from mbd.view.scenery import Ground, Scenery, plane_of_motion, scenery
 from mbd.view.seen_once import once, solid_ones
 from mbd.view.solids import Hinge, Solid, Stop, hinges, limbs, solids, stops
 
@@ -162,12 +163,14 @@ def _grounds(
         for point in np.moveaxis(positions, 1, 0):
             plane = plane_of_motion(point, gap)
             if plane is not None:
-                if not any(np.allclose(plane[0], n) and abs(plane[1] - d) < PLANE_ATOL for n, d in planes):
+                if not any(np.allclose(plane[0], n) and abs(plane[1] - d) < NOMINAL_RTOL for n, d in planes):
                     planes.append(plane)
                 break
     turn = upright(run)
     return [
         (normal, offset)
         for normal, offset in planes
-        if not any(np.allclose(turn @ normal, g.normal) and abs(offset - g.offset) < PLANE_ATOL for g in around.grounds)
+        if not any(
+            np.allclose(turn @ normal, g.normal) and abs(offset - g.offset) < NOMINAL_RTOL for g in around.grounds
+        )
     ]

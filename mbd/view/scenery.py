@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.constraints.surfaces import Plane
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 from mbd.equations.shapes import HEIGHT, PLACE, Shape, drawn
 from mbd.results.facts import ROUND
 from mbd.results.names import AXES
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Ball", "Blade", "Deck", "Ground", "Sheet", "Scenery", "Wheel", "plane_of_motion", "scenery"]
 
-PLANE_ATOL = 1e-6
-"""A plane whose distance reproduces a gap this well is the ground of that contact [m]."""
 
 FINE, MOST, MOST_MOVING = 100, 4000, 400
 """Points of a curve over the size of the mechanism, and on a whole curve, at rest and moving."""
@@ -219,17 +218,17 @@ def _heights(run: Trajectory, shape: Shape, places: NDArray[np.float64], times: 
 
 def plane_of_motion(p: Matrix, gap: Vector) -> tuple[Vector, float] | None:
     """normal, offset with ``normal · p − offset = gap`` and a unit normal; None if the motion shows no such plane."""
-    if np.max(np.abs(p[:, 1] - gap)) < PLANE_ATOL:
+    if np.max(np.abs(p[:, 1] - gap)) < NOMINAL_RTOL:
         return np.array([0.0, 1.0, 0.0]), 0.0
-    moving = np.ptp(p, axis=0) > PLANE_ATOL
+    moving = np.ptp(p, axis=0) > NOMINAL_RTOL
     if moving.sum() < 2:
         return None
     unknowns = np.column_stack([p[:, moving], -np.ones(len(p))])
     solution, _, rank, _ = np.linalg.lstsq(unknowns, gap, rcond=1e-9)
-    if rank < unknowns.shape[1] or np.max(np.abs(unknowns @ solution - gap)) > PLANE_ATOL:
+    if rank < unknowns.shape[1] or np.max(np.abs(unknowns @ solution - gap)) > NOMINAL_RTOL:
         return None
     normal = np.zeros(3)
     normal[moving] = solution[:-1]
-    if abs(float(np.linalg.norm(normal)) - 1.0) > PLANE_ATOL:
+    if abs(float(np.linalg.norm(normal)) - 1.0) > NOMINAL_RTOL:
         return None
     return normal, float(solution[-1])

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Matrix
+from mbd.equal import NOMINAL_RTOL
 from mbd.view.scenery import Ball, Scenery, Wheel
 from mbd.view.solids import Solid, rotations
 
@@ -18,8 +19,6 @@ MIN_DENSITY = 1.2
 
 RADIUS_RTOL = 0.02
 """Radii that differ less, over the radius, are one [-]."""
-CENTER_RTOL = 1e-6
-"""Centers that are nearer, over the radius, are one [-]."""
 
 
 def once(around: Scenery, solids: tuple[Solid, ...]) -> tuple[Scenery, tuple[Solid, ...]]:
@@ -45,7 +44,7 @@ def _body_of(ball: Ball, solids: Iterable[Solid]) -> Solid | None:
     for solid in solids:
         if solid.form.kind == "ball" and ball.name.startswith(f"{solid.name}.") and not np.any(ball.radius != radius):
             away = float(np.max(np.linalg.norm(solid.center - ball.center, axis=1)))
-            if away <= CENTER_RTOL * radius and abs(float(solid.form.half[0]) - radius) < RADIUS_RTOL * radius:
+            if away <= NOMINAL_RTOL * radius and abs(float(solid.form.half[0]) - radius) < RADIUS_RTOL * radius:
                 return solid
             if away < radius:
                 return replace(solid, center=ball.center, form=replace(solid.form, half=np.full(3, radius)))
@@ -74,7 +73,7 @@ def _shown(wheel: Wheel, solids: Iterable[Solid], hidden: set[str]) -> bool:
         own = wheel.name.startswith(f"{solid.name}.")
         if not own or solid.form.kind != "cylinder" or not _along(wheel, solid):
             continue
-        if float(np.max(np.abs(solid.center - wheel.center))) > CENTER_RTOL * radius:
+        if float(np.max(np.abs(solid.center - wheel.center))) > NOMINAL_RTOL * radius:
             continue
         if abs(float(solid.form.half[0]) - radius) < RADIUS_RTOL * radius:
             return True

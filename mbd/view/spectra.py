@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.equal import EQUAL_RTOL
 from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, NEUTRAL, tone
 
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["spectra"]
 
-MIN_DRAWN = 1e-9
-"""Damping ratios and elongations below this are not drawn [-]."""
 HALF = float(np.pi)
 """ω dt of two steps a period, beyond which there is no period to speak of [rad]."""
 LONG = re.compile(r"\d+\.\d{5,}")
@@ -68,7 +67,7 @@ def _scale(found: Sequence[Criteria], upper: Any, middle: Any, lower: Any) -> No
 
 def _above(values: Any) -> Any:
     """The values that a logarithmic axis can show."""
-    return np.where(values > MIN_DRAWN, values, np.nan)
+    return np.where(values > EQUAL_RTOL, values, np.nan)
 
 
 def _label(each: Criteria) -> str:

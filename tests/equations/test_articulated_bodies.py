@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
+from mbd.equal import DIRECT_PIVOT_RTOL
 from tests.equations.mechanisms import random_tree
 from tests.equations.test_states import model as pulled
 from tests.space_scenes import JOINTS, scene

@@ -10,10 +10,9 @@ import mbd
 from mbd.compile import orders
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.orders import flat_order
+from mbd.equal import DIRECT_PIVOT_RTOL, HALF_PRECISION_RTOL
 from mbd.equations.programs import ActiveSet
 from mbd.kernel.algebra.ordered import (
-    DIRECT_PIVOT_RTOL,
-    NEWTON_PIVOT_RTOL,
     OF_ACCELERATIONS,
     OF_TANGENT,
     SYMMETRIC,
@@ -21,7 +20,7 @@ from mbd.kernel.algebra.ordered import (
     order_at,
     solve_kkt,
     weakest_pivot,
-)  # fmt: skip
+)
 from mbd.kernel.records import Kernel
 from mbd.tape.ordering import Order, order
 from tests.simulation.singular_linkages import four_bars
@@ -106,7 +105,7 @@ def test_symmetric_saddles_of_definite_masses_need_no_search(n, m, seed):
     M, _, B = saddle(rng, n, min(m, n // 2))
     A = matrix(M, B.T, B)
     K = kernel(A, n, len(B))
-    assert factor_ordered(K, A.ravel(), 1, OF_TANGENT, NEWTON_PIVOT_RTOL)
+    assert factor_ordered(K, A.ravel(), 1, OF_TANGENT, HALF_PRECISION_RTOL)
     assert_solves(K, A, rng)
 
 
@@ -117,7 +116,7 @@ def test_rows_that_nearly_depend_on_each_other_are_not_sound(n, seed, apart):
     B[2] = B[0] - B[1] + apart * rng.normal(size=n) * (B[0] != 0.0)
     A = matrix(M, B.T, B)
     K = kernel(A, n, 3)
-    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, NEWTON_PIVOT_RTOL)
+    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, HALF_PRECISION_RTOL)
     assert K.order_start == 0
 
 
@@ -128,7 +127,7 @@ def test_a_pivot_that_is_no_number_or_nothing_is_not_sound(wrong):
     K = kernel(A, 6, 2)
     A[3, 3] = wrong
     A[3, :3] = A[:3, 3] = 0.0
-    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, NEWTON_PIVOT_RTOL)
+    assert not factor_ordered(K, A.ravel(), 1, OF_TANGENT, HALF_PRECISION_RTOL)
 
 
 def test_an_order_is_for_its_own_rows_only():

@@ -79,7 +79,7 @@ def test_explicit_steps_with_rows_are_those_with_a_search_for_pivots(motion, how
     straight = motion(scheme)
     assert straight.stats["compiled"]
     assert any(code.rates is not None for code in modes_of(straight))
-    name, value = {"too many unknowns": ("MAX_UNKNOWNS", 0), "no pivot large enough": ("MIN_PIVOT_SHARE", 1e300)}[how]
+    name, value = {"too many unknowns": ("MAX_UNKNOWNS", 0), "no pivot large enough": ("DIRECT_PIVOT_RTOL", 1e300)}[how]
     monkeypatch.setattr(explicit_solution, name, value)
     searched = motion(scheme)
     assert all(code.rates is None for code in modes_of(searched)) == (how == "too many unknowns")
@@ -134,7 +134,7 @@ def test_straight_line_code_solves_the_equations_of_accelerations_and_rows(seed,
 def test_where_no_pivot_is_large_enough_pivots_are_searched_for(form, monkeypatch):
     scheme = mbd.GeneralizedAlpha(0.8, formulation=form)
     straight = walk(scheme)
-    monkeypatch.setattr(elimination, "MIN_PIVOT_RATIO", 1e300)
+    monkeypatch.setattr(elimination, "HALF_PRECISION_RTOL", 1e300)
     searched = walk(scheme)
     assert searched.stats["pivoted"] == searched.stats["factorizations"] > 0
     assert_same(straight, searched)
@@ -226,7 +226,7 @@ def test_what_is_raised_while_code_is_made_comes_out_of_the_step(monkeypatch):
             raise RuntimeError("no room for code")
         return made(self, kind, mode, names, make)
 
-    monkeypatch.setattr(elimination, "MIN_PIVOT_RATIO", 1e300)
+    monkeypatch.setattr(elimination, "HALF_PRECISION_RTOL", 1e300)
     monkeypatch.setattr(Mechanism, "_add", fails)
     walker = kneed_walker()
     with pytest.raises(RuntimeError, match="no room"):

@@ -22,6 +22,7 @@ from scipy.integrate import DOP853, Radau
 
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
+from mbd.equal import SMALL_SUM_RTOL
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State
@@ -36,8 +37,6 @@ MOST_STRIDES = {"DOP853": 400, "Radau": 4000}
 """Strides within one step after which the method gives up: the scene is too stiff for it."""
 MAX_CACHED_INTERVALS = 1000
 """Dense outputs of a course that are kept; only the last few are needed."""
-ROW_RTOL = 1e-14
-"""|h| and |ḣ|, relative to the size of the state, that need no correction."""
 
 
 class Balance:
@@ -86,7 +85,7 @@ class Balance:
             matrix, _, (h, rate, _), H = self._evaluate(t, q, y)
             h = np.where(self.held, h, 0.0)
             size = 1.0 + max(np.max(np.abs(q)), np.max(np.abs(y)))
-            if max(np.max(np.abs(h)), np.max(np.abs(rate))) <= ROW_RTOL * size:
+            if max(np.max(np.abs(h)), np.max(np.abs(rate))) <= SMALL_SUM_RTOL * size:
                 break
             right = np.zeros((n + len(h), 2))
             right[n:, 0], right[n:, 1] = -h, -rate

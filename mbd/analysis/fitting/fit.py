@@ -15,6 +15,7 @@ from mbd.assembly.changed_start import changed_start, start_names
 from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.later import later
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Fit", "bounds", "fit"]
 
-RANK_RTOL = 1e-8
-"""Singular value of the scaled derivatives, over the largest, below which the data cannot tell directions apart [-]."""
 MAX_STEPS_OF_SPAN = 20
 """Steps of a search over a part of the time: parameters that it does not tell of would wander on [-]."""
 SPANS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)
@@ -375,7 +374,7 @@ class _Search:
         scaled = found.jac / np.where(sizes > 0.0, sizes, 1.0)
         _, strengths, directions = np.linalg.svd(scaled)
         strengths = np.pad(strengths, (0, len(directions) - len(strengths)))
-        weak = strengths <= RANK_RTOL * max(strengths[0], 1e-300)
+        weak = strengths <= HALF_PRECISION_RTOL * max(strengths[0], 1e-300)
         groups, unknown = [], np.zeros(len(found.x), dtype=bool)
         for line in directions[weak]:
             members = np.abs(line) > 0.1

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 from mbd.errors import TrajectoryError
 
 if TYPE_CHECKING:
@@ -34,9 +35,6 @@ Interval = tuple[float, float]
 
 SINGLE_SIDE = "all"
 """The side of a machine whose names have no words of sides: every foot and every joint is of it."""
-
-MIN_LOAD_RATIO = 1e-6
-"""Share of its largest force below which a foot of a force law has just struck [-]."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +214,7 @@ def _pushes_at_start(run: Trajectory, contacts: Sequence[str]) -> bool:
     """Whether a foot of a force law pushes in the first row, so that it has struck before."""
     own = [each.name for each in run.facts.contacts if each.name in contacts and each.kind == "penalty"]
     forces = [run[f"{name}.force"] for name in own]
-    return any(force[0] > MIN_LOAD_RATIO * np.max(force) for force in forces)
+    return any(force[0] > NOMINAL_RTOL * np.max(force) for force in forces)
 
 
 def strides_between(

@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.python import array_function
-from mbd.equal import EQUAL_RTOL
+from mbd.equal import EQUAL_RTOL, SMALL_SUM_RTOL
 from mbd.gait.section import Section
 from mbd.tape.derivatives import gradient
 from mbd.tape.node import Node
 
 __all__ = ["OntoSection"]
 
-RESIDUAL_ATOL = 1e-14
-"""Residual below which nothing is corrected, so that states on the section stay as they are, to the bit [m, rad]."""
 REGULARIZATION = 1e-13
 """Share of the trace of G Gᵀ that is added to its diagonal, lest rows that depend on others divide by zero [-]."""
 
@@ -66,7 +64,7 @@ class OntoSection:
             for _ in range(20):  # of positions, at most
                 h, G = self._rows(self._positions, self._held[0], inputs, parameters)
                 off = np.max(np.abs(h), axis=1)
-                moving = (off > RESIDUAL_ATOL) & np.isfinite(off)
+                moving = (off > SMALL_SUM_RTOL) & np.isfinite(off)
                 if not moving.any() or not len(self.free_places):
                     break
                 step = _shortest(G[moving][:, :, self.free_places], h[moving])
@@ -76,7 +74,7 @@ class OntoSection:
                     move = np.zeros((len(step), self.n_v))
                     move[:, self.free_places] = -step
                     q[moving] = self.configuration.compose(q[moving], move)
-                if np.max(np.abs(step)) < RESIDUAL_ATOL:
+                if np.max(np.abs(step)) < SMALL_SUM_RTOL:
                     break
             h, _ = self._rows(self._positions, self._held[0], inputs, parameters)
             good &= np.max(np.abs(h), axis=1) <= EQUAL_RTOL
@@ -85,7 +83,7 @@ class OntoSection:
         if self._held[1]:
             h, B = self._rows(self._velocities, self._held[1], inputs, parameters)
             fast = np.maximum(1.0, np.max(np.abs(v), axis=1, initial=0.0))
-            moving = (np.max(np.abs(h), axis=1) > RESIDUAL_ATOL * fast) & np.isfinite(h).all(axis=1)
+            moving = (np.max(np.abs(h), axis=1) > SMALL_SUM_RTOL * fast) & np.isfinite(h).all(axis=1)
             if len(self.free_rates) and moving.any():
                 v[np.ix_(moving, self.free_rates)] -= _shortest(B[moving][:, :, self.free_rates], h[moving])
                 h, _ = self._rows(self._velocities, self._held[1], inputs, parameters)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mbd.bodies.scope import Scope
+from mbd.equal import MIN_SQUARED_SPEED
 from mbd.joints.losses.base import Loss, LossSum
 from mbd.joints.losses.viscous import Viscous
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["MIN_SQUARED_SPEED", "isotropic"]
-
-MIN_SQUARED_SPEED = 1e-60
-"""Square of a speed that is none, beside which a direction is defined [m²/s², rad²/s²]."""
+__all__ = ["isotropic"]
 
 
 def isotropic(loss: Loss, velocity: Sequence[Scalar], scope: Scope, owner: str) -> list[Scalar]:

@@ -5,6 +5,7 @@ Hand-written because it runs inside the compiled kernel, where below about 28 un
 
 from __future__ import annotations
 
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
 from mbd.kernel.tangent_rules import takes_part
@@ -12,9 +13,6 @@ from mbd.kernel.tangent_rules import takes_part
 __all__ = [
     "eliminate", "factor", "largest_entry", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes",
 ]  # fmt: skip
-
-PIVOT_RTOL = 1e-12
-"""Part of the entries that a pivot came from which is more than round-off in any size of matrix [-]."""
 
 
 def factor(A: Reals, n: int, pivots: Integers) -> int:
@@ -90,7 +88,7 @@ def solve(A: Reals, n: int, pivots: Integers, b: Reals) -> None:
 
 def round_off(n: int) -> float:
     """What elimination of n unknowns may leave of a pivot that is zero, of the entries that it came from."""
-    return min(PIVOT_RTOL, 8.0 * EPS * (n + 8.0))
+    return min(ROUND_OFF_RTOL, 8.0 * EPS * (n + 8.0))
 
 
 def solve_definite(M: Reals, n: int, b: Reals, work: Reals) -> float:

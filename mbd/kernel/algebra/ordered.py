@@ -20,10 +20,6 @@ __all__ = [
 
 OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)
 """Where values come from: the matrix of a step, row-major; the program `accelerations`; that with Bᵀ in place of R."""
-NEWTON_PIVOT_RTOL = 1e-8
-"""Part of its terms that a pivot must keep where Newton's method goes on with what is left [-]."""
-DIRECT_PIVOT_RTOL = 1e-4
-"""The same where a solution is taken as it is: at most four digits of sixteen are lost [-]."""
 
 
 def order_at(K: Motion, m: int) -> int:

@@ -7,6 +7,7 @@ Where one does, its force depends on how a load is shared (other μ, other drag)
 
 from __future__ import annotations
 
+from mbd.equal import RANK_RTOL
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.orthogonal import clear_row, square
@@ -16,8 +17,6 @@ from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["find_dependent", "find_dependence", "find_shares", "shared", "sharing", "spread", "take_shares"]
 
-RANK_RTOL = 1e-9
-"""What is left of a row beside the earlier ones, relative, below which it depends on them [-]."""
 
 SHORT_ROW_RATIO = 1e-2
 """Length of a row over that of the longest of its unit below which it comes after the others [-].

@@ -8,16 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from mbd.equal import DIRECT_PIVOT_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.islands import find_islands, gather_island, saddle_entry
-from mbd.kernel.algebra.linear import PIVOT_RTOL, eliminate, factor, round_off, sum_of_sizes
-from mbd.kernel.algebra.ordered import (
-    DIRECT_PIVOT_RTOL,
-    OF_ACCELERATIONS,
-    SYMMETRIC,
-    factor_ordered,
-    order_at,
-    solve_ordered,
-)
+from mbd.kernel.algebra.linear import eliminate, factor, round_off, sum_of_sizes
+from mbd.kernel.algebra.ordered import OF_ACCELERATIONS, SYMMETRIC, factor_ordered, order_at, solve_ordered
 from mbd.kernel.algebra.redundancy import find_dependent, find_shares, sharing, spread, take_shares
 from mbd.kernel.codes import CONFLICT, DEPENDENT, EPS, NOT_FINITE
 from mbd.kernel.records import Balance, DependentRows, Equations
@@ -63,7 +57,7 @@ def correct_positions(K: Balance, m: int) -> int:
 def solve_change(K: Balance, y: Any, m: int, dropping: bool, what: int) -> int:
     """The same, contradictions measured by what changes: the velocities y, positions, or the rows' own terms."""
     size = K.n + m
-    rank = solve_matrix(K, m, not dropping and sharing(K), PIVOT_RTOL)
+    rank = solve_matrix(K, m, not dropping and sharing(K), ROUND_OFF_RTOL)
     if rank == -CONFLICT and dropping:
         return solve_kept(K, y, m, what)
     if rank == -CONFLICT and K.failure_index < K.n:  # forces push along a motion of little inertia
@@ -104,7 +98,7 @@ def solve_kept(K: Balance, y: Any, m: int, what: int) -> int:
     kept = dependent_last(K, m)
     little = blocked < K.n
     if (kept < m or little) and not sharing(K):
-        rank = solve_matrix(K, kept, False, round_off(K.n + kept) if little else PIVOT_RTOL)
+        rank = solve_matrix(K, kept, False, round_off(K.n + kept) if little else ROUND_OFF_RTOL)
         if rank == K.n + kept and (kept == m or not contradicts(K, y, m, what)):
             spread(K, K.impulse)
             return 0
@@ -140,7 +134,7 @@ def solve_to_round_off(K: Balance, m: int, dropping: bool) -> int:
 
 def solve_shared(K: Balance, m: int) -> int:
     """w and λ with the shares of dependent rows in K.shares, for the m independent rows that come first in K.rows."""
-    rank = solve_matrix(K, m, True, PIVOT_RTOL)
+    rank = solve_matrix(K, m, True, ROUND_OFF_RTOL)
     if rank < 0:
         return -rank
     if rank < K.n + m:

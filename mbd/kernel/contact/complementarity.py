@@ -18,6 +18,7 @@ Non-smooth steps with friction in space begin with the cones.
 
 from __future__ import annotations
 
+from mbd.equal import LAW_RTOL, NOMINAL_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CONFLICT, NO_IMPACT
 from mbd.kernel.contact.branches import is_on, solve_directed
@@ -28,16 +29,12 @@ from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, DependentRows, Motion
 from mbd.kernel.stepping.restart import active_rows, refresh_scales
 
-__all__ = ["LAW_RTOL", "complementarity"]
+__all__ = ["complementarity"]
 
 MAX_NEWTON = 12
 """Changes of all branches at once before and after the solution over cones [-]."""
 MAX_CONE_MISFIT = 0.1
 """Part of the largest impulse that cones may miss laws by for their branches to be tried [-]."""
-LAW_RTOL = 1e-11
-"""What multipliers and velocities or accelerations may miss of their laws, relative to their terms [-]."""
-SLIDING_LAW_RTOL = 1e-6
-"""The same for a friction that an event has found to slide: its acceleration is still round-off [-]."""
 
 
 def complementarity(K: Balance, level: int) -> int:
@@ -172,7 +169,7 @@ def friction_fault(K: ContactForces, f: int, largest: float) -> float:
     if K.sticks[f] == 1:
         return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - LAW_RTOL * largest)
     return departure(
-        K, row, K.slip[f], SLIDING_LAW_RTOL if K.loose[f] == 2 else LAW_RTOL
+        K, row, K.slip[f], NOMINAL_RTOL if K.loose[f] == 2 else LAW_RTOL
     )  # it slides against its own friction
 
 
@@ -186,7 +183,7 @@ def group_fault(K: ContactForces, f: int, largest: float) -> float:
             pull = K.impulse[K.friction_row[g]] + K.past[K.friction_row[g]]
             square += pull * pull
         return float(sqrt(square) - K.limit[f] - LAW_RTOL * largest)
-    return misses(K, f, SLIDING_LAW_RTOL if K.loose[f] == 2 else LAW_RTOL)
+    return misses(K, f, NOMINAL_RTOL if K.loose[f] == 2 else LAW_RTOL)
 
 
 def give_way(K: DependentRows) -> int:

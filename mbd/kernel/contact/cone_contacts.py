@@ -11,6 +11,7 @@ smooth part included, so that what was closed may push less than it did there, b
 
 from __future__ import annotations
 
+from mbd.equal import REST_SPEED
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.redundancy import find_dependence, shared, sharing
 from mbd.kernel.algebra.saddle import solve_at
@@ -28,9 +29,6 @@ from mbd.kernel.stepping.restart import (
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["all_hold", "keep_branches", "solve_cones"]
-
-REST_RTOL = 1e-9
-"""Velocity, as the impulse that would stop it over the largest impulse, below which nothing slides or parts [-]."""
 
 
 def solve_cones(K: Balance, level: int, allowed: float) -> int:
@@ -257,7 +255,7 @@ def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
     for c in range(K.n_contacts):
         u = K.cone_normal[c]
         if u >= 0:
-            parts = K.cone_owner[u] == PUSH and K.cone_work[o_w + count + u] * K.cone_work[o_w + u] > REST_RTOL * size
+            parts = K.cone_owner[u] == PUSH and K.cone_work[o_w + count + u] * K.cone_work[o_w + u] > REST_SPEED * size
             if K.free[c] == 2:
                 K.parting[c] = 1 if parts else 0
             else:
@@ -265,7 +263,7 @@ def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
         if f >= 0 and K.loose[f] > 0:
-            take_friction(K, u, f, REST_RTOL * size, o_w, count)
+            take_friction(K, u, f, REST_SPEED * size, o_w, count)
     for u in range(count):
         row = K.cone_rows[u]
         K.impulse[row] = -K.cone_found[u] - (K.past[row] if level == 1 else 0.0)

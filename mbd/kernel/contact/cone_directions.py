@@ -8,6 +8,7 @@ a plane turns by one angle, a direction in space by two.
 
 from __future__ import annotations
 
+from mbd.equal import SMALL_SUM_RTOL
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.contact.branches import is_on, solve_directed
@@ -16,8 +17,6 @@ from mbd.kernel.records import Balance, ContactForces, ContactRows
 
 __all__ = ["MAX_GROUP_SIZE", "fill_tangents", "misses", "turn_directions"]
 
-DIRECTION_RTOL = 1e-14
-"""γ × e over its terms that is round-off [-]."""
 DIFFERENCE_ANGLE = 1e-6
 """Angle by whose effect slopes are measured [rad]."""
 MAX_TURN = 0.5
@@ -105,7 +104,7 @@ def find_misses(K: ContactForces, count: int) -> float:
             miss += K.cone_across[MAX_GROUP_SIZE * i + k] * value
         K.cone_miss[i] = miss - leaned * forward
         worst = max(worst, abs(K.cone_miss[i]) / (size + 1e-300))
-        if forward < -DIRECTION_RTOL * size:
+        if forward < -SMALL_SUM_RTOL * size:
             worst = max(worst, 1.0)
     return worst
 
@@ -200,7 +199,7 @@ def turn_directions(K: Balance, level: int) -> int:
         return 0
     best = find_misses(K, count)
     for turn in range(60):  # rounds in which directions are looked for
-        if best <= DIRECTION_RTOL:
+        if best <= SMALL_SUM_RTOL:
             return 0
         by_newton = turn >= 3 and turn % 4 != 3  # three projections come before Newton's method
         if by_newton:
@@ -216,7 +215,7 @@ def turn_directions(K: Balance, level: int) -> int:
             return status
         now = measure_misses(K)
         if by_newton and now >= best:
-            if best <= 1e3 * DIRECTION_RTOL:
+            if best <= 1e3 * SMALL_SUM_RTOL:
                 keep_directions(K, False)
                 return int(solve_directed(K, level))
             if now > best:

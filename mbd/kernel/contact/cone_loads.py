@@ -14,6 +14,7 @@ feet.
 
 from __future__ import annotations
 
+from mbd.equal import HALF_PRECISION_RTOL, LAW_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.redundancy import largest_limit, share, sharing
 from mbd.kernel.algebra.roots import sqrt
@@ -24,16 +25,8 @@ from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 
 __all__ = ["keep_in_cones"]
 
-LIMIT_RTOL = 1e-12
-"""Part of a limit by which multipliers of least norm may exceed it for round-off [-]."""
-DIRECTION_RTOL = 1e-8
-"""Part of a unit vector that is more than round-off [-]."""
-MIN_LIMIT_RATIO = 1e-12
-"""Limit of a foot that bears nothing, over the largest of all [-]."""
 MIN_WEIGHT_RATIO = 1e-4
 """w of such a foot over the largest limit [-]."""
-SLACK_ATOL = 1e-11
-"""−σ below which what cones leave open is nothing to choose from [-]."""
 
 
 def keep_in_cones(K: Balance, lam: Reals) -> None:
@@ -54,7 +47,7 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
     sigma = find_brink(K, spans, discs)
     for row in range(K.n_rows):
         K.lam_at_limit[row] = lam[row] + scale * freed(K, row, spans)
-    if sigma < -SLACK_ATOL:  # the smallest freedoms within all discs, from those
+    if sigma < -LAW_RTOL:  # the smallest freedoms within all discs, from those
         minimize_within_discs(K, spans, discs, True)
     for row in range(K.n_rows):
         lam[row] += scale * freed(K, row, spans)
@@ -63,7 +56,7 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
 def exceeds(K: Frictions, lam: Reals) -> bool:
     """Whether a friction that sticks is beyond its limit."""
     for f in range(K.n_frictions):
-        if K.sticks[f] == 1 and friction_size(K, f, lam) > (1.0 - LIMIT_RTOL) * K.limit[f]:
+        if K.sticks[f] == 1 and friction_size(K, f, lam) > (1.0 - ROUND_OFF_RTOL) * K.limit[f]:
             return True
     return False
 
@@ -109,7 +102,7 @@ def find_freedoms(K: Balance, pushes_stay: bool) -> int:
                 for i in range(found):
                     clear_row(K.null_way, o, i * width, count)
             left = sqrt(square(K.null_way, o, count))
-            if size > DIRECTION_RTOL and left > DIRECTION_RTOL * max(size, 1.0):
+            if size > HALF_PRECISION_RTOL and left > HALF_PRECISION_RTOL * max(size, 1.0):
                 for d in range(count):
                     K.null_way[o + d] /= left
                 found += 1
@@ -142,7 +135,7 @@ def find_null_vectors(K: Balance) -> int:
             for i in range(count):
                 clear_row(K.null_vectors, o, i * K.n_rows, K.n_rows)
         left = sqrt(square(K.null_vectors, o, K.n_rows))
-        if left > DIRECTION_RTOL * size:
+        if left > HALF_PRECISION_RTOL * size:
             for row in range(K.n_rows):
                 K.null_vectors[o + row] /= left
             count += 1
@@ -154,7 +147,7 @@ def is_free(K: Complementarity, row: int, spans: int) -> bool:
     size = 0.0
     for j in range(spans):
         size = max(size, abs(K.freedom[row * K.n_disc_unknowns + j]))
-    return size > DIRECTION_RTOL
+    return size > HALF_PRECISION_RTOL
 
 
 def find_discs(K: ContactForces, lam: Reals, spans: int, scale: float) -> int:
@@ -174,7 +167,7 @@ def find_discs(K: ContactForces, lam: Reals, spans: int, scale: float) -> int:
         for k in range(DISC_SIZE - 1):
             row = K.friction_row[f + k] if k < K.group_size[f] else -1
             fill_line(K, DISC_SIZE * discs + k, row, 1.0, lam[row] / scale if row >= 0 else 0.0, spans)
-        limit = max(K.limit[f] / scale, MIN_LIMIT_RATIO)
+        limit = max(K.limit[f] / scale, ROUND_OFF_RTOL)
         fill_line(K, DISC_SIZE * discs + 3, push, -K.rise[f], limit, spans)
         K.disc_weight[discs] = max(limit, MIN_WEIGHT_RATIO)
         discs += 1
@@ -183,7 +176,7 @@ def find_discs(K: ContactForces, lam: Reals, spans: int, scale: float) -> int:
         if K.kind[c] == 0 and K.opens[c] == 0 and push >= 0 and is_free(K, push, spans):
             for k in range(DISC_SIZE - 1):
                 fill_line(K, DISC_SIZE * discs + k, -1, 0.0, 0.0, spans)
-            fill_line(K, DISC_SIZE * discs + 3, push, -1.0, max(-lam[push] / scale, MIN_LIMIT_RATIO), spans)
+            fill_line(K, DISC_SIZE * discs + 3, push, -1.0, max(-lam[push] / scale, ROUND_OFF_RTOL), spans)
             K.disc_weight[discs] = 1.0
             discs += 1
     return discs

@@ -20,6 +20,7 @@ solved, with ε on the diagonal, which keeps steps small along what is undetermi
 
 from __future__ import annotations
 
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import Integers, Reals
@@ -36,8 +37,6 @@ CONE_COMPLIANCE = 1e-7
 """Velocity by which a soft contact gives way to its impulse, of the least that any contact alone does."""
 CONE_REGULARIZATION = 1e-9
 """ε, where the diagonal of the equations is 1."""
-RIGID_RTOL = 1e-12
-"""Entry of the diagonal of G, of the largest, below which an impulse moves nothing and is zero."""
 
 
 def cone_places(n: int) -> int:
@@ -146,7 +145,7 @@ def cone_metric(G: Reals, n: int, shift: Reals, twin: Integers, work: Reals) -> 
                 count += 1
                 v = twin[v]
             slack /= count
-        work[o_rho + u] = 1.0 / slack if slack > RIGID_RTOL * largest else 0.0
+        work[o_rho + u] = 1.0 / slack if slack > ROUND_OFF_RTOL * largest else 0.0
         size = max(size, abs(work[o_rho + u] * shift[u]))
     return size
 

@@ -12,6 +12,7 @@ A motion that only comes close to rest turns around it in shortened steps, and s
 
 from __future__ import annotations
 
+from mbd.equal import EQUAL_RTOL, MIN_DIVISOR, REST_SPEED
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import STICK
 from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABILITY_SHARE, estimated_turn_rate
@@ -28,8 +29,7 @@ from mbd.kernel.contact.cones import (
     set_hold,
     speed_of,
 )
-from mbd.kernel.contact.contact_modes import REST_SPEED
-from mbd.kernel.events.guard_sides import MIN_SPEED
+from mbd.kernel.events.guard_sides import REST_RATE_RTOL
 from mbd.kernel.events.guards import judge
 from mbd.kernel.events.locate import locate
 from mbd.kernel.records import Frictions, Guards, Kernel, Switching
@@ -52,8 +52,6 @@ REACHES_ZERO_SHARE = 0.8
 """Part of a step within which γ reaches zero if a direction is held in it [-]."""
 HEAD_ON_SINE = 0.05
 """Sine of the angle between γ̇ and −γ below which γ runs into zero [-]."""
-COLLINEAR_SINE = 1e-9
-"""The same where γ moves along a line: a direction that is held is that of γ then, however long it slides on [-]."""
 MIN_REST_STEP_RATIO = 1e-5
 """Part of dt below which no step is shortened for this; where γ asks for less it runs into zero at any angle [-]."""
 MAX_HELD_TURN = 0.25
@@ -62,8 +60,6 @@ SLIDES_ON = -2
 """Of `come_to_zero`: what seemed to come to rest slides on."""
 COMMON_REST_SHARE = 0.02
 """Part of its speed before the step at which another group rests at the same instant [-]."""
-REST_RTOL = 1e-10
-"""Speed across the direction that is held that counts as none, over ‖γ̇‖ dt [-]."""
 
 
 def approached_end(K: Switching, t1: float) -> float:
@@ -88,7 +84,7 @@ def approached_end(K: Switching, t1: float) -> float:
             slow = MAX_STEP_SHARE * speed <= MIN_REST_STEP_RATIO * change * K.dt
             straight = fall > 0.0 and (turns_at <= HEAD_ON_SINE * speed * change or slow)
             ends = fall > 0.0 and speed * speed < REACHES_ZERO_SHARE * h * fall
-            line = turns_at <= COLLINEAR_SINE * speed * change
+            line = turns_at <= EQUAL_RTOL * speed * change
             if straight and (ends or line or h < MIN_REST_STEP_RATIO * K.dt):
                 set_hold(K, f, HOLD_DIRECTION)
                 rest = max(rest, speed * speed / fall)
@@ -142,7 +138,7 @@ def slides_on(K: Guards) -> bool:
     for f in range(K.n_frictions):
         if keeps_direction(K, f):
             forward = along(K, f, K.guards1, K.at_slip)
-            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > COLLINEAR_SINE * forward:
+            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > EQUAL_RTOL * forward:
                 set_hold(K, f, 0.0)
                 found = True
     return found
@@ -157,7 +153,7 @@ def slides_until_event(K: Guards) -> bool:
     for f in range(K.n_frictions):
         if keeps_direction(K, f) and may_follow(K, f):
             forward = along(K, f, K.guards1, K.at_slip)
-            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > COLLINEAR_SINE * forward:
+            if forward > 0.0 and away(K, f, K.guards1, K.at_slip) > EQUAL_RTOL * forward:
                 set_hold(K, f, 0.0)
                 found = True
     return found
@@ -192,8 +188,8 @@ def come_to_zero(K: Kernel, h: float, t1: float) -> int:
         for g in range(K.n_frictions):
             if K.group_size[g] > 1 and K.slip[g] != 0.0 and K.hold[g] == HOLD_DIRECTION:
                 speed = speed_of(K, g, K.guards0, K.at_slip)
-                largest = max(largest, away(K, g, K.guards1, K.at_slip) / (REST_RTOL * speed + 1e-13))
-                left = across(K, g, K.guards1, K.at_slip) / (speed + MIN_SPEED)
+                largest = max(largest, away(K, g, K.guards1, K.at_slip) / (REST_RATE_RTOL * speed + 1e-13))
+                left = across(K, g, K.guards1, K.at_slip) / (speed + MIN_DIVISOR)
                 change = left - K.across[g]
                 product += K.across[g] * change
                 square += change * change

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
+from mbd.equal import DIRECT_PIVOT_RTOL, REST_SPEED
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents, mass_of
 from mbd.kernel.contact.cones import HOLD_DIRECTION, leads_group, product_of, speed_of
-from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.records import Balance, ContactForces, Switching
 from mbd.kernel.stepping.restart import evaluate, stepping_rows
 

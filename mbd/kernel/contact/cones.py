@@ -9,6 +9,7 @@ nothing, λ_T follows γ.
 
 from __future__ import annotations
 
+from mbd.equal import MIN_DIVISOR, MIN_SQUARED_SPEED
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, Frictions, Guards, Reals
 
@@ -28,10 +29,6 @@ ONSET_SPEED = 4e-6
 """Speed [m/s] up to which it stays as it was, ten times what stands for γ then."""
 MIN_DIRECTION_SPEED = ONSET_END_SPEED * HOLD_AT_ONSET
 """Speed [m/s, rad/s] below which γ is round-off, and K.slip stays that of the motion before."""
-MIN_COSINE = 1e-200
-"""What stands for a cosine that is zero: 0.0 would say that nothing slides [-]."""
-MIN_SQUARED_SPEED = 1e-60
-"""Square of a speed that is none, as in `mbd.equations.cones` [m²/s²]."""
 
 
 def follows(K: Frictions, f: int) -> bool:
@@ -69,10 +66,10 @@ def aim(K: Frictions, f: int) -> None:
         square += K.slip[g] * K.slip[g]
     size = sqrt(square)
     for g in range(first, first + K.group_size[f]):
-        none = 1.0 if g == first else MIN_COSINE
+        none = 1.0 if g == first else MIN_DIVISOR
         K.slip[g] = K.slip[g] / size if size > 0.0 else none
-        if abs(K.slip[g]) < MIN_COSINE:
-            K.slip[g] = MIN_COSINE
+        if abs(K.slip[g]) < MIN_DIVISOR:
+            K.slip[g] = MIN_DIVISOR
         K.lean[g] = K.slip[g]
 
 

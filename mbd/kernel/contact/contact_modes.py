@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.equal import REST_SPEED
 from mbd.kernel.algebra.islands import find_islands
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import solve_rows
@@ -32,10 +33,8 @@ from mbd.kernel.stepping.restart import (
     take_consistent,
 )
 
-__all__ = ["REST_SPEED", "resolve_contact_modes"]
+__all__ = ["resolve_contact_modes"]
 
-REST_SPEED = 1e-9
-"""Speed [m/s, rad/s] of a gap or along a friction that counts as none."""
 NEAR_REST_SPEED = 1e-7
 """The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
 

@@ -15,10 +15,10 @@ Stronge       as Poisson, with one factor on all impulses of the second phase, s
 
 from __future__ import annotations
 
+from mbd.equal import LAW_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CONFLICT, ENERGY_GAIN, NO_IMPACT, PULL
 from mbd.kernel.contact.impact_solve import (
-    ENERGY_GAIN_RTOL,
     energy_gain,
     gather,
     let_rebound,
@@ -36,8 +36,6 @@ __all__ = ["impact"]
 
 MAX_IMPACTS = 1000
 """Impacts of the sequential law at one instant [-]."""
-APPROACH_RTOL = 1e-11
-"""Approach speed, relative to the fastest, that counts as none [-]."""
 
 
 def impact(K: Switching, slow: bool) -> int:
@@ -61,7 +59,7 @@ def impact(K: Switching, slow: bool) -> int:
     unsolved = status == CONFLICT or status == NO_IMPACT
     if status != 0 and not (unsolved and not slow and rebounds(K)):
         return status
-    if not slow and (unsolved or energy_gain(K) > ENERGY_GAIN_RTOL):
+    if not slow and (unsolved or energy_gain(K) > ROUND_OFF_RTOL):
         for c in range(K.n_contacts):
             if K.closing[c] > 0 and K.restitution[c] > 1.0:
                 return status if unsolved else ENERGY_GAIN
@@ -70,7 +68,7 @@ def impact(K: Switching, slow: bool) -> int:
         status = poisson_law(K, True)
         if status != 0:
             return status
-        if energy_gain(K) > ENERGY_GAIN_RTOL:
+        if energy_gain(K) > ROUND_OFF_RTOL:
             return ENERGY_GAIN
     if slow and K.strategy == 0:
         rest(K)
@@ -231,7 +229,7 @@ def sequential_law(K: Switching) -> int:
                 approach = -speed(K, K.normal[c])
                 most = max(most, abs(approach) if is_held_through(K, c) else approach)
         fastest = max(fastest, most)
-        if most <= APPROACH_RTOL * fastest or most < 1e-14:
+        if most <= LAW_RTOL * fastest or most < 1e-14:
             end_together(K, fastest)
             return 0
         for c in range(K.n_contacts):

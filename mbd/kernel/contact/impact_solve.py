@@ -10,12 +10,9 @@ from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts
 from mbd.kernel.stepping.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
 
 __all__ = [
-    "ENERGY_GAIN_RTOL", "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "solve_impact",
+    "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "solve_impact",
     "speed", "start_over", "strikes",
 ]  # fmt: skip
-
-ENERGY_GAIN_RTOL = 1e-12
-"""Energy that impulses add, relative to its terms, above which a law is given up: restitution that sticks can [-]."""
 
 
 def prepare(K: Balance) -> None:

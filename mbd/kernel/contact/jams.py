@@ -8,18 +8,17 @@ laws: of an approach that tends to zero, which leaves no solution in which the c
 
 from __future__ import annotations
 
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.codes import LOG_OPENED, LOG_STUCK, NO_FORCE
 from mbd.kernel.contact.contact_log import ALL_IMPULSES, NO_IMPULSE, log_event
-from mbd.kernel.contact.impact_solve import ENERGY_GAIN_RTOL, energy_gain, gather, prepare, solve_impact, start_over
+from mbd.kernel.contact.impact_solve import energy_gain, gather, prepare, solve_impact, start_over
 from mbd.kernel.records import ContactForces, Switching
 from mbd.kernel.stepping.restart import row_speed
 
 __all__ = ["stop_slide"]
 
-FIRST_APPROACH_RATIO = 0.1
-"""Approach speed of the first regularized impact, over the speed of the slide [-]."""
 APPROACH_REDUCTION = 0.1
-"""The approach that follows, over the one before, until there is none [-]."""
+"""Approach of each regularized impact over the one before, the first over the speed of the slide [-]."""
 MAX_REDUCTIONS = 4
 """Approaches before there is none [-]."""
 
@@ -39,7 +38,7 @@ def stop_slide(K: Switching, c: int) -> int:
             slide += abs(row_speed(K, k))
     # the branches of a slow approach, then the impulses that these give without it
     status = 0
-    approach = FIRST_APPROACH_RATIO
+    approach = APPROACH_REDUCTION
     for turn in range(MAX_REDUCTIONS + 1):
         start_over(K)
         for k in range(K.n_rows):
@@ -51,7 +50,7 @@ def stop_slide(K: Switching, c: int) -> int:
             status = solve_impact(K)
         approach *= APPROACH_REDUCTION if turn + 1 < MAX_REDUCTIONS else 0.0
     stopped = stopped_friction(K)
-    if status != 0 or stopped < 0 or energy_gain(K) > ENERGY_GAIN_RTOL:
+    if status != 0 or stopped < 0 or energy_gain(K) > ROUND_OFF_RTOL:
         K.failure_index = c
         return NO_FORCE
     # energy, velocities, and who parts

@@ -14,12 +14,12 @@ beyond its limit, let go before it, and the step is taken again.
 
 from __future__ import annotations
 
+from mbd.equal import REST_SPEED
 from mbd.kernel.algebra.linear import largest_entry
 from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import follows
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
-from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.contact.nonsmooth_cones import hold_together, release, turned_in_plane
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.events.switching import close_by_impact, mark_touching

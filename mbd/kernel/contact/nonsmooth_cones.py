@@ -8,6 +8,7 @@ first order, for all contacts together.
 
 from __future__ import annotations
 
+from mbd.equal import NOMINAL_RTOL, REST_SPEED
 from mbd.kernel.codes import PULL
 from mbd.kernel.contact.cone_contacts import all_hold
 from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABILITY_SHARE, estimated_turn_rate
@@ -21,14 +22,10 @@ from mbd.kernel.contact.cones import (
     set_hold,
     speed_of,
 )
-from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate, evaluate_loaded, largest_force, limit_of
 
 __all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release", "turned_in_plane"]
-
-MAX_HELD_SINE = 1e-6
-"""Sine of the angle by which γ may leave the direction that a step holds [-]."""
 
 
 def hold_for_step(K: Switching, h: float) -> None:
@@ -61,7 +58,7 @@ def turned_in_plane(K: Guards, f: int) -> bool:
     forward = along(K, f, K.guards1, K.at_slip)
     if K.hold[f] != HOLD_DIRECTION:
         return forward < -REST_SPEED
-    return bool(forward <= REST_SPEED or away(K, f, K.guards1, K.at_slip) > MAX_HELD_SINE * forward)
+    return bool(forward <= REST_SPEED or away(K, f, K.guards1, K.at_slip) > NOMINAL_RTOL * forward)
 
 
 def release(K: Switching, f: int, least: float) -> int:

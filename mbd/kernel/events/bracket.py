@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, OPEN_FORCE, OPEN_GAP, OPEN_PULL, PRESS, SLIP, STICK, WATCH
 from mbd.kernel.contact.cones import along
-from mbd.kernel.events.guards import gap_scale, gap_tolerance, guard_value, pull_round_off
+from mbd.kernel.events.guards import GAP_RTOL, gap_scale, gap_tolerance, guard_value, pull_round_off
 from mbd.kernel.events.hermite import first_guess
 from mbd.kernel.events.refine import enough, refine
 from mbd.kernel.records import ContactForces, Guards, Kernel, Sizes
@@ -16,10 +17,6 @@ __all__ = ["bracket", "flag_of"]
 
 MAX_HALVINGS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
-CLEAR_FORCE_RATIO = 1e-8
-"""Part of the largest force by which a force is clearly beyond what it may be [-]."""
-SURFACE_RTOL = 1e-10
-"""Part of its terms within which a gap is at rest on its surface [-]."""
 
 
 def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
@@ -46,7 +43,7 @@ def bracket(K: Kernel, kind: int, index: int, low: float, high: float) -> int:
         low = find_way(K, kind, index, high, root_tolerance(K, kind, index, f_low, f_high))
         if low < 0.0:
             return int(-low)
-        if low == 0.0 and kind == CLOSE and abs(K.guards0[index]) <= SURFACE_RTOL * gap_scale(K, index):
+        if low == 0.0 and kind == CLOSE and abs(K.guards0[index]) <= GAP_RTOL * gap_scale(K, index):
             status = parts_slowly(K, index, high)
             if status == 0:
                 reject_event(K, kind, index)
@@ -167,7 +164,7 @@ def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> floa
         value = guard_value(K, kind, index, K.time + low)
         if value > tiny:
             return low
-        if (kind == SLIP or kind == OPEN_PULL) and value < -CLEAR_FORCE_RATIO * largest_force(K):
+        if (kind == SLIP or kind == OPEN_PULL) and value < -HALF_PRECISION_RTOL * largest_force(K):
             note_ahead(K, low)
     return 0.0
 

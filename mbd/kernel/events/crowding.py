@@ -9,6 +9,7 @@ instant wherever it is cut.
 
 from __future__ import annotations
 
+from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.records import Guards, Switching
 
 __all__ = ["count_impact", "crowd", "crowds"]
@@ -17,8 +18,6 @@ MAX_EXCESS_IMPACTS = 64.0
 """Impacts through several contacts, less one for each dt, from which on steps are non-smooth [-]."""
 MIN_CONTACTS = 2
 """Contacts closed already that take part in such an impact [-]."""
-IMPULSE_RTOL = 1e-6
-"""Impulse over the largest of an impact that is more than round-off [-]."""
 
 
 def crowd(K: Guards) -> float:
@@ -34,7 +33,7 @@ def count_impact(K: Switching) -> None:
             largest = max(largest, abs(K.impulse[K.normal[c]]))
     several = 0
     for c in range(K.n_contacts):
-        if K.kind[c] == 0 and K.closing[c] == 0 and abs(K.impulse[K.normal[c]]) > IMPULSE_RTOL * largest:
+        if K.kind[c] == 0 and K.closing[c] == 0 and abs(K.impulse[K.normal[c]]) > NOMINAL_RTOL * largest:
             several += 1
     if several >= MIN_CONTACTS:
         K.crowding = crowd(K) + 1.0

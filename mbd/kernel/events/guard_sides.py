@@ -14,6 +14,7 @@ before, ġ₀:
 
 from __future__ import annotations
 
+from mbd.equal import INSTANT_RTOL, MIN_DIVISOR
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, LOG_EVENT, STICK
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.events.guard_round_off import guard_round_off
@@ -21,8 +22,6 @@ from mbd.kernel.events.guards import gap_tolerance, is_waiting, is_watched
 from mbd.kernel.records import Events, Guards, Switching
 
 __all__ = [
-    "MIN_SPEED",
-    "INSTANT_RTOL",
     "find_crossings",
     "find_passed",
     "is_at_event",
@@ -32,14 +31,10 @@ __all__ = [
     "striking_contact",
 ]
 
-INSTANT_RTOL = 1e-9
-"""Part of the way to an event by which another of the same instant may seem to come later [-]."""
 REACH_SHARE = 1e-3
 """Part of a step within which a guard must reach zero at its rate, for its round-off to be looked at [-]."""
 REST_RATE_RTOL = 1e-10
-"""Rate of a guard after an event, over that before, which is none [-]."""
-MIN_SPEED = 1e-200
-"""What is added to a speed that may be zero [m/s, rad/s]."""
+"""Rate after an event over that before, or speed across a direction over that along it, which is none [-]."""
 RESET_ROUND_OFFS = 2.0**20
 """Round-offs of a guard beyond which a reset has moved it away from zero [-]."""
 
@@ -68,7 +63,7 @@ def is_at_event(K: Guards, e: int) -> bool:
     """Whether guard e is zero at the event, as far as its instant is known; the state is there."""
     known = max(INSTANT_RTOL * K.event_after, 8.0 * EPS * abs(K.time))
     if K.event_kind == CLOSE:
-        known += gap_tolerance(K, K.event_index) / (abs(K.guards0[K.at_gap_rate + K.event_index]) + MIN_SPEED)
+        known += gap_tolerance(K, K.event_index) / (abs(K.guards0[K.at_gap_rate + K.event_index]) + MIN_DIVISOR)
     return bool(abs(K.guards0[K.at_user + e]) <= known * abs(K.guards0[K.at_user_rate + e]))
 
 

@@ -7,6 +7,7 @@ armed is ignored until its gap has risen above zero. Closed contacts fire by the
 
 from __future__ import annotations
 
+from mbd.equal import NOMINAL_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import (
     CLOSE,
@@ -57,16 +58,12 @@ __all__ = [
 
 DOUBTFUL_SHARE = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
-SLIP_RTOL = 1e-12
-"""Speed along a friction, relative to its terms, that is no turn: other rows may hold it still as it pulls [-]."""
 NEAR_TURN_RATIO = 1e-3
 """Part of what a guard changes by in a step, at its first rate, above zero where the turn is looked at itself [-]."""
-FALL_RTOL = 1e-10
-"""Part of its terms by which a gap may fall though its rate is none or positive at both ends of a step [-]."""
+GAP_RTOL = 1e-10
+"""Part of its terms by which a gap may be off its surface, or fall in a step at whose ends it does not fall [-]."""
 RETREAT_ROUND_OFFS = 16.0
 """Round-offs of a guard by which it has gone back; a contact at its surface may leave it off by some of them [-]."""
-CLEAR_GAP = 1e-6
-"""Gap [m, rad] above which a contact is clearly open."""
 
 
 def watch(K: Mechanism, t: float, q: Reals, y: Reals, rate: Reals, lam: Reals, values: Reals) -> None:
@@ -178,7 +175,7 @@ def is_quiet(K: Guards) -> bool:
     for c in range(K.n_contacts):
         if K.closed[c] != 0 or K.armed[c] != 1 or K.while_kind[c] != 0:
             return False
-        if not (K.guards0[c] > CLEAR_GAP and K.guards1[c] > CLEAR_GAP):
+        if not (K.guards0[c] > NOMINAL_RTOL and K.guards1[c] > NOMINAL_RTOL):
             return False
         if K.guards0[K.at_gap_rate + c] < 0.0 < K.guards1[K.at_gap_rate + c]:
             return False
@@ -206,7 +203,7 @@ def judge(K: Switching, h: float) -> bool:
             if K.armed[c] != 1 or not is_watched(K, c, K.guards0):
                 continue
             if g1 < -tiny:
-                if min(d0, d1) >= -tiny and rises(g0, g1 + tiny, d0, d1, FALL_RTOL * gap_scale(K, c), d1 * K.dt / h):
+                if min(d0, d1) >= -tiny and rises(g0, g1 + tiny, d0, d1, GAP_RTOL * gap_scale(K, c), d1 * K.dt / h):
                     continue
                 slow = d0 >= -tiny and g0 - g1 > tiny  # what comes before it is looked at first
                 if g0 > tiny:
@@ -351,7 +348,7 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
     v1 = along(K, f, K.guards1, K.at_slip)
     d0 = along(K, f, K.guards0, K.at_slip_rate) * h
     d1 = along(K, f, K.guards1, K.at_slip_rate) * h
-    tiny = SLIP_RTOL * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
+    tiny = ROUND_OFF_RTOL * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
     if v1 < -tiny:
         top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
         if v0 > tiny:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.equal import INSTANT_RTOL, NOMINAL_RTOL
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -15,7 +16,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.events.bracket import bracket, flag_of
 from mbd.kernel.events.guard_round_off import guard_round_off
-from mbd.kernel.events.guard_sides import INSTANT_RTOL, striking_contact
+from mbd.kernel.events.guard_sides import striking_contact
 from mbd.kernel.events.guards import (
     gap_scale,
     gap_tolerance,
@@ -28,8 +29,6 @@ from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["find_jump", "jumps_over_stop", "locate"]
 
-ANGLE_RTOL = 1e-6
-"""Part of its terms by which an angle may be off zero at the instant at which a contact closes [-]."""
 MAX_UNEXPLAINED_TURN = 0.5
 """What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
 EARLIER, LATER = -2, -1
@@ -161,7 +160,7 @@ def root_before(K: Kernel, kind: int, index: int, low: float, end: float) -> int
 
 def jumps(K: Switching, c: int) -> bool:
     """Whether the angle of contact c is nowhere zero as it closes, as a twist at half a turn: K.failure_index."""
-    if K.row_unit[K.normal[c]] != 1 or abs(K.guards1[c]) <= ANGLE_RTOL * gap_scale(K, c):
+    if K.row_unit[K.normal[c]] != 1 or abs(K.guards1[c]) <= NOMINAL_RTOL * gap_scale(K, c):
         return False
     K.failure_index = c
     return True

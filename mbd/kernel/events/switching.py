@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.equal import EQUAL_RTOL, REST_SPEED
 from mbd.kernel.codes import (
     CLOSE,
     CROSS,
@@ -17,7 +18,6 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact.cones import aim_as_pulled, friction_size, leads_group, set_loose, set_sticking, speed_of
 from mbd.kernel.contact.contact_log import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, log_event
-from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.contact.impact import impact
 from mbd.kernel.contact.impact_solve import strikes
 from mbd.kernel.events.guards import gap_scale, is_watched
@@ -30,8 +30,6 @@ __all__ = ["switch"]
 
 COMMON_REST_SHARE = 1e-3
 """Part of dt within which contacts that come to rest do so together [-]."""
-FRICTION_LIMIT_RTOL = 1e-9
-"""Part of its limit by which a friction may be below it and begin to slide with others [-]."""
 
 
 def gather_closing(K: Guards) -> float:
@@ -222,9 +220,7 @@ def slip_together(K: Balance, index: int) -> None:
     for f in range(K.n_frictions):
         if status == 0 and leads_group(K, f) and K.sticks[f] == 1 and is_closed(K, f):
             limit = limit_of(K, f)
-            if f == index or (
-                limit > 0.0 and friction_size(K, f, K.lam_at_limit) > (1.0 - FRICTION_LIMIT_RTOL) * limit
-            ):
+            if f == index or (limit > 0.0 and friction_size(K, f, K.lam_at_limit) > (1.0 - EQUAL_RTOL) * limit):
                 set_loose(K, f, 3)
                 set_sticking(K, f, 0)
                 aim_as_pulled(K, f, K.lam_at_limit)

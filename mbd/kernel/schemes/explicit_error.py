@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
+from mbd.equal import DIRECT_PIVOT_RTOL
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.records import Memory, Steps

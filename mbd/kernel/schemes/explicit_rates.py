@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.linear import solve_definite, sum_of_sizes
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import NOT_FINITE, SINGULAR

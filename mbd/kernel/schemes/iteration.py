@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.algebra.ordered import clear_tangent
 from mbd.kernel.codes import EPS
 from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Model, Motion, Settings, SingularSteps, Steps
-from mbd.kernel.singular.step_pairs import STEP_RTOL
 from mbd.kernel.stepping.restart import compose, note_scales
 from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 
@@ -59,7 +59,7 @@ def predict(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> No
 
 def shift_growth(K: Steps, h: float) -> float:
     """The factor by which a position correction, that of order h³, grows from the last step to this one."""
-    if h > (1.0 + STEP_RTOL) * K.step:  # the longer of a pair: round-off of the shorter does not grow
+    if h > (1.0 + NOMINAL_RTOL) * K.step:  # the longer of a pair: round-off of the shorter does not grow
         return 1.0
     stretch = h / K.aux_step
     return float(stretch * stretch * stretch)

@@ -6,16 +6,9 @@ straight-line code. The stabilized form corrects positions by U first, then the 
 
 from __future__ import annotations
 
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import (
-    NEWTON_PIVOT_RTOL,
-    OF_TANGENT,
-    clear_tangent,
-    columns_at,
-    factor_ordered,
-    order_at,
-    solve_kkt,
-)
+from mbd.kernel.algebra.ordered import OF_TANGENT, clear_tangent, columns_at, factor_ordered, order_at, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED, TOO_NEAR, TOO_TIGHT
 from mbd.kernel.hooks import call, call_on
@@ -338,7 +331,7 @@ def factorize(K: DependentRows, size: int, tangents: int) -> bool:
     m = size - K.n
     o = order_of_tangent(K, m)
     if o > 0 and tangents <= MAX_FIXED_ORDER:
-        if factor_ordered(K, K.out, o, OF_TANGENT, NEWTON_PIVOT_RTOL):
+        if factor_ordered(K, K.out, o, OF_TANGENT, HALF_PRECISION_RTOL):
             K.n_factorizations += 1
             return True
         clear_tangent(K, m, K.out)

@@ -8,6 +8,7 @@ acceleration level, which makes them as accurate as positions and velocities.
 
 from __future__ import annotations
 
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT
 from mbd.kernel.contact.cones import HOLD_DIRECTION
@@ -48,7 +49,6 @@ from mbd.kernel.singular.stages import (
     spans_singularity,
 )
 from mbd.kernel.singular.step_size import accept_row_norms, forget_row_norms
-from mbd.kernel.stepping.mass_ratios import RESIDUAL_CORRECTION_RTOL
 from mbd.kernel.stepping.restart import (
     lower_to_step,
     measure_accepted,
@@ -234,7 +234,7 @@ def has_converged(moved: float, last: float, first: float) -> bool:
 
     Masses that differ by 10⁶ make a change of 10⁻³ in the rates of the light one of residuals of 10⁻⁹.
     """
-    return moved <= max(RESIDUAL_CORRECTION_RTOL, NEGLIGIBLE_CORRECTION * first * first) or (
+    return moved <= max(HALF_PRECISION_RTOL, NEGLIGIBLE_CORRECTION * first * first) or (
         last > 0.0 and moved > 0.5 * last
     )
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
+from mbd.equal import DIRECT_PIVOT_RTOL, REST_SPEED
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR
-from mbd.kernel.contact.contact_modes import REST_SPEED
 from mbd.kernel.hooks import call_on
 from mbd.kernel.records import DependentRows, Equations
 from mbd.kernel.singular.newmark_step import VELOCITY_RTOL

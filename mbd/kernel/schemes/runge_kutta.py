@@ -11,7 +11,7 @@ that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
+from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import INCREMENT_RATES, NOT_CONVERGED, PASSING, SINGULAR
 from mbd.kernel.hooks import call

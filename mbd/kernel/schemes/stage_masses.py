@@ -14,8 +14,9 @@ of its own, and is done where corrections with matrices of the middle stage alon
 
 from __future__ import annotations
 
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import solve_definite
-from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, solve_kkt
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import ACCELERATIONS
@@ -83,7 +84,7 @@ def exchange_masses_and_rows(K: Kernel, m: int, h: float, t1: float) -> bool:
     for i in range(3):
         load_stage(K, i, h, t1)
         call(K, ACCELERATIONS, K.acc)
-        if not factor_saddle(K, m, False, NEWTON_PIVOT_RTOL):
+        if not factor_saddle(K, m, False, HALF_PRECISION_RTOL):
             sound = False
             break
         K.rhs[:n] = S[o_r + i * size : o_r + i * size + n]

@@ -7,16 +7,10 @@ together from three of them.
 
 from __future__ import annotations
 
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.complex_linear import factor_complex, solve_complex
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import (
-    NEWTON_PIVOT_RTOL,
-    OF_TANGENT,
-    clear_tangent,
-    factor_ordered,
-    order_at,
-    solve_held,
-)
+from mbd.kernel.algebra.ordered import OF_TANGENT, clear_tangent, factor_ordered, order_at, solve_held
 from mbd.kernel.algebra.ordered_complex import factor_pair_ordered, solve_pair_ordered
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import PASSING
@@ -119,12 +113,12 @@ def factor_stages(K: SingularSteps, size: int) -> bool:
     """LU factors of both matrices; false where a pivot is missing."""
     o = 0 if sharing(K) else order_at(K, size - K.n)
     column = 0
-    if o == 0 or not factor_ordered(K, K.kkt, o, OF_TANGENT, NEWTON_PIVOT_RTOL):
+    if o == 0 or not factor_ordered(K, K.kkt, o, OF_TANGENT, HALF_PRECISION_RTOL):
         K.order_start = 0
         K.n_pivoted += 1 if o > 0 else 0
         column = factor(K.kkt, size, K.pivots)
     o_P = stage_place(K, PAIR_PIVOTS)
-    if column == 0 and o > 0 and factor_pair_ordered(K, stage_place(K, PAIR), o, NEWTON_PIVOT_RTOL):
+    if column == 0 and o > 0 and factor_pair_ordered(K, stage_place(K, PAIR), o, HALF_PRECISION_RTOL):
         K.stages[o_P] = -float(o)  # in the place of a row, which is not negative
     elif column == 0:
         column = factor_complex(K.stages, stage_place(K, PAIR), size, o_P)

@@ -6,16 +6,9 @@ projected onto the rows and the scheme starts again, but for the average that it
 
 from __future__ import annotations
 
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import factor
-from mbd.kernel.algebra.ordered import (
-    NEWTON_PIVOT_RTOL,
-    OF_TANGENT,
-    clear_tangent,
-    factor_ordered,
-    order_at,
-    solve_kkt,
-    weakest_pivot,
-)
+from mbd.kernel.algebra.ordered import OF_TANGENT, clear_tangent, factor_ordered, order_at, solve_kkt, weakest_pivot
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR
@@ -269,7 +262,7 @@ def factor_positions(K: DependentRows, m: int) -> bool:
     """LU factors of the index-3 tangent in K.out; false if a pivot is missing."""
     size = K.n + m
     o = 0 if sharing(K) else order_at(K, m)
-    if o > 0 and factor_ordered(K, K.out, o, OF_TANGENT, NEWTON_PIVOT_RTOL):
+    if o > 0 and factor_ordered(K, K.out, o, OF_TANGENT, HALF_PRECISION_RTOL):
         return True
     K.n_pivoted += 1 if o > 0 else 0
     K.order_start = 0

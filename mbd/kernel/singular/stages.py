@@ -15,7 +15,8 @@ linearly, the faster the shorter the step.
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import NEWTON_PIVOT_RTOL, solve_kkt
+from mbd.equal import HALF_PRECISION_RTOL
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, NOT_FINITE, PASSING, SINGULAR
@@ -98,7 +99,7 @@ def solve_singular_stage(K: Kernel, i: int, h: float, t1: float, m: int, afresh:
         K.rhs[n + k] = 0.0 if below else -rate
     solve_kkt(K, n + m, K.rhs)
     S[o_s : o_s + n] = K.rhs[:n]
-    if K.n_frictions > 0 and not factor_saddle(K, m, False, NEWTON_PIVOT_RTOL):
+    if K.n_frictions > 0 and not factor_saddle(K, m, False, HALF_PRECISION_RTOL):
         return SINGULAR
     for j in range(n):
         load = K.acc[K.acc_f + j]
@@ -137,7 +138,7 @@ def project_stage_positions(K: Kernel, i: int, h: float, t1: float, m: int, afre
                 return NOT_FINITE
             K.rhs[n + k] = -off
             size = max(size, abs(off) / (16.0 * EPS * K.scale[n + row] + 1e-300))
-        if not factor_saddle(K, m, True, NEWTON_PIVOT_RTOL):
+        if not factor_saddle(K, m, True, HALF_PRECISION_RTOL):
             return SINGULAR
         if turn == 0 and not afresh:
             take_back(K, i, m)

@@ -8,9 +8,10 @@ by where the grid happens to lie: enough to hide that the sum of all errors fall
 
 from __future__ import annotations
 
+from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.records import State
 
-__all__ = ["ALONE", "FIRST", "LONG_PART", "SECOND", "SHORT_PART", "STEP_RTOL", "is_of_pair", "is_whole", "may_pair"]
+__all__ = ["ALONE", "FIRST", "LONG_PART", "SECOND", "SHORT_PART", "is_of_pair", "is_whole", "may_pair"]
 
 LONG_PART = 0.75 + 0.38188130791298669
 """3/4 + √(7/48), part of dt, of the second: what is predicted from it is stretched little [-]."""
@@ -18,18 +19,16 @@ SHORT_PART = 0.75 - 0.38188130791298669
 """3/4 − √(7/48), part of dt, of the first [-]."""
 SECOND, FIRST, ALONE = 1, 2, 3
 """Values of paired_step: the longer of a pair is next, the shorter is tried; one sized for a singularity is."""
-STEP_RTOL = 1e-6
-"""Part of dt by which a step may differ from the size it counts as: round-off of instants [-]."""
 
 
 def is_of_pair(size: float) -> bool:
     """Whether a step of this size, part of dt, is one of a pair."""
-    return abs(size - SHORT_PART) <= STEP_RTOL or abs(size - LONG_PART) <= STEP_RTOL
+    return abs(size - SHORT_PART) <= NOMINAL_RTOL or abs(size - LONG_PART) <= NOMINAL_RTOL
 
 
 def is_whole(K: State, h: float) -> bool:
     """Whether a step of size h is one of the grid."""
-    return bool(abs(h - K.step) <= STEP_RTOL * K.step)
+    return bool(abs(h - K.step) <= NOMINAL_RTOL * K.step)
 
 
 def may_pair(K: State, h: float) -> bool:

@@ -9,7 +9,8 @@ error e is what each correction by the balance leaves of the error before (Wilki
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, solve_kkt
+from mbd.equal import DIRECT_PIVOT_RTOL
+from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, ILL_CONDITIONED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
+from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.codes import FREE_RATES
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance
@@ -12,7 +12,7 @@ from mbd.kernel.tangent_rules import is_differentiated
 __all__ = ["NOT_CLEAR", "free_rates", "rates_in_block"]
 
 NOT_CLEAR = -1.0
-"""Of rates that lost too many digits, or are not finite."""
+"""Of rates that lost too many digits, are not finite or cannot be found."""
 
 
 def free_rates(K: Balance, t: float) -> float:

@@ -9,8 +9,9 @@ the factor that elimination has lost, so one or two suffice. Where nothing is lo
 
 from __future__ import annotations
 
+from mbd.equal import DIRECT_PIVOT_RTOL, EQUAL_RTOL, HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import solve_again, solve_definite
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL, NEWTON_PIVOT_RTOL, order_at, solve_kkt
+from mbd.kernel.algebra.ordered import order_at, solve_kkt
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Equations, Motion
 
@@ -23,10 +24,6 @@ __all__ = [
     "polish_with_rows",
 ]
 
-CORRECTION_RTOL = 1e-9
-"""Correction over the largest rate, both as they are, after which none follows [-]."""
-RESIDUAL_CORRECTION_RTOL = 1e-8
-"""Part of the largest rate that a correction of residuals that pass may change without another look [-]."""
 MAX_FORCE_RATIO = 1e6
 """Terms of forces over inertia forces and multipliers above which corrections are looked at as well [-]."""
 
@@ -42,7 +39,7 @@ def has_settled(moved: float, last: float, enough: float) -> bool:
         where there was none
     enough : what is small beside the error of the step [-]
     """
-    return moved <= max(RESIDUAL_CORRECTION_RTOL, enough) or (last > 0.0 and moved > 0.5 * last)
+    return moved <= max(HALF_PRECISION_RTOL, enough) or (last > 0.0 and moved > 0.5 * last)
 
 
 def excuses_much(K: Motion) -> bool:
@@ -96,7 +93,7 @@ def polish_rates(K: Balance, kept: float) -> None:
     """
     n = K.n
     before = 1e300
-    for _ in range(8 if kept < NEWTON_PIVOT_RTOL else 1):
+    for _ in range(8 if kept < HALF_PRECISION_RTOL else 1):
         find_imbalance(K)
         for i in range(n):
             K.rhs[i] = -K.out[i]
@@ -107,7 +104,7 @@ def polish_rates(K: Balance, kept: float) -> None:
             K.jump[i] += K.rhs[i]
             change = max(change, abs(K.rhs[i]))
             size = max(size, abs(K.jump[i]))
-        if change < CORRECTION_RTOL * size or change > 0.5 * before:
+        if change < EQUAL_RTOL * size or change > 0.5 * before:
             break
         before = change
 

@@ -10,8 +10,8 @@ step from any other at most; next to an end it has not. In space, without rows, 
 
 from __future__ import annotations
 
+from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.linear import solve_definite
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
 from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Guards, Switching
@@ -29,8 +29,6 @@ END_SHARE = 1.0 / 256.0
 """Part of a step at the end of larger accelerations, over which they are looked at for a rise [-]."""
 MIN_SQUARED_RISE = 16.0
 """Relative rise of squares of accelerations over a step, were it to go on, above which a pole may be near [-]."""
-NOT_FOUND = -1.0
-"""Of accelerations that cannot be found."""
 
 
 def peaks_within(K: Switching, h: float, at_y: int) -> bool:
@@ -42,7 +40,7 @@ def peaks_within(K: Switching, h: float, at_y: int) -> bool:
     width = 0.25  # between the places that are looked at: five, of which two ends
     first = pull_at(K, h, 0.0, at_y)
     last = pull_at(K, h, 1.0, at_y)
-    if first == NOT_FOUND or last == NOT_FOUND:
+    if first == NOT_CLEAR or last == NOT_CLEAR:
         return False
     ends = max(first, last)
     close = pull_at(K, h, END_SHARE if first >= last else 1.0 - END_SHARE, at_y)
@@ -52,14 +50,14 @@ def peaks_within(K: Switching, h: float, at_y: int) -> bool:
     if K.n_rows == 0 and K.n_frictions == 0 and not rises and 0.0 < K.stage_pull < MIN_RISE * MIN_RISE * ends:
         return False
     a0 = first
-    a2 = NOT_FOUND
+    a2 = NOT_CLEAR
     a4 = last
     for halving in range(12):
         a1 = pull_at(K, h, low + width, at_y)
-        if a2 == NOT_FOUND:
+        if a2 == NOT_CLEAR:
             a2 = pull_at(K, h, low + 2.0 * width, at_y)
         a3 = pull_at(K, h, low + 3.0 * width, at_y)
-        if a1 == NOT_FOUND or a2 == NOT_FOUND or a3 == NOT_FOUND:
+        if a1 == NOT_CLEAR or a2 == NOT_CLEAR or a3 == NOT_CLEAR:
             return False
         most = max(max(a1, a2), max(a3, max(a0, a4)))
         if most > MAX_RISE * MAX_RISE * ends:
@@ -83,7 +81,7 @@ def peaks_within(K: Switching, h: float, at_y: int) -> bool:
 
 
 def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
-    """v̇·M v̇ at a part of the way; as good as infinite where it is not finite, `NOT_FOUND` where it cannot be found."""
+    """v̇·M v̇ at a part of the way; as good as infinite where it is not finite, `NOT_CLEAR` where it cannot be found."""
     t = K.time + h * part
     fill_block(K, t, K.q, K.y)
     for i in range(K.n):
@@ -104,13 +102,13 @@ def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
     compose(K, K.q1)
     if free:
         quick = pull_without_rows(K, t)
-        if quick != NOT_FOUND:
+        if quick != NOT_CLEAR:
             return quick
     status = consistent(K, t, K.q1, K.y1)
     if status == NOT_FINITE:
         return 1e300
     if status != 0:
-        return NOT_FOUND
+        return NOT_CLEAR
     total = 0.0
     for i in range(K.n_v):
         for j in range(K.n_v):
@@ -119,7 +117,7 @@ def pull_at(K: Switching, h: float, part: float, at_y: int) -> float:
 
 
 def pull_without_rows(K: Balance, t: float) -> float:
-    """The same at (q1, y1) where nothing is held, ``−v̇·f``; `NOT_FOUND` where M is not clearly positive definite."""
+    """The same at (q1, y1) where nothing is held, ``−v̇·f``; `NOT_CLEAR` where M is not clearly positive definite."""
     n = K.n
     evaluate(K, t, K.q1, K.y1)
     finite = 0.0
@@ -127,9 +125,9 @@ def pull_without_rows(K: Balance, t: float) -> float:
         K.jump[i] = -K.acc[K.acc_f + i]
         finite += abs(K.jump[i])
     if not finite < 1e300:
-        return NOT_FOUND
+        return NOT_CLEAR
     if solve_definite(K.acc, n, K.jump, K.spare) < DIRECT_PIVOT_RTOL:
-        return NOT_FOUND
+        return NOT_CLEAR
     total = 0.0
     for i in range(K.n_v):
         total -= K.jump[i] * K.acc[K.acc_f + i]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.algebra.redundancy import find_dependence, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import ACCELERATIONS, COMPOSE, EPS, NOT_CONVERGED, SCALES
@@ -34,8 +35,6 @@ MAX_MAGNITUDE_RATIO = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
 MAX_ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
-LOAD_RTOL = 1e-6
-"""Relative change of the last of these above which there are no such multipliers: friction locks the motion [-]."""
 MAX_LOAD_ITERATIONS = 30
 """How often multipliers that friction follows are solved for again [-]."""
 
@@ -285,8 +284,8 @@ def consistent(K: Balance, t: float, q: Reals, y: Reals) -> int:
                 find_shares(K)
             load_accelerations(K)
             status = solve_rows(K, m, False)
-        if status == 0 and change > LOAD_RTOL:
-            K.failure_size = change / LOAD_RTOL
+        if status == 0 and change > NOMINAL_RTOL:
+            K.failure_size = change / NOMINAL_RTOL
             return NOT_CONVERGED
     if K.n_dropped > 0 and status == 0:
         minimum_norm_multipliers(K, K.impulse)

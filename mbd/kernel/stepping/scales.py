@@ -19,6 +19,7 @@ it only grows.
 
 from __future__ import annotations
 
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import ACCELERATIONS, SCALES
 from mbd.kernel.hooks import call
@@ -26,8 +27,6 @@ from mbd.kernel.records import Equations, Motion
 
 __all__ = ["FORCE_ULPS", "add_force_floors", "note_extent", "size_of", "still_energy", "still_speed"]
 
-REST_RTOL = 1e-12
-"""Way in a step over the size of a coordinate below which the coordinate is at rest [-]."""
 HORIZON_STEPS = 1000.0
 """Steps in which the least force that counts would move a coordinate by its own size [-]."""
 FORCE_ULPS = 4096.0
@@ -67,7 +66,7 @@ def size_of(K: Motion, i: int) -> float:
 
 def still_speed(K: Motion, i: int) -> float:
     """Speed of coordinate i at which it is at rest [m/s, rad/s]."""
-    return REST_RTOL * size_of(K, i) / K.dt
+    return ROUND_OFF_RTOL * size_of(K, i) / K.dt
 
 
 def still_energy(K: Motion) -> float:

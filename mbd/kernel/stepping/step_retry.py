@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.codes import (
     GAINED,
     LAST,
@@ -16,7 +17,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact.nonsmooth_cones import hold_all
 from mbd.kernel.records import Balance, Guards, Kernel, SchemeAbilities, State
-from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONG_PART, SECOND, SHORT_PART, STEP_RTOL, may_pair
+from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONG_PART, SECOND, SHORT_PART, may_pair
 from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
 from mbd.kernel.stepping.control import controlled_step
 from mbd.kernel.stepping.resolution import judge_change
@@ -94,7 +95,7 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
     else:
         status = judged_step(K, h, t1)
     if status == TOO_NEAR and may_pair(K, h):
-        if K.time + (SHORT_PART + LONG_PART) * step < K.until - STEP_RTOL * step:
+        if K.time + (SHORT_PART + LONG_PART) * step < K.until - NOMINAL_RTOL * step:
             h = SHORT_PART * step
             full = h
             K.paired_step = FIRST
@@ -146,7 +147,7 @@ def step_past_singularity(K: Kernel, unit: float) -> int:
     """
     h = singular_step_size(K, unit, K.longest_over)
     if h > unit:
-        if K.time + h > K.until - STEP_RTOL * unit:
+        if K.time + h > K.until - NOMINAL_RTOL * unit:
             if K.until >= K.end:
                 return LAST
             h = singular_step_size(K, unit, 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, NOMINAL_RTOL
 from mbd.kernel.codes import (
     EPS,
     GUARDS,
@@ -29,16 +30,10 @@ from mbd.kernel.stepping.restart import (
 
 __all__ = ["try_step", "turns"]
 
-RATE_RTOL = 1e-9
-"""Change of these rates, over the largest, at which they are what leads there [-]."""
 SLIP_RTOL = 256.0 * EPS
 """Part of the terms of γ below which it is round-off [-]."""
-MAX_FORCE_ERROR = 1e-6
-"""Part of the forces that a step may miss for it at most [-]."""
 MAX_ROW_RATE = 1e-2
 """Rate of a row at the end of a brief step, over the sum of its terms, above which it is another row [-]."""
-MAX_ROW_DRIFT = 1e-8
-"""Part of its terms that a row which was left out may be off in a step; less restarts the scheme with other rows."""
 
 
 def try_step(K: Kernel, h: float, t1: float) -> int:
@@ -97,7 +92,7 @@ def blur_of(K: Guards) -> float:
             least = 4.0 * K.hold[f] if K.hold[f] > 0.0 else 0.0
             speed = speed_of(K, f, K.guards0, K.at_slip) + least
             largest = max(largest, SLIP_RTOL * size / (speed + EPS * size))
-    return min(largest, MAX_FORCE_ERROR)
+    return min(largest, NOMINAL_RTOL)
 
 
 def share_multipliers(K: Balance, t1: float) -> int:
@@ -169,7 +164,7 @@ def settled(K: Balance) -> bool:
     for i in range(K.n):
         change = max(change, abs(K.jump[i] - K.rate1[i]))
         largest = max(largest, abs(K.jump[i]))
-    return change <= RATE_RTOL * largest
+    return change <= EQUAL_RTOL * largest
 
 
 def rows_turn_around(K: Motion) -> bool:
@@ -194,7 +189,7 @@ def departs(K: DependentRows) -> bool:
         if (
             K.dropped[k] == 1
             and K.row_level[k] == 0
-            and abs(K.acc[o_h + k]) > MAX_ROW_DRIFT * max(K.scale[K.n + k], 1e-3)
+            and abs(K.acc[o_h + k]) > HALF_PRECISION_RTOL * max(K.scale[K.n + k], 1e-3)
         ):
             return True
     return False

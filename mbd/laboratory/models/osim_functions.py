@@ -8,6 +8,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
+from mbd.equal import NOMINAL_RTOL
 from mbd.errors import ModelError
 from mbd.forces.samples import Samples
 from mbd.laboratory.models.xml import Element
@@ -16,8 +17,6 @@ __all__ = ["Curve", "Linear", "Polynomial", "Powers", "function_of", "has_corner
 
 MAX_ORDER = 12
 """Order of a polynomial of several coordinates that is read."""
-STRAIGHT_RTOL = 1e-6
-"""Part of the largest value by which points may be off a line that they lie on [-]."""
 FUNCTIONS = (
     "Constant", "LinearFunction", "PolynomialFunction", "SimmSpline", "NaturalCubicSpline", "natCubicSpline",
     "NatCubicSpline", "MultiplierFunction", "PiecewiseLinearFunction", "MultivariatePolynomialFunction",
@@ -150,7 +149,7 @@ def function_of(owner: Element, arguments: int, what: str) -> Linear | Polynomia
 def has_corners(x: Vector, y: Vector) -> bool:
     """Whether points do not lie on one line, but for the digits of a file."""
     line = y[0] + (y[-1] - y[0]) * (x - x[0]) / (x[-1] - x[0])
-    return bool(np.abs(y - line).max() > STRAIGHT_RTOL * np.abs(y).max())
+    return bool(np.abs(y - line).max() > NOMINAL_RTOL * np.abs(y).max())
 
 
 def _powers(function: Element, arguments: int, what: str) -> Powers:

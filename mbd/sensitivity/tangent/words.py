@@ -6,6 +6,7 @@ Numbers in K.starts: inputs of the last of Newton's matrices | W | the block of 
 
 from __future__ import annotations
 
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
@@ -14,12 +15,10 @@ __all__ = [
     "solution_place", "solve_plain", "step_place", "takes_part", "without_tangent",
 ]  # fmt: skip
 
-CORRECTION_RTOL = 1e-12
-"""Derivatives of a correction of rates, over the largest of the rates, at which they are those of the solution [-]."""
 MAX_CONTRACTION = 0.9
 """Part of the last correction of derivatives above which the next one is round-off [-]."""
 SAFETY = 0.1
-"""Part of `CORRECTION_RTOL` that a correction must be expected to stay below if it is not made [-]."""
+"""Part of `ROUND_OFF_RTOL` that a correction must be expected to stay below if it is not made [-]."""
 MAX_CORRECTIONS = 12
 """Corrections of derivatives with matrices that are not quite those of the solution [-]."""
 
@@ -29,9 +28,9 @@ def are_corrected(change: float, before: float, largest: float) -> bool:
 
     before : the last one; largest : of the rates
     """
-    if change <= CORRECTION_RTOL * largest or change > MAX_CONTRACTION * before:
+    if change <= ROUND_OFF_RTOL * largest or change > MAX_CONTRACTION * before:
         return True
-    return before < 1e300 and change * change <= SAFETY * CORRECTION_RTOL * largest * before
+    return before < 1e300 and change * change <= SAFETY * ROUND_OFF_RTOL * largest * before
 
 
 def is_differentiated() -> bool:

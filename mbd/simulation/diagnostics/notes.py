@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from mbd.assembly.doubtful import degrees
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.equations.equations import Contact
 from mbd.forces.muscles import Muscle
 from mbd.kernel.codes import PULL
@@ -40,10 +41,6 @@ HALVING_RATIO = 3.0
 
 UNRESOLVED_STEPS = 2.0
 """Steps of a penalty contact below which its impact is the scheme's, not the law's: the run's message says so [-]."""
-
-
-PENETRATION_ATOL = 1e-8
-"""Depth at which a contact may close that is no more than round-off of large coordinates [m, rad]."""
 
 
 MAX_IMPACTS = 8
@@ -139,7 +136,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
         notes += _ignored(run, number, contact)
-        if run.kernel.closing_gap[number] < -0.5 * PENETRATION_ATOL:
+        if run.kernel.closing_gap[number] < -0.5 * HALF_PRECISION_RTOL:
             notes += _overshot(run, columns, contact)
         notes += short
         if run.kernel.row_bounds[1 + number] > 0.0:
@@ -252,7 +249,7 @@ def _overshot(run: RunData, columns: ModelColumns, contact: Contact) -> list[str
         return []
     (gaps,) = columns.evaluate([contact.gap], columns.part(np.array(rows), [contact.gap]))
     worst = int(np.argmin(gaps))
-    if not gaps[worst] < -PENETRATION_ATOL:
+    if not gaps[worst] < -HALF_PRECISION_RTOL:
         return []
     return [
         f"{contact.name!r} closed {-gaps[worst]:.2g} {contact.unit} below its surface at t = "

@@ -6,7 +6,8 @@ import numpy as np
 
 from mbd.assembly.conflicts import Conflict, loops_of
 from mbd.assembly.infeasibility import position_conflicts
-from mbd.assembly.posture import RESIDUAL_RTOL, Posture, close_positions, position_rows
+from mbd.assembly.posture import Posture, close_positions, position_rows
+from mbd.equal import EQUAL_RTOL
 from mbd.kernel import codes
 from mbd.simulation.run.data import RunData
 
@@ -52,7 +53,7 @@ def _follows_time(run: RunData) -> bool:
     """Whether a row on positions that acts changes with time while nothing moves."""
     rows = position_rows(_posture(run, 0.0))
     off = [np.max(np.abs(_heights(_posture(run, ahead * run.dt), rows)), initial=0.0) for ahead in AHEAD]
-    return bool(rows) and bool(np.isfinite(off).all()) and max(off) > RESIDUAL_RTOL
+    return bool(rows) and bool(np.isfinite(off).all()) and max(off) > EQUAL_RTOL
 
 
 def _posture(run: RunData, ahead: float) -> Posture:
@@ -73,7 +74,7 @@ def _heights(work: Posture, rows: list[int]) -> np.ndarray:
 def _closes(run: RunData, ahead: float) -> bool:
     work = _posture(run, ahead)
     left = close_positions(work, position_rows(work), np.ones(work.equations.n_v, dtype=bool))
-    return bool(np.max(np.abs(left), initial=0.0) <= RESIDUAL_RTOL)
+    return bool(np.max(np.abs(left), initial=0.0) <= EQUAL_RTOL)
 
 
 def _conflict(run: RunData, ahead: float) -> Conflict | None:

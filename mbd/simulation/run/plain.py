@@ -10,11 +10,11 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector, read_only
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.equations.equations import Equations
 from mbd.equations.programs import ActiveSet, follows_multipliers, mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
-from mbd.kernel.algebra.ordered import DIRECT_PIVOT_RTOL
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel

@@ -21,6 +21,7 @@ from time import perf_counter
 
 import numpy as np
 
+from mbd.equal import SMALL_SUM_RTOL
 from mbd.results.driving import own_share
 from mbd.simulation.tolerance.comparison import Gap, gap
 from mbd.simulation.tolerance.trials import Trial, is_rounding, least_error, rounding, same_steps
@@ -41,8 +42,6 @@ LOOSEN_SHARE = 0.15
 """Estimated error over the tolerance below which a looser run is tried [-]."""
 SAME_STEPS_REFINEMENT = 1e3
 """How much finer the next run is where two runs took the same steps [-]."""
-ROUND_OFF = 1e-14
-"""Difference of two runs that is no more than round-off [m, rad]."""
 ERROR_FLOOR = 1e-6
 """Errors over the tolerance below which they do not tell runs apart [-]."""
 MAX_REFINEMENT = 1e4
@@ -91,7 +90,7 @@ class Search:
 
     def why_better(self, trials: Sequence[Trial], best: Trial) -> str:
         """Why no looser run is worth trying, or ''."""
-        rounded = best.error == 0.0 or best.gap is None or best.gap.size <= ROUND_OFF
+        rounded = best.error == 0.0 or best.gap is None or best.gap.size <= SMALL_SUM_RTOL
         if rounded and not self.names:  # results that are named may be so because of coordinates that are not
             return "errors are round-off whatever the steps"
         looser = [trial for trial in trials if trial.allowed > best.allowed]
@@ -181,7 +180,7 @@ class Search:
             or not np.isfinite([near[0].error, near[1].error]).all()
         ):
             return self.power
-        if min(near[0].error, near[1].error) <= 10.0 * ROUND_OFF:
+        if min(near[0].error, near[1].error) <= 10.0 * SMALL_SUM_RTOL:
             return self.power
         seen = np.log(near[1].error / near[0].error) / np.log(near[1].allowed / near[0].allowed)
         return float(min(max(seen, LEAST_ORDER * self.power), MOST_ORDER * self.power))
