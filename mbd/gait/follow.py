@@ -18,7 +18,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import GaitError, MbdError, ModelError, UnknownNameError, nearest
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.derivatives import parameter_value
-from mbd.gait.exact_derivative import DIFFERENCE_STEP
 from mbd.gait.limits import changed_events, limit_between
 from mbd.gait.margins import least_margins, watched_feet
 from mbd.gait.special_points import TESTS, SpecialPoint, polished
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PointCurve", "follow"]
 
+DIFFERENCE_STEP = 0.001
+"""Distance along the tangent at which a test function is asked for a second time [-]."""
 LIMIT_DISTANCE = 0.02
 """Distance before a limit of events from which it is looked for [-]."""
 SECANTS, LOCATED = 12, 1e-12
