@@ -20,6 +20,8 @@ DOUBTFUL_START, NEEDS_PYTHON = 40, 41
     CROSS_BRIEF, CROSS_BACK,
 ) = range(13)  # fmt: skip
 """Kinds of fired guards."""
+ALWAYS, BY_MEASURE = -1, -2
+"""When a contact is watched, in place of the number of another one while which is closed."""
 LOG_CLOSED, LOG_OPENED, LOG_EVENT, LOG_STUCK, LOG_SLIPPED, LOG_PUSHED = range(6)
 """Kinds in the log."""
 NOT_KNOWN_YET = -9

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from itertools import accumulate, chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.equations.equations import Contact, Equations, Guard
+from mbd.kernel.codes import ALWAYS, BY_MEASURE
 from mbd.state import Mode
 
 __all__ = ["ActiveSetManager", "ContactTables"]
@@ -111,18 +113,13 @@ class ActiveSetManager:
         """Rules as arrays; see `mbd.kernel.records`."""
         number = {contact.name: c for c, contact in enumerate(self.contacts)}
         opens = {"pull": 0, "gap": 1, "when": 2}
-        starts, targets, afters = [0], [], []
-        anchors = [self._first_anchor]
-        while_kind, while_target = [], []
+        anchors, watched_by = [self._first_anchor], []
         for contact in self.contacts:
-            for other, after in contact.when:
-                targets.append(number[other])
-                afters.append(int(after))
-            starts.append(len(targets))
             anchors.append(anchors[-1] + len(contact.anchors))
             named = isinstance(contact.only_while, str)
-            while_kind.append(0 if contact.only_while is None else 1 if named else 2)
-            while_target.append(number[str(contact.only_while)] if named else -1)
+            watched_by.append(
+                number[str(contact.only_while)] if named else ALWAYS if contact.only_while is None else BY_MEASURE
+            )
         normals = [contact.rows[0] if contact.rows else -1 for contact in self.contacts]
         integers = {
             "row_contact": self._row_contact, "row_level": self._row_level, "row_friction": self._row_friction,
@@ -133,8 +130,8 @@ class ActiveSetManager:
             "row_trivial": [int(k in self.trivial) for k in range(len(self._row_contact))],
             "kind": [int(contact.kind == "penalty") for contact in self.contacts],
             "opens": [opens[contact.opens_on] for contact in self.contacts],
-            "normal": normals, "when_start": starts, "when_target": targets, "when_after": afters,
-            "while_kind": while_kind, "while_target": while_target, "anchor_start": anchors,
+            "normal": normals, "watched_by": watched_by, "anchor_start": anchors,
+            "when": _lists([[2 * number[other] + after for other, after in each.when] for each in self.contacts]),
             "direction": [guard.direction for guard in self.guards], **self._transitions(),
             "impulse_contact": [each.contact for each in self.impulses],
             "impulse_order": [each.order for each in self.impulses],
@@ -147,19 +144,12 @@ class ActiveSetManager:
         """The transitions of machines as the kernel's tables, by guards."""
         n_c, n_g = len(self.contacts), len(self.guards)
         begin = {"closed": 0, "opened": n_c, "event": 2 * n_c, "taken": 2 * n_c + n_g}
-        causes, cause_starts, stored, store_starts = list[int](), [0], list[int](), [0]
-        for guard in self.guards:
-            each = guard.transition
-            causes += [] if each is None else [begin[kind] + number for kind, number in each.causes]
-            stored += [] if each is None else each.stored
-            cause_starts.append(len(causes))
-            store_starts.append(len(stored))
-        releases, release_starts = list[int](), [0]
-        for contact in self.contacts:
-            for name in contact.released_in:
-                releases += [begin["taken"] + e for e in self.instants.get(name, ())]
-            release_starts.append(len(releases))
         own = [(e, guard.transition) for e, guard in enumerate(self.guards)]
+        causes = [[] if each is None else [begin[kind] + k for kind, k in each.causes] for _, each in own]
+        releases = [
+            [begin["taken"] + e for name in contact.released_in for e in self.instants.get(name, ())]
+            for contact in self.contacts
+        ]
         return {
             "machine_start": [machine.anchors[0] for machine in self.machines],
             "guard_machine": [-1 if each is None else each.machine for _, each in own],
@@ -169,6 +159,12 @@ class ActiveSetManager:
             "guard_timed": [0 if each is None else 2 * self.guards[e].is_timer + each.timed for e, each in own],
             "guard_kink": [int(guard.is_kink) for guard in self.guards],
             "guard_contact": [-1 if each is None else each.contact for _, each in own],
-            "release_start": release_starts, "release_mark": releases,
-            "cause_start": cause_starts, "cause_mark": causes, "store_start": store_starts, "store_anchor": stored,
+            "releases": _lists(releases), "causes": _lists(causes),
+            "stores": _lists([[] if each is None else each.stored for _, each in own]),
         }  # fmt: skip
+
+
+def _lists(lists: Sequence[Sequence[int]]) -> list[int]:
+    """Lists side by side, behind the places at which each begins and the last ends."""
+    starts = accumulate(map(len, lists), initial=len(lists) + 1)
+    return [*starts, *chain.from_iterable(lists)]

@@ -10,6 +10,8 @@ from __future__ import annotations
 from mbd.equal import NOMINAL_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import (
+    ALWAYS,
+    BY_MEASURE,
     CLOSE,
     CROSS,
     CROSS_BACK,
@@ -89,11 +91,10 @@ def is_waiting(K: Guards, e: int) -> bool:
 
 def is_watched(K: Contacts, c: int, values: Reals) -> bool:
     """Whether an open contact may close."""
-    if K.while_kind[c] == 0:
-        return True
-    if K.while_kind[c] == 1:
-        return bool(K.closed[K.while_target[c]] == 1)
-    return bool(values[K.at_condition + c] > 0.0)
+    other = K.watched_by[c]
+    if other >= 0:
+        return bool(K.closed[other] == 1)
+    return bool(other == ALWAYS or values[K.at_condition + c] > 0.0)
 
 
 def gap_scale(K: ContactRows, c: int) -> float:
@@ -127,7 +128,7 @@ def update_armed(K: Guards) -> None:
                 K.armed[c] = -1
             elif K.armed[c] == -1:
                 near = 1e-10 * gap_scale(K, c)
-                sinks = K.while_kind[c] == 2 and K.guards0[K.at_gap_rate + c] < -1e-9
+                sinks = K.watched_by[c] == BY_MEASURE and K.guards0[K.at_gap_rate + c] < -1e-9
                 K.armed[c] = 1 if K.guards0[c] > near or (K.guards0[c] >= -near and not sinks) else 0
             elif K.armed[c] == 0 and K.guards0[c] > 1e-8 * gap_scale(K, c):
                 K.armed[c] = 1
@@ -173,7 +174,7 @@ def is_quiet(K: Guards) -> bool:
     if K.n_guards + K.n_frictions > 0:
         return False
     for c in range(K.n_contacts):
-        if K.closed[c] != 0 or K.armed[c] != 1 or K.while_kind[c] != 0:
+        if K.closed[c] != 0 or K.armed[c] != 1 or K.watched_by[c] != ALWAYS:
             return False
         if not (K.guards0[c] > NOMINAL_RTOL and K.guards1[c] > NOMINAL_RTOL):
             return False
@@ -257,7 +258,7 @@ def rises(g0: float, g1: float, d0: float, d1: float, lost: float, reach: float)
 def begins_to_be_watched(K: Switching, c: int, h: float) -> bool:
     """Whether the measure that contact c is watched by has risen through zero, by more than its round-off."""
     place = K.at_condition + c
-    if K.while_kind[c] != 2 or not K.guards0[place] <= 0.0 < K.guards1[place]:
+    if K.watched_by[c] != BY_MEASURE or not K.guards0[place] <= 0.0 < K.guards1[place]:
         return False
     return bool(K.guards1[place] > condition_round_off(K, c, K.time + h, K.q1, K.y1))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.equal import INSTANT_RTOL, NOMINAL_RTOL
 from mbd.kernel.codes import (
+    BY_MEASURE,
     CLOSE,
     CROSS,
     CROSS_BACK,
@@ -245,7 +246,7 @@ def left_alone(K: Guards, c: int) -> bool:
     """Whether contact c is not watched at the candidate; a condition that ends at the same instant has ended."""
     if not is_watched(K, c, K.guards1):
         return True
-    if K.while_kind[c] != 2:
+    if K.watched_by[c] != BY_MEASURE:
         return False
     place = K.at_condition + c
     change = abs(K.guards0[place] - K.guards1[place])

@@ -62,9 +62,8 @@ def release_for(K: Switching, after: int) -> None:
     """Open the contacts whose rule names one that closes now."""
     for c in range(K.n_contacts):
         if K.closed[c] == 1:
-            for place in range(K.when_start[c], K.when_start[c + 1]):
-                target = K.when_target[place]
-                if K.when_after[place] == after and K.closing[target] == 1:
+            for place in range(K.when[c], K.when[c + 1]):
+                if K.when[place] % 2 == after and K.closing[K.when[place] // 2] == 1:
                     K.closed[c] = 0
                     K.armed[c] = 0
                     log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)

@@ -60,8 +60,8 @@ def is_allowed(K: Guards, e: int) -> bool:
 def has_cause(K: Events, e: int) -> bool:
     """Whether something has happened that causes transition e."""
     found = False
-    for place in range(K.cause_start[e], K.cause_start[e + 1]):
-        found = found or K.happened[K.cause_mark[place]] == 1
+    for place in range(K.causes[e], K.causes[e + 1]):
+        found = found or K.happened[K.causes[place]] == 1
     return found
 
 
@@ -123,8 +123,8 @@ def store_taken(K: Switching) -> None:
         if e < 0:
             continue
         K.failure_index = e
-        for place in range(K.store_start[e], K.store_start[e + 1]):
-            K.anchors[K.store_anchor[place]] = K.acc[K.acc_captured + K.store_anchor[place]]
+        for place in range(K.stores[e], K.stores[e + 1]):
+            K.anchors[K.stores[place]] = K.acc[K.acc_captured + K.stores[place]]
         K.anchors[K.machine_start[m]] = float(K.guard_target[e])
         if K.guard_fires[e] == 0:
             log_event(K, LOG_EVENT, e, 0.0, NO_IMPULSE)
@@ -140,8 +140,8 @@ def store_taken(K: Switching) -> None:
 def open_released(K: Switching) -> None:
     """Open the contacts whose rule names a state that is entered now."""
     for c in range(K.n_contacts):
-        for place in range(K.release_start[c], K.release_start[c + 1]):
-            if K.closed[c] == 1 and K.happened[K.release_mark[place]] == 1:
+        for place in range(K.releases[c], K.releases[c + 1]):
+            if K.closed[c] == 1 and K.happened[K.releases[place]] == 1:
                 K.closed[c] = 0
                 K.armed[c] = 0
                 log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)

@@ -15,11 +15,8 @@ class Contacts(SchemeAbilities):
     kind: Integers = integers()  # 0 unilateral, 1 penalty
     opens: Integers = integers()  # 0 on pull, 1 on gap, 2 by When
     normal: Integers = integers()  # normal row
-    when_start: Integers = integers()  # who opens it
-    when_target: Integers = integers()
-    when_after: Integers = integers()
-    while_kind: Integers = integers()  # 0 always, 1 while a contact is closed, 2 while a measure is positive
-    while_target: Integers = integers()
+    when: Integers = integers()  # twice the contacts that open each, + 1 where they do after the impact
+    watched_by: Integers = integers()  # the contact while which is closed each is watched, `ALWAYS` or `BY_MEASURE`
     anchor_start: Integers = integers()
     restitution: Reals = reals()
     impulse_contact: Integers = integers()  # whose closing an impulse of the user waits for
@@ -83,12 +80,9 @@ class Events(SchemeAbilities):
     guard_timed: Integers = integers()  # 1: by after=, + 2: its instant is known, and a step ends there
     guard_kink: Integers = integers()  # 1: a step ends at it, and nothing tells of it
     guard_contact: Integers = integers()  # that must be closed for it, −1 for none
-    cause_start: Integers = integers()  # what makes a transition happen
-    cause_mark: Integers = integers()
-    release_start: Integers = integers()  # transitions that open each contact
-    release_mark: Integers = integers()
-    store_start: Integers = integers()  # anchors that are stored with it
-    store_anchor: Integers = integers()
+    causes: Integers = integers()  # of each transition, a list of marks that make it happen
+    releases: Integers = integers()  # of each contact, a list of transitions that open it
+    stores: Integers = integers()  # of each transition, a list of anchors that are stored with it
     happened: Integers = integers(lambda s: s.n_marks, kept=True)  # contacts closed, opened, guards crossed, taken
     fresh: Integers = integers(lambda s: s.n_guards, kept=True)  # 1: its side follows from where it is after a restart
     taken: Integers = integers(lambda s: s.n_machines)  # the transition that each machine takes

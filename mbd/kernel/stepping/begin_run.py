@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.codes import ACCELERATIONS, DOUBTFUL_START, GUARDS, SCALES
 from mbd.kernel.events.guard_round_off import guard_round_off
+from mbd.kernel.events.guards import is_watched
 from mbd.kernel.events.transitions import begins_now
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Guards, Kernel, Mechanism, Switching
@@ -104,12 +105,7 @@ def holds_its_rows(K: Mechanism) -> bool:
 def touch(K: Guards) -> bool:
     """Note which contacts touch at the start; False where one that is open lies inside its surface."""
     for c in range(K.n_contacts):
-        watched = True
-        if K.while_kind[c] == 1:
-            watched = K.closed[K.while_target[c]] == 1
-        elif K.while_kind[c] == 2:
-            watched = K.guards1[K.at_condition + c] > 0.0
-        ready = K.armed[c] == 1 and watched
+        ready = K.armed[c] == 1 and is_watched(K, c, K.guards1)
         near = abs(K.guards1[c]) <= CLOSE and abs(K.guards1[K.at_gap_rate + c]) <= SLOW
         for k in range(K.n_rows):
             if K.row_contact[k] == c and K.row_friction[k] < 0:

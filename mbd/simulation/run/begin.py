@@ -13,6 +13,7 @@ from mbd.assembly.machines import first_anchors, store_first
 from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture
 from mbd.errors import ModelError
+from mbd.kernel.events.guards import is_watched
 from mbd.kernel.stepping.begin_run import MAX_START_DEPTH
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.memory import memory_of_end
@@ -113,9 +114,7 @@ def _touch(run: RunData, start: State, guards: Vector) -> list[str]:
     rates = run.mechanism.acceleration_terms(start.time, start.q, v.y[: v.n], v.params, v.anchors[: v.n_anchors]).rate
     for c in range(n_contacts):
         close, slow = abs(guards[c]) <= 1e-8, abs(guards[n_contacts + c]) <= 1e-9
-        target = v.while_target[c]
-        watched = (True, v.closed[target] == 1, guards[3 * n_contacts + c] > 0.0)[v.while_kind[c]]
-        ready = v.armed[c] == 1 and watched
+        ready = v.armed[c] == 1 and is_watched(v, c, guards)
         held = [row for row in run.manager.contacts[c].rows if run.mechanism.equations.rows[row].friction < 0]
         still = all(abs(rates[row]) <= 1e-9 for row in held)
         v.touched[c] = int(ready and v.kind[c] == 0 and close and slow and still)
