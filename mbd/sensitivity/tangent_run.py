@@ -90,6 +90,10 @@ class TangentStepper(Stepper):
         bases = np.array([*(room.ctypes.data for room in self.rooms), 0])
         self._words[BOUND] = bases[plan.shelf] + LANES * plan.offset
 
+    @property
+    def size(self) -> int:
+        return super().size + sum(room.size for room in self.rooms)
+
     def begin_again(self, parameters: Vector, end: float) -> None:
         super().begin_again(parameters, end)
         for room in self._cleared:

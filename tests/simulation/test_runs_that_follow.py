@@ -7,6 +7,7 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
+from mbd.simulation.run import stepper
 from mbd.simulation.run.begin import guard_values, require_consistent, set_side
 from mbd.simulation.simulate import REST_SPEED, laid_out
 from mbd.testing.mechanisms import random_scene
@@ -62,6 +63,19 @@ def test_arrays_are_taken_and_given_back():
     mbd.simulate(model, start, dt=1e-3, until=0.01, parameters={"hip.mass": 0.6})
     mbd.simulate(model, start, dt=2e-3, until=0.01)  # of another kind
     assert left in idle.values() and len(idle) == 2
+
+
+def test_arrays_that_are_kept_have_no_more_numbers_than_their_limit_with_those_of_derivatives(monkeypatch):
+    model = kneed_walker()
+    start, idle = kneed_walker_start(model), mechanism_of(model).idle
+    idle.clear()
+    mbd.simulate(model, start, dt=1e-3, until=0.01)
+    (left,) = idle.values()
+    monkeypatch.setattr(stepper, "MAX_IDLE_SIZE", 2 * left.size)
+    mbd.simulate(model, start, dt=1e-3, until=0.01)
+    assert list(idle.values()) == [left]
+    mbd.simulate(model, start, dt=1e-3, until=0.01, wrt=["gravity.x"])
+    assert list(idle.values()) == [left]
 
 
 def test_a_run_within_a_run_has_arrays_of_its_own():

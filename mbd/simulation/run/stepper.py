@@ -59,14 +59,10 @@ def follows(equations: Equations) -> int:
 
 
 class InitialArrays:
-    """The record and the arrays of a stepper before a run, of which only numbers other than 0 are kept.
-
-    size : how many numbers the arrays have
-    """
+    """The record and the arrays of a stepper before a run, of which only numbers other than 0 are kept."""
 
     def __init__(self, kernel: Kernel, rooms: list[Any]) -> None:
-        self.size = sum(map(len, rooms))
-        if self.size <= MAX_IDLE_SIZE:
+        if sum(map(len, rooms)) <= MAX_IDLE_SIZE:
             self._values = dict(vars(kernel))
             self._places = [np.flatnonzero(room) for room in rooms]
             self._numbers = [room[places] for room, places in zip(rooms, self._places, strict=True)]
@@ -141,7 +137,12 @@ class Stepper:
     @property
     def max_idle(self) -> int:
         """How many steppers of this size are kept for other runs; 0 where arrays cannot be made as they were."""
-        return 0 if self._fresh is None else min(8, MAX_IDLE_SIZE // self._fresh.size)
+        return 0 if self._fresh is None else min(8, MAX_IDLE_SIZE // self.size)
+
+    @property
+    def size(self) -> int:
+        """How many numbers its arrays have."""
+        return sum(map(len, self.shelves.rooms))
 
     def begin_again(self, parameters: Vector, end: float) -> None:
         """Make everything as it was before the run that is over, but for parameters and the end of the next one."""
