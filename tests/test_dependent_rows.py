@@ -8,6 +8,7 @@ from hypothesis import given, strategies as st
 
 from mbd.assembly.conflicts import Member, irreducible, linear_conflict, solvable
 from mbd.assembly.dependence import dependences, rank_of
+from tests.comparisons import at_least, compared
 
 
 @st.composite
@@ -32,10 +33,12 @@ def test_as_many_rows_are_named_as_the_rank_lacks_in_any_order(made):
         assert len(found) == len(B) - rank
 
 
+@at_least(4)
 @given(deficient())
 def test_a_dependent_row_is_the_combination_that_is_told(made):
     B, _, _ = made
     for row in dependences(B, titles(B)):
+        compared()
         combined = sum(c * B[k] for k, (_, c) in zip(row.numbers, row.on, strict=True))
         np.testing.assert_allclose(combined, B[row.number], atol=1e-8 * np.abs(B[row.number]).max())
         assert all(k < row.number for k in row.numbers)

@@ -77,7 +77,7 @@ def test_what_it_cannot_do_is_refused_by_its_name():
 
 @pytest.mark.parametrize("scheme", [Midpoint(), BDF2()], ids=repr)
 def test_a_listed_scheme_steps_any_system(scheme):
-    check_integrator(scheme, halvings=3)
+    assert sum(check_integrator(scheme, halvings=3).laws.values()) > 20
 
 
 def test_an_integrator_that_names_no_scheme_is_told_to():

@@ -394,6 +394,7 @@ def test_plain_python_and_machine_code_agree():
     motion, _ = random_motion(body.joints, np.random.default_rng(5), 2)
     fast = mbd.inverse_dynamics(model, motion)
     slow = mbd.inverse_dynamics(model, motion, backend="python")
+    assert len(fast._own) > 20 and slow._own.keys() == fast._own.keys()
     for name in fast._own:
         assert slow._own[name] == pytest.approx(fast._own[name], rel=1e-11, abs=1e-11)
 

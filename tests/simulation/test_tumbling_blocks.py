@@ -41,7 +41,7 @@ def test_a_block_with_friction_tumbles_to_the_end_whatever_the_step(seed):
     """Where sliding comes to rest the direction is held for a whole step: in parts of it nothing came to rest."""
     model, start, dt = block(seed)
     if model.contacts[0].friction is None:  # may have no motion: it pulls, or sinks in
-        return
+        pytest.skip("of blocks without friction")
     runs = [mbd.simulate(model, start, mbd.RadauIIA(), dt=part * dt, until=0.62) for part in (1.0, 0.9)]
     for run in runs:
         total = run.energy.total

@@ -154,13 +154,11 @@ def test_a_file_of_chosen_names_draws_what_it_has(tmp_path):
     loaded.page(tmp_path / "page.html")
 
 
-@pytest.mark.parametrize("op", [*UNARY, *BINARY])
+@pytest.mark.parametrize("op", [op for op in (*UNARY, *BINARY) if op not in ("lt", "le", "and", "or", "not")])
 def test_numbers_of_arrays_are_those_of_single_numbers(op):
     tape = Tape()
     x, y = tape.input("q", 0), tape.input("q", 1)
     node = tape.unary(op, x) if op in UNARY else tape.binary(op, x, y)
-    if op in ("lt", "le", "and", "or", "not"):
-        return
     a, b = np.array([0.3, -0.7, 0.0, 2.5, -1.0]), np.array([0.2, 1.0, -0.4, 2.5, 3.0])
     found = evaluate_arrays(node, {("q", 0): a, ("q", 1): b})
     single = [evaluate([node], {("q", 0): p, ("q", 1): q})[0] for p, q in zip(a, b, strict=True)]
