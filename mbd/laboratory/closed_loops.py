@@ -13,6 +13,7 @@ from mbd.compile.backend import Function
 from mbd.compile.many import at_inputs
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL
 from mbd.equations.equations import Equations
 from mbd.equations.programs import constraint_terms
 from mbd.errors import ModelError
@@ -20,8 +21,6 @@ from mbd.laboratory.least_norm import left_inverses
 
 __all__ = ["ClosedFrames", "close_loops", "refuse_open_loops"]
 
-RESIDUAL_RTOL = 1e-11
-"""Residual of rows up to which coordinates that were not given are completed, over the largest row [-]."""
 MAX_CORRECTIONS = 30
 """Newton corrections of a frame."""
 MAX_SWEEPS = 6
@@ -90,7 +89,7 @@ class _Rows:
             q[left], size = self.step(time[left], q[left], v[left])
             if self.inverse is not None:
                 break  # what the rows determine enters them linearly
-            left = left[~(size <= RESIDUAL_RTOL * np.maximum(1.0, np.abs(q[left]).max(axis=1)))]
+            left = left[~(size <= EQUAL_RTOL * np.maximum(1.0, np.abs(q[left]).max(axis=1)))]
             if not len(left):
                 break
         return q
@@ -150,7 +149,7 @@ def _follow(rows: _Rows, time: Vector, q: Matrix, v: Matrix) -> None:
         away = np.abs(guess - q[right:]).max(axis=1)
         tried, _ = rows.step(time[right:], guess.copy(), v[right:])
         size = np.maximum(1.0, np.abs(q[right:]).max(axis=1))
-        same = np.abs(tried - q[right:]).max(axis=1) <= MAX_CONTRACTION * away + 1e3 * RESIDUAL_RTOL * size
+        same = np.abs(tried - q[right:]).max(axis=1) <= MAX_CONTRACTION * away + HALF_PRECISION_RTOL * size
         if same.all():
             return
         first = int(np.argmin(same))
@@ -201,7 +200,7 @@ def refuse_open_loops(frames: ClosedFrames, equations: Equations, time: Vector, 
         with the first such frame and its row.
     """
     size = np.maximum(1.0, np.abs(frames.q).max(axis=1, initial=0.0))
-    open_rows = ~(frames.off.max(axis=1, initial=0.0) <= 1e3 * RESIDUAL_RTOL * size)
+    open_rows = ~(frames.off.max(axis=1, initial=0.0) <= HALF_PRECISION_RTOL * size)
     if not open_rows.any():
         return
     k = int(np.argmax(open_rows))

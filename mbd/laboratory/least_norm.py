@@ -7,12 +7,9 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-from mbd.equal import RANK_RTOL
+from mbd.equal import HALF_PRECISION_RTOL, RANK_RTOL
 
 __all__ = ["Balanced", "balanced", "left_inverses"]
-
-MAX_CONDITION = 1e6
-"""Product of the largest elements of a triangle and of its inverse up to which its rank is beyond doubt [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +80,7 @@ def left_inverses(matrices: NDArray[np.float64]) -> NDArray[np.float64] | None:
         return None
     inverse = np.linalg.inv(U)
     sizes = np.abs(U).max(axis=(1, 2)) * np.abs(inverse).max(axis=(1, 2))
-    return np.asarray(inverse @ Q.transpose(0, 2, 1)) if np.all(sizes < MAX_CONDITION) else None
+    return np.asarray(inverse @ Q.transpose(0, 2, 1)) if np.all(sizes * HALF_PRECISION_RTOL < 1.0) else None
 
 
 def _inverse(matrices: NDArray[np.float64], scale: Vector) -> tuple[NDArray[np.float64], NDArray[np.intp]]:

@@ -17,6 +17,7 @@ from mbd.bodies.scope import Scope
 from mbd.bodies.values import is_number, named_number_faults, number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Action, Force, Result
 from mbd.forces.muscles import Muscle
@@ -32,9 +33,6 @@ from mbd.results.tables import library
 from mbd.tape.derivatives import gradient
 
 __all__ = ["MuscleForces", "muscle_forces"]
-
-MIN_MOMENT = 1e-9
-"""Moment of all muscles together about a coordinate below which they do not act there [N m]."""
 
 
 class MuscleForces:
@@ -167,7 +165,8 @@ def muscle_forces(
     crossed = _crossed(bare, acting, moments, parameters or {})
     arms, strength, passive, length = crossed.arms, crossed.strength, crossed.passive, crossed.length
     driven = moments.driven
-    about = np.flatnonzero(driven & (np.abs(arms * strength[:, np.newaxis]).sum(axis=2).max(axis=0) > MIN_MOMENT))
+    together = np.abs(arms * strength[:, np.newaxis]).sum(axis=2).max(axis=0)
+    about = np.flatnonzero(driven & (together > ROUND_OFF_RTOL * together.max(initial=0.0)))
     if not len(about):
         raise ModelError("the muscles act about no driven coordinate of the model; check their paths, or joints=")
     wanted = moments.effort[:, about] - np.einsum("kjm,km->kj", arms[:, about], passive)

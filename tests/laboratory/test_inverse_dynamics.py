@@ -233,10 +233,12 @@ def test_the_angle_of_the_crank_alone_determines_a_loop():
     assert any("follow from the closed loops" in note for note in found.notes)
 
 
-def test_a_loop_follows_its_branch_at_all_frames_at_once(monkeypatch):
-    """What one frame after another gives, over two turns of the crank."""
+@pytest.mark.parametrize("sweeps", [6, 0])
+def test_a_loop_follows_its_branch_at_all_frames_at_once(monkeypatch, sweeps):
+    """What one frame after another gives, over two turns of the crank, however often all are tried at once."""
     import mbd.laboratory.closed_loops as loops
 
+    monkeypatch.setattr(loops, "MAX_SWEEPS", sweeps)
     time_ = np.linspace(0.0, 4.0, 161)
     motion = {"time": time_, "drive.angle": math.pi * time_ + 0.3 * np.sin(4.0 * time_)}
     sequential, at_once = [], []

@@ -66,18 +66,17 @@ def test_postures_are_those_of_least_squares():
         seen = np.column_stack([recording.markers[name][k] for name in names]).T.ravel()
         own = np.where(np.isnan(seen), 0.0, w)
 
-        def problem(x, base, seen=seen, own=own):
+        def problem(x, base=q[k], seen=seen, own=own):
             y, J = program.at_all(np.zeros(1), whole.compose(base, x)[None], mechanism.parameters())
             return own * (y[0] - np.nan_to_num(seen)), own[:, None] * J[0]
 
-        place, zero = q[k], np.zeros(mechanism.layout.n_v)
-        for _ in range(3):  # the derivatives by increments are exact where these are small
-            best = least_squares(
-                lambda x, base=place: problem(x, base)[0], zero, lambda x, base=place: problem(x, base)[1],
-                xtol=1e-15, ftol=1e-15, gtol=1e-15,
-            )  # fmt: skip
-            place = whole.compose(place, best.x)
-        assert np.abs(whole.difference(place, found.run.record.q[k])).max() < 1e-9
+        zero = np.zeros(mechanism.layout.n_v)
+        best = least_squares(lambda x: problem(x)[0], zero, lambda x: problem(x)[1], xtol=1e-15, ftol=1e-15)
+        place = whole.compose(q[k], best.x)
+        for _ in range(6):  # steps so small that sums of squares do not tell them apart
+            r, J = problem(zero, place)
+            place = whole.compose(place, np.linalg.lstsq(J, -r, rcond=None)[0])
+        assert np.abs(whole.difference(place, found.run.record.q[k])).max() < 1e-10
         y, J = program.at_all(np.zeros(1), found.run.record.q[k][None], mechanism.parameters())
         slope = (own[:, None] * J[0]).T @ (own * (y[0] - np.nan_to_num(seen)))
         bend = (own[:, None] * J[0]).T @ (own[:, None] * J[0])

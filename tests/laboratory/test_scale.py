@@ -31,6 +31,18 @@ def test_segments_have_the_lengths_that_markers_show(caplog):
     assert "'right thigh' as 'left thigh'" in said and "'head' by the mean" in said
 
 
+@pytest.mark.parametrize("scatter", [0.005, 0.05])
+def test_markers_that_do_not_keep_their_distance_are_doubted(scatter, recwarn):
+    hip = np.tile([0.0, 0.9, -0.1], (40, 1))
+    knee = hip - np.outer(0.41 + scatter * (-1.0) ** np.arange(40), [0.0, 1.0, 0.0])
+    static = mbd.Recording(np.arange(40) / 100.0, {"LHIP": hip, "LKNE": knee})
+    mbd.scale(mbd.human(75.0, 1.80), {"left thigh": ("LHIP", "LKNE")}, static)
+    told = [
+        str(each.message) for each in recwarn if "varies by 50 mm; do both lie on the left thigh" in str(each.message)
+    ]
+    assert len(told) == (scatter > 0.02) and not any("varies by 5 mm" in str(each.message) for each in recwarn)
+
+
 def test_masses_are_shared_as_before_and_inertia_follows():
     person = mbd.human(75.0, 1.80)
     patient = mbd.scale(person, {"left shank": 1.1 * person.bodies["left shank"].length}, mass=90.0)

@@ -33,8 +33,6 @@ CURVES = {
     "Schutte1993Muscle_Deprecated": "de groote", "Delp1990Muscle_Deprecated": "de groote",
 }  # fmt: skip
 """Curves that stand for those of each kind of muscle."""
-DEFAULT_MAX_VELOCITY = 10.0
-"""Largest velocity of fibers that is taken where a file has none [1/s]."""
 SAME = ("DeGrooteFregly2016Muscle", "Millard2012EquilibriumMuscle")
 """Kinds whose curves these are; those of others are taken as De Groote's, and said."""
 
@@ -93,7 +91,7 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
         report.approximated.append(f"curves of De Groote and Fregly stand for others: {listed(others)}")
     if slow:
         report.approximated.append(
-            f"velocity of fibers, of which there is none, as {DEFAULT_MAX_VELOCITY:g} 1/s: {listed(slow)}"
+            f"velocity of fibers, of which there is none, as {Muscle.max_velocity:g} 1/s: {listed(slow)}"
         )
     if pathless:
         report.left_out.append(f"muscles without a <GeometryPath>: {listed(pathless)}")
@@ -110,10 +108,10 @@ def _muscle(file: OsimFile, element: Element, name: str, points: list[Any], slow
     if curves == "millard" and not rigid and damping < 0.01:
         file.report.approximated.append(f"muscle {name!r} has no damping; it is taken as 0.1")
         damping = 0.1
-    velocity = number_of(element, "max_contraction_velocity", number_of(element, "Vmax", DEFAULT_MAX_VELOCITY))
+    velocity = number_of(element, "max_contraction_velocity", number_of(element, "Vmax", Muscle.max_velocity))
     if velocity <= 0.0:
         slow.append(name)
-        velocity = DEFAULT_MAX_VELOCITY
+        velocity = Muscle.max_velocity
     return Muscle(
         name, points, number_of(element, "max_isometric_force", 1000.0),
         number_of(element, "optimal_fiber_length", 0.1), number_of(element, "tendon_slack_length", 0.2),
