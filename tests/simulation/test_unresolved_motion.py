@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import random
 import re
 import warnings
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings, strategies as st
 
 import mbd
+from mbd.equations.clusters import clusters
+from mbd.equations.derivation import derive
 from mbd.simulation.diagnostics.coarse import percent
+from mbd.testing.mechanisms import random_tree
 from tests.simulation.mechanisms import falling, run
 
 STIFF = 1e9
@@ -162,3 +167,149 @@ def test_a_scheme_that_lags_behind_a_steep_brake_says_so(scheme, share):
 @pytest.mark.parametrize(("share", "told"), [(1.7, "170"), (0.23, "23"), (0.0012, "0.1"), (4e-6, "0.0004")])
 def test_uncertain_rates_are_never_told_to_be_certain(share, told):
     assert percent(share) == told
+
+
+# who else is there --------------------------------------------------------------------------------------------------
+def at_walls(seed, beside):
+    """A random tree of two bodies with a stiff wall on each side of one coordinate, and something apart from it."""
+    rng = random.Random(seed)
+    model = random_tree(seed, 2, spatial=seed % 2 == 1, most=4)
+    names = [f"{joint.name}.{label.name}" for joint in model.joints for label in joint.labels]
+    velocity = {name: rng.uniform(-2.0, 2.0) for name in names}
+    reach, depth, energy = rng.uniform(0.02, 0.4), 10.0 ** rng.uniform(-4.0, -2.0), rng.uniform(0.1, 3.0)
+
+    def wall(x):
+        return energy / depth**2 * mbd.where(abs(x) > reach, (abs(x) - reach) ** 2, 0.0)
+
+    model.apply(mbd.Potential("walls", wall, (rng.choice(names),)))
+    if beside == "wheel":
+        wheel = mbd.RigidBody("wheel", mass=3.0, inertia=0.7)
+        model.connect(mbd.Revolute("pin", model.ground.origin, wheel.origin))
+        velocity["pin.angle"] = 800.0
+    elif beside == "stone":
+        stone = mbd.PointMass("stone", mass=900.0)
+        model.connect(mbd.Translation("flight", model.ground.origin, stone.origin))
+        velocity["flight.x"] = 300.0
+    elif beside == "weight":
+        weight = mbd.PointMass("weight", mass=50.0)
+        spring = {"stiffness": 2e3, "loss": mbd.Viscous(3.0)}
+        model.connect(mbd.Prismatic("swing", model.ground.origin, weight.origin, **spring))
+        velocity["swing.displacement"] = 40.0
+    return model, mbd.assemble(model, velocity=velocity)
+
+
+def told(seed, integrator, beside=""):
+    """Whether a run goes as far as it is asked to, what ends it, and what it says of its steps."""
+    model, start = at_walls(seed, beside)
+    dt = 10.0 ** random.Random(seed + 1).uniform(-3.0, -1.7)
+    found = mbd.simulate(model, start, integrator, dt=dt, until=40.0 * dt, on_failure="return")
+    failed = found.message if not found.success else ""
+    return failed, coarse_notes(found)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.integers(0, 10**6),
+    st.sampled_from([mbd.RungeKutta4(), mbd.RungeKutta853()]),
+    st.sampled_from(["wheel", "stone", "weight"]),
+)
+def test_what_an_explicit_run_says_of_its_steps_is_the_same_beside_a_body_apart(seed, integrator, beside):
+    alone, together = told(seed, integrator), told(seed, integrator, beside)
+    assume("energy" not in alone[0])  # which is judged of all bodies as one
+    assert alone == together
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([mbd.HHT(0.05), mbd.GeneralizedAlpha(0.5), mbd.RadauIIA()]))
+def test_what_an_implicit_run_says_of_its_steps_is_the_same_beside_a_wheel(seed, integrator):
+    alone, together = told(seed, integrator), told(seed, integrator, "wheel")
+    assume(not alone[0] and not together[0])
+    assert alone[1] == together[1]
+
+
+def test_what_forces_masses_or_rows_connect_is_one_cluster():
+    model = mbd.Model("apart", gravity=(0.0, 0.0, 0.0))
+    bodies = [mbd.PointMass(f"body {k}", mass=1.0) for k in range(7)]
+    slides = [mbd.Translation(f"place {k}", model.ground.origin, body.origin) for k, body in enumerate(bodies)]
+    model.connect(*slides)
+    model.apply(mbd.Spring("spring", bodies[0].origin, bodies[2].origin, stiffness=10.0, length=1.0))
+    model.constrain(mbd.Bilateral("rod", mbd.distance(bodies[3].origin, bodies[1].origin), value=1.0))
+    model.constrain(mbd.Penalty("bumper", mbd.distance(bodies[4].origin, bodies[5].origin), stiffness=1e3))
+    found = clusters(derive(model))
+    assert found[:2] == found[4:6] and found[2:4] == found[6:8] and found[8:10] == found[10:12]
+    assert len({found[k] for k in (0, 2, 8, 12, 13)}) == len(set(found)) == 5, "both ways of a point are apart, too"
+
+
+# forces that begin, end or act within a step ------------------------------------------------------------------------
+def pushed(integrator, force, dt, until, speed=1.0, arguments=("t",), wheel=0.0):
+    """A mass of 1 kg on a slide that a force pushes, perhaps beside a wheel."""
+    model = mbd.Model("pushed", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("body", mass=1.0)
+    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin))
+    model.apply(mbd.Motor("push", model.joints[0], force, arguments=list(arguments)))
+    velocity = {"slide.displacement": speed}
+    if wheel:
+        round_ = mbd.RigidBody("wheel", mass=1.0, inertia=0.01)
+        model.connect(mbd.Revolute("pin", model.ground.origin, round_.origin))
+        velocity["pin.angle"] = wheel
+    start = mbd.assemble(model, velocity=velocity)
+    return mbd.simulate(model, start, integrator, dt=dt, until=until, on_failure="return")
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(-1.0, 1.0), st.floats(-3.0, -1.5), st.floats(0.1, 5.0), st.floats(5.0, 40.0),
+    st.one_of(st.none(), st.floats(1.1, 3.0)), st.sampled_from([0.0, 1e3]),
+)  # fmt: skip
+def test_four_stages_that_meet_a_wall_tell_a_rate_that_is_wrong(speed, step, push, way, width, wheel):
+    """A wall that steps cannot leap over throws a body back as fast as it came."""
+    speed, dt = 10.0**speed, 10.0**step
+    force, at = 10.0**push * speed / dt, way * speed * dt
+    end = np.inf if width is None else at + width * speed * dt
+    found = pushed(
+        mbd.RungeKutta4(), lambda x: mbd.where(x > at, mbd.where(x < end, -force, 0.0), 0.0), dt, 2.2 * way * dt, speed,
+        ("slide.displacement",), wheel,
+    )  # fmt: skip
+    thrown = abs(found.final["slide.rate"] + speed) / speed
+    assert not found.success or coarse_notes(found) or thrown < 0.35
+    if not found.success:
+        assert "slide.displacement" in found.message and "pin" not in found.message
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 1.0), st.floats(0.1, 1.3), st.floats(-2.0, 2.0))
+def test_a_smooth_motion_that_four_stages_follow_is_not_doubted(phase, turn, scale):
+    """``v = V cos(ω t + φ)`` with 0.1 < ω dt < 1.3: four stages are right within 3 % in a step."""
+    angle, dt = 2.0 * np.pi * phase, 0.01
+    found = oscillator_at(turn / dt, 10.0**scale * np.sin(angle), 10.0**scale * np.cos(angle) * turn / dt, dt)
+    assert found.success and not coarse_notes(found)
+
+
+def oscillator_at(frequency, place, speed, dt):
+    model = mbd.Model("oscillator", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("body", mass=1.0)
+    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin, stiffness=frequency**2))
+    start = mbd.assemble(model, {"slide.displacement": place}, velocity={"slide.displacement": speed})
+    return mbd.simulate(model, start, mbd.RungeKutta4(), dt=dt, until=20.0 * dt, on_failure="return")
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+@pytest.mark.parametrize("speed", [0.0, 1e-3])
+def test_a_force_that_grows_from_nothing_is_not_doubted(power, speed):
+    found = pushed(mbd.RungeKutta4(), lambda t: 1e3 * t**power, 0.01, 0.1, speed)
+    assert found.final["slide.rate"] == pytest.approx(speed + 1e3 * 0.1 ** (power + 1) / (power + 1), rel=1e-2)
+    assert not coarse_notes(found)
+
+
+@pytest.mark.parametrize("force", [0.3, 3.0])
+def test_friction_that_turns_within_a_step_of_a_swing_is_not_doubted(force):
+    """What it errs by is small beside how fast the swing was, if not beside how fast it is as it turns."""
+    model = mbd.Model("swing", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("body", mass=1.0)
+    loss = mbd.Coulomb(force, smoothing=0.01)
+    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin, stiffness=40.0, loss=loss))
+    start = mbd.assemble(model, {"slide.displacement": 1.0})
+    found = mbd.simulate(model, start, mbd.RungeKutta4(), dt=0.01, until=3.0)
+    exact = mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-8, until=3.0)
+    assert not coarse_notes(found)
+    assert abs(found.final["slide.rate"] - exact.final["slide.rate"]) < 0.02

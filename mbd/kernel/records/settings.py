@@ -107,6 +107,7 @@ class Settings(Sizes):
     dt: float  # of all steps, or where they follow the error a time that is short beside the motion
     allowed: float  # local error in positions [m, rad] per second
     longest: float  # step
+    n_clusters: int  # of coordinates that nothing connects to others: see `mbd.equations.clusters`
 
 
 class SchemeAbilities(Settings):
@@ -115,6 +116,7 @@ class SchemeAbilities(Settings):
     scheme: int
     explicit: int
     estimates: int
+    second_look: int
     singular_size: int
     stretches: int
     n_nodes: int

@@ -39,6 +39,7 @@ class Model(SchemeAbilities):
     row_friction: Integers = integers()  # friction of each row that holds only while it sticks, −1 otherwise
     row_unit: Integers = integers()  # 0 [m], 1 [rad], 2 other, of each row
     unit: Integers = integers()  # unit block of each balance component
+    cluster: Integers = integers(lambda s: s.n)  # number of the cluster of each balance component
     turned_by: Integers = integers(lambda s: s.n_v)  # from 1: the joint in charts that each velocity turns, 0: none
     chart: Reals = reals()  # what programs of charts are called with
     chart_end: Reals = reals(lambda s: 3 * s.n_v)  # x, ẋ and ẍ of the candidate in the chart of the step
@@ -71,6 +72,9 @@ class State(SchemeAbilities):
     rate: Reals = reals(lambda s: s.n, kept=True)
     lam: Reals = reals(lambda s: s.n_rows, kept=True)
     anchors: Reals = reals(lambda s: s.n_anchors, kept=True)
+    peak: Reals = reals(lambda s: s.n, kept=True)  # largest of each rate so far, forgotten slowly
+    fastest: Reals = reals(lambda s: s.n)  # the largest of the candidate in each cluster
+    damping: Reals = reals(lambda s: s.n)  # of what a step has not predicted, in each cluster
     largest: Reals = reals(lambda s: s.n - s.n_v, kept=True)  # size of each first-order state so far, adaptive only
     q1: Reals = reals(lambda s: s.n_q)  # candidate
     y1: Reals = reals(lambda s: s.n)

@@ -63,6 +63,8 @@ class Abilities:
     stability : largest ω dt at which an explicit scheme is stable: `stability` refuses steps beyond it that are rough
     most_growth : factor from one step to the next where steps follow a tolerance (`control`); below the limit of
         stability of multistep schemes, such as 1 + √2 of BDF2
+    second_look : what tells of forces that the estimate may not see, of the stages of an explicit formula in K.stages
+        (`resolution`): 1: how far they are from a straight line; 2: the second estimate of its tableau; 0: nothing
     singular_size : 1: where constraint Jacobians lose rank, steps are sized so that none has a node close by
         (`singular.step_size`, `control`, `step_retry`): the scheme calls `forget_row_norms` in `start`,
         `note_row_norms` in `step` and `accept_row_norms` in `accept`. 0: `solve_step` steps over them, for which
@@ -75,6 +77,7 @@ class Abilities:
 
     explicit: int = 0
     estimates: int = 0
+    second_look: int = 0
     singular_size: int = 0
     stretches: int = 0
     look_twice: float = 0.01

@@ -13,7 +13,7 @@ from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 
 __all__ = [
     "MAX_CURVATURE", "MAX_UNCHECKED_ERROR", "MIN_HALVED_RESIDUAL", "MIN_RATE_SHARE", "finish", "is_below_floors",
-    "is_small", "overturns",
+    "is_small", "note_fastest", "overturns",
     "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at", "weigh_by_accelerations",
 ]  # fmt: skip
 
@@ -221,14 +221,36 @@ def finish(K: Steps, h: float) -> bool:
     if K.n > K.n_v or error_share(K, h) * most > 0.5:
         return False
     whole = K.step / h if K.step > h else 1.0
-    return is_small(K, h, whole, most, unforeseen, fastest)
+    return is_little(K, h, whole, most, unforeseen, fastest) if K.n_clusters == 1 else is_small(K, h, whole)
 
 
-def is_small(K: Settings, h: float, stretch: float, most: float, unforeseen: float, fastest: float) -> bool:
-    """Whether the largest changes of rates in a step, in all and unpredicted, are small beside the fastest of them."""
+def is_little(K: Settings, h: float, stretch: float, most: float, unforeseen: float, fastest: float) -> bool:
+    """Whether changes of rates in a step, in all and unpredicted, are small beside the fastest of their cluster."""
     cube = stretch * stretch * stretch
     small = h * unforeseen * cube <= 12.0 * MAX_UNCHECKED_ERROR * max(K.rest_speed, MIN_RATE_SHARE * fastest)
     return bool(small and h * most <= MAX_CURVATURE * max(K.rest_speed, fastest))
+
+
+def note_fastest(K: Motion, both: bool) -> None:
+    """The fastest rate of each cluster at the candidate, or at `both` ends of the step, into K.fastest."""
+    for c in range(K.n_clusters):
+        K.fastest[c] = 0.0
+    for i in range(K.n_v):
+        c = K.cluster[i]
+        K.fastest[c] = max(K.fastest[c], abs(K.y1[i]))
+        if both:
+            K.fastest[c] = max(K.fastest[c], abs(K.y[i]))
+
+
+def is_small(K: Steps, h: float, stretch: float) -> bool:
+    """Whether the changes of all rates are little, in most steps."""
+    note_fastest(K, False)
+    for i in range(K.n):
+        change = K.rate1[i] - K.rate[i]
+        unforeseen = abs(change - h * K.slope[i])
+        if not is_little(K, h, stretch, abs(change) if i < K.n_v else 0.0, unforeseen, K.fastest[K.cluster[i]]):
+            return False
+    return True
 
 
 def error_share(K: Settings, h: float) -> float:

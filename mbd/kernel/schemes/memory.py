@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.records import SingularSteps, State, Steps
 from mbd.kernel.stepping.restart import note_scales, raise_scales, retain_scales
+from mbd.kernel.stepping.scales import HORIZON_STEPS
 
 __all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step"]
 
@@ -32,6 +33,7 @@ def accept_step(K: Steps, h: float) -> None:
     K.q[: K.n_q] = K.q1[: K.n_q]
     for i in range(K.n):
         K.y[i] = K.y1[i]
+        K.peak[i] = max(abs(K.y1[i]), (1.0 - 1.0 / HORIZON_STEPS) * K.peak[i])
         K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
         K.rate[i] = K.rate1[i]
         K.aux[i] = K.aux1[i]

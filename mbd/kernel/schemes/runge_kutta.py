@@ -199,13 +199,13 @@ def runge_kutta_accept(K: SingularSteps, h: float) -> None:
         accept_row_norms(K, h)
 
 
-def explicit_scheme(name: str, tableau: Tableau, middle: float, stability: float) -> Scheme:
-    """The entry of a formula; middle, stability : see `Abilities`."""
+def explicit_scheme(name: str, tableau: Tableau, middle: float, stability: float, second_look: int) -> Scheme:
+    """The entry of a formula; middle, stability, second_look : see `Abilities`."""
     return Scheme(
         name, runge_kutta_start, runge_kutta_step, runge_kutta_accept,
         abilities=Abilities(
             explicit=1, estimates=1, singular_size=1, look_twice=0.1, most_growth=5.0, middle=middle,
-            stability=stability,
+            stability=stability, second_look=second_look,
         ),
         nodes=tuple(tableau.nodes),
         programs="explicit",
@@ -214,5 +214,5 @@ def explicit_scheme(name: str, tableau: Tableau, middle: float, stability: float
     )  # fmt: skip
 
 
-SCHEME = explicit_scheme("runge-kutta", EIGHTH_ORDER, 0.46666666666666667, 5.96)
+SCHEME = explicit_scheme("runge-kutta", EIGHTH_ORDER, 0.46666666666666667, 5.96, 2)
 """Its middle lies between the nodes at 1/3 and 3/5."""

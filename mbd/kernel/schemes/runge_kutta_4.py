@@ -12,5 +12,5 @@ from mbd.kernel.schemes.tableau import FOURTH_ORDER
 
 __all__ = ["SCHEME"]
 
-SCHEME = explicit_scheme("runge-kutta-4", FOURTH_ORDER, 0.75, 2.828)
+SCHEME = explicit_scheme("runge-kutta-4", FOURTH_ORDER, 0.75, 2.828, 1)
 """Its middle lies between the nodes at 1/2 and 1."""

@@ -46,7 +46,7 @@ def outgrows(K: Switching, h: float, t1: float, stretch: float, at_y: int, at_D:
     while part >= 1.0 / 4096.0:  # least part of D that is tried where accelerations are not finite at its other end
         take_back(K, at_y, at_D, part, 0.5 * h * part)
         if consistent(K, t1, K.q1, K.y1) == 0:
-            moved = growth_between(K, h, stretch, part, at_D, 0, K.n_v)
+            moved = largest_growth(K, h, stretch, part, at_D, 0, K.n_v)
             states = growth_of_states(K, h, t1, stretch, part, at_y, at_D) if n > K.n_v else 0.0
             K.unforeseen_change = max(moved, states)
             return max(moved, states) > resolved_growth(K)
@@ -75,7 +75,7 @@ def growth_of_states(K: Switching, h: float, t1: float, stretch: float, part: fl
     K.q1[: K.n_q] = K.inside[: K.n_q]
     if consistent(K, t1, K.q1, K.y1) != 0:
         return 0.0
-    return growth_between(K, h, stretch, part, at_D, K.n_v, K.n)
+    return largest_growth(K, h, stretch, part, at_D, K.n_v, K.n)
 
 
 def leave_rows_alone(K: Switching, at_D: int) -> None:
@@ -96,12 +96,25 @@ def resolved_growth(K: SchemeAbilities) -> float:
     return MAX_GROWTH * TRAPEZOID_ERROR / error if error > TRAPEZOID_ERROR else MAX_GROWTH
 
 
-def growth_between(K: Switching, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
-    """ζ of the module's text over some components, over a whole step; K.trial_jump has a(y₁), K.jump a(y₁ − part D)."""
+def largest_growth(K: Switching, h: float, stretch: float, part: float, at_D: int, first: int, last: int) -> float:
+    """The largest ζ of a cluster, over some components, or 0."""
+    largest = 0.0
+    for c in range(K.n_clusters):
+        largest = max(largest, growth_between(K, h, stretch, part, at_D, first, last, c))
+    return largest
+
+
+def growth_between(
+    K: Switching, h: float, stretch: float, part: float, at_D: int, first: int, last: int, cluster: int
+) -> float:
+    """ζ of the module's text over some components of a cluster, over a whole step.
+
+    K.trial_jump has a(y₁), K.jump a(y₁ − part D).
+    """
     fed = 0.0
     size = 0.0
     for i in range(first, last):
-        for j in range(first, last):
+        for j in range(first, last if K.cluster[i] == cluster else first):
             weight = K.inside[at_D + i] * K.acc[i * K.n + j]
             fed += weight * (K.trial_jump[j] - K.jump[j])
             size += weight * K.inside[at_D + j]
@@ -113,19 +126,25 @@ def growth_between(K: Switching, h: float, stretch: float, part: float, at_D: in
 def is_unstable(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:
     """Whether an explicit step amplifies D, as `note_unforeseen` has it: |μ| in K.unforeseen_change above K.stability.
 
-    Along D the forces are those of a spring and a damper, ω² and δ by differences of accelerations at the candidate,
-    and ``μ² + h δ μ + h² ω² = 0``: where a root is beyond the region of stability, so is one of the whole mechanism, as
-    these are Rayleigh quotients. What was not predicted then grows from step to step, by |μ|^p/p! with order p.
+    Along D of a cluster the forces are those of a spring and a damper, ω² and δ by differences of accelerations at the
+    candidate, and ``μ² + h δ μ + h² ω² = 0``: where a root is beyond the region of stability, so is one of the whole
+    mechanism, as these are Rayleigh quotients. What was not predicted then grows from step to step, by |μ|^p/p! with
+    order p.
     """
     take_back(K, at_y, at_D, 1.0, 0.0)
     if consistent(K, t1, K.q1, K.y1) != 0:
         return False
-    damping = -growth_between(K, h, 1.0, 1.0, at_D, 0, K.n_v)
+    for c in range(K.n_clusters):
+        K.damping[c] = -growth_between(K, h, 1.0, 1.0, at_D, 0, K.n_v, c)
     take_back(K, at_y, at_D, 0.0, 0.5 * h)
     if consistent(K, t1, K.q1, K.y1) != 0:
         return False
-    square = -2.0 * growth_between(K, h, 1.0, 1.0, at_D, 0, K.n_v)
-    inside = 0.25 * damping * damping - square
-    largest = 0.5 * abs(damping) + sqrt(inside) if inside > 0.0 else sqrt(square)
-    K.unforeseen_change = largest
-    return largest > K.stability and max(damping, square) > 0.0
+    K.unforeseen_change = 0.0
+    for c in range(K.n_clusters):
+        damping = K.damping[c]
+        square = -2.0 * growth_between(K, h, 1.0, 1.0, at_D, 0, K.n_v, c)
+        inside = 0.25 * damping * damping - square
+        largest = 0.5 * abs(damping) + sqrt(inside) if inside > 0.0 else sqrt(square)
+        if max(damping, square) > 0.0:
+            K.unforeseen_change = max(K.unforeseen_change, largest)
+    return K.unforeseen_change > K.stability

@@ -15,8 +15,8 @@ from __future__ import annotations
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import GAINED, LEAPT, NOT_FINITE, OUTGROWN, UNSTABLE
 from mbd.kernel.hooks import scheme_error
-from mbd.kernel.records import Equations, Guards, Kernel, State, Steps, Switching
-from mbd.kernel.schemes.iteration import MAX_CURVATURE, MAX_UNCHECKED_ERROR, MIN_RATE_SHARE, is_small
+from mbd.kernel.records import Equations, Guards, Kernel, Motion, Steps, Switching
+from mbd.kernel.schemes.iteration import MAX_CURVATURE, MAX_UNCHECKED_ERROR, MIN_RATE_SHARE, is_small, note_fastest
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.charts import whole_step
 from mbd.kernel.stepping.growth import is_unstable, leave_rows_alone, note_unforeseen, outgrows
@@ -28,8 +28,8 @@ __all__ = ["judge_change"]
 
 MAX_RATE_ERROR = 0.2
 """Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
-UNSEEN_RATIO = 4.0
-"""Change of velocities over that by the accelerations at the ends of a step above which these do not tell it [-]."""
+BULGE_SHARE = 0.5
+"""Error of a rate over dt times the largest way of slopes from a line, where forces begin within a step [-]."""
 MAX_UNEXPLAINED_ENERGY = 0.5
 """Part of the kinetic energy at the end of a step that may be neither old nor work of forces [-]."""
 MIN_CHANGE_ENERGY = 0.085
@@ -42,10 +42,10 @@ def judge_change(K: Kernel, h: float, t1: float) -> int:
     if K.turning_step > 0.0:
         whole = min(whole, K.turning_step)
     stretch = max(1.0, whole / h)
-    if K.estimates == 0 and changes_little(K, h, stretch):
+    if K.estimates == 0 and is_small(K, h, stretch):
         return 0
     worst = largest_share(K, h, stretch)
-    unseen = K.explicit == 1 and worst <= MAX_UNCHECKED_ERROR and changes_unseen(K, h)
+    unseen = (K.second_look == 1 or (K.second_look == 2 and worst > MAX_UNCHECKED_ERROR)) and unseen_change(K, h)
     if (worst <= MAX_UNCHECKED_ERROR and not unseen and not bends(K, h)) or K.near_singular > 0 or sharing(K):
         return 0
     if worst > MAX_UNCHECKED_ERROR:  # then stages have seen nothing that counts
@@ -53,53 +53,56 @@ def judge_change(K: Kernel, h: float, t1: float) -> int:
     return look_closer(K, h, t1, stretch, worst > K.look_twice or unseen)
 
 
-def changes_little(K: Steps, h: float, stretch: float) -> bool:
-    """Whether the errors of all rates are small beside a part of the fastest one, and none `bends`: in most steps."""
-    largest = 0.0
-    most = 0.0
-    fastest = 0.0
-    for i in range(K.n_v):
-        most = max(most, abs(K.rate1[i] - K.rate[i]))
-        largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
-        fastest = max(fastest, abs(K.y1[i]))
-    for i in range(K.n_v, K.n):
-        largest = max(largest, abs(K.rate1[i] - K.rate[i] - h * K.slope[i]))
-    return is_small(K, h, stretch, most, largest, fastest)
+def unseen_change(K: Steps, h: float) -> bool:
+    """Whether stages have met forces that the estimate may not see, such as a wall's; K.failure_size tells how large.
 
-
-def changes_unseen(K: Equations, h: float) -> bool:
-    """Whether a step changed velocities although accelerations at neither end tell; the share is in K.failure_size.
-
-    Stages between the ends have met a force then, such as that of a wall which the step leaves again; the estimate of
-    four stages may not see it.
+    An estimate of few stages may be zero though a force begins, ends or acts for a part of the step: how far slopes at
+    stages are from a straight line between those at its ends tells, which is ½ of a force that begins, ¼ of one that
+    grows from zero with t². Of many stages the second estimate does, of low order. Either is compared with the rate
+    itself, as fast as it was or as forces make it in a step, and with a part of the fastest of its cluster, which
+    `largest_share` has noted.
     """
-    change = 0.0
-    most = 0.0
-    fastest = 0.0
-    for i in range(K.n_v):
-        change = max(change, abs(K.y1[i] - K.y[i]))
-        most = max(most, max(abs(K.rate[i]), abs(K.rate1[i])))
-        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
-    if change <= UNSEEN_RATIO * h * most or change <= MAX_RATE_ERROR * max(K.rest_speed, fastest):
-        return False
-    K.failure_size = max(K.failure_size, change / max(K.rest_speed, fastest))
-    return True
+    n_v = K.n_v
+    width = n_v + K.n
+    stages = K.n_nodes
+    end = stages * width
+    third = stages * stages + 3 * stages + 1
+    worst = MAX_RATE_ERROR
+    for i in range(n_v):
+        first = K.stages[n_v + i]
+        last = K.stages[end + n_v + i]
+        error = 0.0
+        for j in range(stages + 1 if K.second_look == 2 else 0):
+            error += h * K.tableau[third + j] * K.stages[j * width + n_v + i]
+        for j in range(1, stages if K.second_look == 1 else 0):
+            slope = K.stages[j * width + n_v + i]
+            error = max(error, BULGE_SHARE * h * abs(slope - first - K.nodes[j] * (last - first)))
+        error = abs(error)
+        if error <= worst * abs(K.y1[i]):  # most steps
+            continue
+        largest = 0.0
+        for j in range(stages + 1):
+            largest = max(largest, abs(K.stages[j * width + n_v + i]))
+        size = max(max(K.peak[i], h * largest), max(abs(K.y[i]), abs(K.y1[i])))
+        size = max(size, max(K.rest_speed, MIN_RATE_SHARE * K.fastest[K.cluster[i]]))
+        if error > worst * size:
+            worst = error / size
+            K.failure_index = i
+    K.failure_size = max(K.failure_size, worst if worst > MAX_RATE_ERROR else 0.0)
+    return worst > MAX_RATE_ERROR
 
 
 def bends(K: Equations, h: float) -> bool:
     """Whether accelerations change so much that a pole may lie between, even if so predicted; K.failure_index whose."""
-    most = 0.0
-    fastest = 0.0
-    who = 0
+    note_fastest(K, False)
+    worst = MAX_CURVATURE
     for i in range(K.n_v):
-        if abs(K.rate1[i] - K.rate[i]) > most:
-            most = abs(K.rate1[i] - K.rate[i])
-            who = i
-        fastest = max(fastest, abs(K.y1[i]))
-    if h * most > MAX_CURVATURE * max(K.rest_speed, fastest):
-        K.failure_index = who
-        return True
-    return False
+        change = h * abs(K.rate1[i] - K.rate[i])
+        size = max(K.rest_speed, K.fastest[K.cluster[i]])
+        if change > worst * size:
+            worst = change / size
+            K.failure_index = i
+    return worst > MAX_CURVATURE
 
 
 def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bool) -> int:
@@ -117,9 +120,9 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
         status = OUTGROWN
     elif stiff and known and is_unstable(K, h, t1, at_y, at_D):
         status = UNSTABLE
-    elif coarse and gains(K, h, t1, at_y, at_D):
+    elif coarse and gains(K, h, t1, at_y, at_D, K.cluster[blocked]):
         status = GAINED
-    elif peaks_within(K, h, at_y):
+    elif peaks_within(K, h, at_y, K.cluster[blocked]):
         status = LEAPT
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
@@ -140,19 +143,23 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
     return status
 
 
-def may_amplify(K: State, h: float) -> bool:
+def may_amplify(K: Motion, h: float) -> bool:
     """Whether rates have doubled, or changed as by forces too stiff for an explicit step: beyond its stability either.
 
-    An estimated error may vanish by chance where a step multiplies all that there is.
+    An estimated error may vanish by chance where a step multiplies all that there is. Each cluster is judged alone.
     """
-    old = 0.0
-    new = 0.0
-    most = 0.0
-    for i in range(K.n_v):
-        old = max(old, abs(K.y[i]))
-        new = max(new, abs(K.y1[i]))
-        most = max(most, abs(K.rate1[i] - K.rate[i]))
-    return new > 2.0 * old or h * most > K.stability * new
+    for c in range(K.n_clusters):
+        old = 0.0
+        new = 0.0
+        most = 0.0
+        for i in range(K.n_v):
+            if K.cluster[i] == c:
+                old = max(old, abs(K.y[i]))
+                new = max(new, abs(K.y1[i]))
+                most = max(most, abs(K.rate1[i] - K.rate[i]))
+        if new > 2.0 * old or h * most > K.stability * new:
+            return True
+    return False
 
 
 def uncertainty(K: Kernel, h: float, t1: float, at_D: int) -> float:
@@ -180,12 +187,10 @@ def uncertainty(K: Kernel, h: float, t1: float, at_D: int) -> float:
 
 def share_of_rates(K: Guards, at_D: int) -> float:
     """Largest part of a rate that is in K.inside from `at_D` on; of one far below the fastest, over a part of that."""
-    fastest = 0.0
-    for i in range(K.n_v):
-        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
-    floor = max(K.rest_speed, MIN_RATE_SHARE * fastest)
+    note_fastest(K, True)
     worst = 0.0
     for i in range(K.n):
+        floor = max(K.rest_speed, MIN_RATE_SHARE * K.fastest[K.cluster[i]])
         worst = max(worst, abs(K.inside[at_D + i]) / max(floor, max(abs(K.y[i]), abs(K.y1[i]))))
     return worst
 
@@ -206,10 +211,7 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
 
     K.failure_index tells which. Rates below the rest speed count as that, those far below the fastest as a part of it.
     """
-    fastest = 0.0
-    for i in range(K.n_v):
-        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
-    floor = max(K.rest_speed, MIN_RATE_SHARE * fastest)
+    note_fastest(K, True)
     cube = stretch * stretch * stretch
     twelfth = h / 12.0
     worst = 0.0
@@ -221,6 +223,7 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
             error = twelfth * abs(K.rate1[i] - K.rate[i] - h * K.slope[i])
         else:
             error = abs(K.error[K.n_v + i])
+        floor = max(K.rest_speed, MIN_RATE_SHARE * K.fastest[K.cluster[i]])
         share = error / max(floor, max(abs(K.y[i]), abs(K.y1[i])))
         if share > worst:
             worst = share
@@ -231,8 +234,8 @@ def largest_share(K: Kernel, h: float, stretch: float) -> float:
     return worst * cube
 
 
-def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:
-    """Whether more than half of the kinetic energy at the end is neither old nor work of forces along the way.
+def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int, cluster: int) -> bool:
+    """Whether more than half of a cluster's kinetic energy at the end is neither old nor work of forces along the way.
 
     Forces may change with time at any instant of the step: of those of its start and of its end the larger work counts.
     What rows change of velocities, such as a drive's, is no gain: with it alone less than half would be unexplained.
@@ -271,9 +274,10 @@ def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:
             for i in range(K.n_v):
                 force = 0.0
                 momentum = 0.0
-                for j in range(K.n_v):
-                    force += K.acc[i * K.n + j] * K.jump[j]
-                    momentum += K.acc[i * K.n + j] * K.y1[j]
+                if K.cluster[i] == cluster:
+                    for j in range(K.n_v):
+                        force += K.acc[i * K.n + j] * K.jump[j]
+                        momentum += K.acc[i * K.n + j] * K.y1[j]
                 energy += 0.5 * momentum * K.y1[i]
                 work += weight * h * max(K.y1[i] * force, 0.0)
             if node == 0:
@@ -290,6 +294,6 @@ def gains(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:
     leave_rows_alone(K, at_D)
     free = 0.0
     for i in range(K.n_v):
-        for j in range(K.n_v):
+        for j in range(K.n_v if K.cluster[i] == cluster else 0):
             free += 0.5 * K.inside[at_D + i] * K.acc[i * K.n + j] * K.inside[at_D + j]
     return free > MIN_CHANGE_ENERGY * new

@@ -25,7 +25,7 @@ from mbd.kernel.codes import ACCELERATIONS, SCALES
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Motion
 
-__all__ = ["FORCE_ULPS", "add_force_floors", "note_extent", "size_of", "still_energy", "still_speed"]
+__all__ = ["FORCE_ULPS", "HORIZON_STEPS", "add_force_floors", "note_extent", "size_of", "still_energy", "still_speed"]
 
 HORIZON_STEPS = 1000.0
 """Steps in which the least force that counts would move a coordinate by its own size [-]."""

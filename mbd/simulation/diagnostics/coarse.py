@@ -42,7 +42,8 @@ def coarse_steps(run: RunData, record: Record) -> list[str]:
 def _resolving_step(run: RunData, record: Record, row: int) -> float:
     """The step that resolves the steepest change of forces between a row and the one before [s].
 
-    ``ω² = max |Δa|/|Δq|`` along the cubic through both rows, as far as the kinetic energy reaches against the forces.
+    ``ω² = max |Δa|/|Δq|`` along the cubic through both rows, of each cluster (`mbd.equations.clusters`), as far as the
+    kinetic energy reaches against the forces.
     """
     system, h = run.stepper.system, float(record.time[row] - record.time[row - 1])
     blind = ADVISED_STEP_RATIO * run.dt
@@ -64,12 +65,16 @@ def _resolving_step(run: RunData, record: Record, row: int) -> float:
         ])  # fmt: skip
     except (ArithmeticError, np.linalg.LinAlgError):
         return blind
-    moved, changed = np.diff(q, axis=0), np.diff(a, axis=0)
-    work = np.cumsum(np.einsum("ki,ij,kj->k", 0.5 * (a[1:] + a[:-1]), M, moved))
-    energy = 0.5 * float(np.max([v[0] @ M @ v[0], v[-1] @ M @ v[-1]]))
-    beyond = np.flatnonzero(np.abs(work) > energy)
-    kept = slice(0, int(beyond[0]) + 1 if len(beyond) else None)
-    ways, changes = np.linalg.norm(moved, axis=1)[kept], np.linalg.norm(changed, axis=1)[kept]
-    steep = changes[ways > 0.0] / ways[ways > 0.0]
-    rate = float(np.sqrt(np.max(steep, initial=0.0)))
+    steepest = 0.0
+    cluster = np.array(run.stepper.clusters[:n_v])
+    for c in set(cluster.tolist()):
+        own = np.flatnonzero(cluster == c)
+        moved, changed, inertia = np.diff(q[:, own], axis=0), np.diff(a[:, own], axis=0), M[np.ix_(own, own)]
+        work = np.cumsum(np.einsum("ki,ij,kj->k", 0.5 * (a[1:, own] + a[:-1, own]), inertia, moved))
+        energy = 0.5 * float(np.max([speeds[own] @ inertia @ speeds[own] for speeds in (v[0], v[-1])]))
+        beyond = np.flatnonzero(np.abs(work) > energy)
+        kept = slice(0, int(beyond[0]) + 1 if len(beyond) else None)
+        ways, changes = np.linalg.norm(moved, axis=1)[kept], np.linalg.norm(changed, axis=1)[kept]
+        steepest = max(steepest, float(np.max(changes[ways > 0.0] / ways[ways > 0.0], initial=0.0)))
+    rate = float(np.sqrt(steepest))
     return min(resolving_dt(rate), blind) if np.isfinite(rate) and rate > 0.0 else blind

@@ -10,6 +10,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.assembly.dependence import MIN_COEFFICIENT
 from mbd.compile.mechanism import AccelerationTerms, Mechanism
+from mbd.equations.clusters import clusters
 from mbd.equations.equations import Equations
 from mbd.equations.programs import ActiveSet, follows_multipliers
 from mbd.errors import MemoryLimitError, ModelError
@@ -160,6 +161,7 @@ class Stepper:
 
     def _sizes(self, dt: float, options: dict[str, Any]) -> Kernel:
         layout = self.mechanism.layout
+        self.clusters = self.mechanism.kept(clusters, lambda: clusters(self.mechanism.equations))
         n_contacts, n_guards = layout.n_contacts, len(self.manager.guards)
         K = Kernel(
             n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
@@ -180,6 +182,7 @@ class Stepper:
             adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
             driven=int(options.get("driven", False)), longest=float(options.get("longest", np.inf)),
             error_order=self.integrator.error_order(), n_substeps=1,
+            n_clusters=1 + max(self.clusters, default=0),
             **self.own.numbers(),
         )  # fmt: skip
         K.event_capacity = max(EVENT_CAPACITY, 2 * room_to_log(K))
@@ -205,6 +208,7 @@ class Stepper:
         v.was[:] = codes.NOT_KNOWN_YET
         fill_coefficients(v, self.own)
         v.unit = unit_blocks(self.mechanism).copy()
+        v.cluster[: v.n] = self.clusters
         for number, (_, turning) in enumerate(self.mechanism.turning, 1):
             v.turned_by[turning] = number
         v.row_unit = np.array([*row_units(self.mechanism), 2], dtype=np.int64)
