@@ -1,7 +1,8 @@
 """Starts and ends at which a run has derivatives on one side only: the refusal, with the values of both sides.
 
-What begins at rest and slides at once slides the other way first where its velocity is changed against it; an event
-whose guard is zero at the start, or at the end, happens within the run on one side of it and not on the other.
+What begins at rest and slides at once slides the other way first where its velocity is changed against it; what sticks
+by all the friction that it can have slides where it needs more; an event whose guard is zero at the start, or at the
+end, happens within the run on one side of it and not on the other.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.state import State
 from mbd.tape.node import Node
 
-__all__ = ["refuse_sided_end", "refuse_sided_start", "sided_end", "with_both_sides"]
+__all__ = ["refuse_sided_end", "refuse_sided_grip", "refuse_sided_start", "sided_end", "with_both_sides"]
 
 ROUND_OFF, GRAZE = 1e-12, 1e-7
 """Velocity over the sum of its terms that is rest, and rate of a guard over its terms below which it grazes [-]."""
@@ -109,6 +110,34 @@ def refuse_sided_start(rows: RunRows, programs: Programs, motion: Motion, mode: 
         )
     if names := dict.fromkeys(watched.firing(within)):
         raise sided(f"the run starts where {_listed(names)} happens, and a change decides whether it does")
+
+
+def refuse_sided_grip(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> None:
+    """Raise a `OneSidedError` where dry friction holds with its limit, and a change decides whether it is enough.
+
+    motion, mode, rates : at the start, or just after an event
+    """
+    if not programs.equations.frictions:
+        return
+    values, slopes = programs.limits(motion.at(mode, rates.rate, rates.lam))
+    Z = motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
+    names = []
+    for f, friction in enumerate(programs.equations.frictions):
+        group = list(friction.group or (f,))
+        rows = [programs.equations.frictions[each].row for each in group]
+        size = float(np.linalg.norm(rates.lam[rows]))
+        if f != group[0] or not set(rows) <= set(mode.held) or size == 0.0:
+            continue
+        along = rates.lam[rows] / size
+        change = slopes[f] @ Z - along @ rates.of_lam[rows]
+        terms = np.abs(slopes[f]) @ np.abs(Z) + np.abs(along) @ np.abs(rates.of_lam[rows])
+        if abs(values[f] - size) <= ROUND_OFF * size and np.any(np.abs(change) > EQUAL_RTOL * terms):
+            names.append(friction.name)
+    if names:
+        raise sided(
+            f"{_listed(names)} sticks at t = {motion.t:.9g} s with all the friction that it can have, and a change "
+            "decides whether it slides"
+        )
 
 
 def refuse_sided_end(

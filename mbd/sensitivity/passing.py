@@ -147,7 +147,7 @@ def tangent_run(
             visit(row, motion, rows.mode(row), rates)
     if not located:
         return Passed(end[0], last, end[1])
-    known = {row: at_row(row) for row in {0, *(each - 1 for each in rows.events)}}
+    known = {row: at_row(row) for row in {0, *rows.events, *(each - 1 for each in rows.events)}}
     fired = refuse_turning_points(rows, programs, known, end)
     instants = [
         Instant(row, trigger, known[row - 1][0], known[row - 1][0])

@@ -12,6 +12,7 @@ that are not always zero. Where coordinates do not add, x is the increment from 
 `consistent`   r (n), ḧ (R)
 `watched`      gaps (nC), penalty forces (nC), values of users' guards, sliding velocities and limits of frictions,
                measures that must be positive for a contact to be watched (nC)
+`limits`       limits of frictions at rest
 `stored`       what machines store by their transitions
 `captured`     what closing contacts hold
 =============  =============================================================================================
@@ -162,6 +163,10 @@ class Programs:
         size = 3 * self.layout.n_contacts + len(self.equations.guards) + 2 * self.layout.n_frictions
         return self._call("watched", at, size)
 
+    def limits(self, at: State) -> tuple[Vector, Matrix]:
+        """Limits of frictions at rest, and their derivatives."""
+        return self._call("limits", at, self.layout.n_frictions)
+
     def stored(self, at: State) -> tuple[Vector, Matrix]:
         """What machines would store, and its derivatives."""
         return self._call("stored", at, self.equations.n_held_by_machines)
@@ -236,6 +241,8 @@ class Programs:
             values += [guard.value for guard in equations.guards]
             values += [friction.rate for friction in frictions] + [friction.sliding for friction in frictions]
             return values + [each.only_while if isinstance(each.only_while, Node) else zero for each in contacts]
+        if name == "limits":
+            return [friction.limit for friction in equations.frictions]
         if name == "stored":
             return [value for machine in equations.machines for value in machine.captured]
         if name == "captured":

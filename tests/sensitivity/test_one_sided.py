@@ -139,3 +139,47 @@ def test_a_derivative_is_that_of_both_sides_or_it_is_refused():
         judged += 1
         assert agree and abs(found[RATE, by] - 0.5 * (above + below)) < 1e-4 * max(1.0, abs(above))
     assert judged > 2 and refused > 2
+
+
+GRIPS = ("joint", "plane", "space", "after a slide")
+
+
+def gripping(case, random):
+    """What sticks by all the friction that it can have: model, start, by what it is differentiated, and of what."""
+    mass, mu, load = random.uniform(0.5, 3.0), random.uniform(0.2, 0.9), random.uniform(1.0, 12.0)
+    angle = 0.0 if case != "space" else random.uniform(0.1, 1.4)
+    along, down = mu * load * np.array([math.cos(angle), math.sin(angle)]), -load
+    gravity = (along[0], 0.0, 0.0) if case == "joint" else (along[0], down, along[1])
+    model, body = mbd.Model("grip", gravity=gravity), mbd.PointMass("m", mass)
+    if case == "joint":
+        model.connect(mbd.Prismatic("x", model.ground.origin, body.origin, loss=mbd.Coulomb(mass * along[0])))
+        return model, start(model, 0.0, 0.0), ["gravity.x", "m.mass"], PLACE
+    model.connect(mbd.Translation("p", model.ground.origin, body.origin, axes="xyz" if case == "space" else "xy"))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin), friction=mu))
+    speed = {"p.x": -random.uniform(0.1, 0.3)} if case == "after a slide" else {}
+    begin = mbd.assemble(model, {"p.x": 0.0, "p.y": 0.0}, speed, closed="foot")
+    return model, begin, ["gravity.x", "gravity.y", "foot.mu"], "p.x"
+
+
+@pytest.mark.parametrize("scheme", [mbd.RungeKutta853(), mbd.HHT(), mbd.RadauIIA()], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("case", GRIPS)
+def test_what_sticks_by_all_its_friction_has_derivatives_on_one_side_only(case, scheme):
+    """Pulled harder or pressed less it slides; both values are those of runs on each side."""
+    random = np.random.default_rng(GRIPS.index(case))
+    model, begin, by, of = gripping(case, random)
+    with pytest.raises(mbd.errors.OneSidedError, match="sticks at t = .* all the friction that it can have") as caught:
+        mbd.sensitivities(model, begin, scheme, 0.01, until=0.4, wrt=by, of=[of])
+    known = mbd.simulate(model, begin, scheme, dt=0.01, until=0.4)
+    values = dict(zip(known.record.parameter_names, known.record.parameters, strict=True))
+    for name in by:
+        h = 1e-5 * abs(values[name])
+
+        def moved(change, name=name):
+            changed = {name: values[name] + change}
+            return float(mbd.simulate(model, begin, scheme, dt=0.01, until=0.4, parameters=changed).final[of])
+
+        below, above = (moved(0.0) - moved(-h)) / h, (moved(h) - moved(0.0)) / h
+        assert abs(below - above) > 1e-3
+        np.testing.assert_allclose(caught.value.sides[of, name], (below, above), rtol=2e-3, atol=1e-6)
+    found = mbd.sensitivities(model, begin, scheme, 0.01, until=0.4, wrt=[of], of=[of])
+    assert found[of, of] == pytest.approx(1.0), "what leaves both forces as they are has a derivative"

@@ -8,7 +8,7 @@ import numpy as np
 
 from mbd.sensitivity.guards import GRAZING_RTOL, Trigger, refused_graze, trigger
 from mbd.sensitivity.motion import Motion, Rates
-from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_start
+from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_grip, refuse_sided_start
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, sided
 from mbd.sensitivity.strikes import refuse_sided_impact
@@ -23,7 +23,7 @@ def refuse_turning_points(
 
     Parameters
     ----------
-    known : motions and rates with their derivatives at the first row, and at those before events
+    known : motions and rates with their derivatives at the first row, and at those before and after events
     end : the same at the end
 
     Raises
@@ -35,6 +35,8 @@ def refuse_turning_points(
     instants = list[tuple[str, Motion]]()
     refuse_sided_start(rows, programs, known[0][0], rows.mode(0), known[0][1])
     time = rows.record.time
+    for row in (0, *(row for row in sorted(rows.events) if row < len(time) - 1)):
+        refuse_sided_grip(programs, known[row][0], rows.mode(row), known[row][1])
     for row in sorted(rows.events):
         before = row - 1
         prior = before - 1
