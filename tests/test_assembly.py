@@ -190,6 +190,17 @@ def test_an_angle_that_the_linkage_cannot_reach_is_told():
         mbd.assemble(LINKAGE, {"a.angle": 0.0, "d.angle": 3.0})
 
 
+def test_a_start_that_moves_along_a_contact_which_sticks_is_told_that_it_does():
+    model, body = mbd.Model("block"), mbd.PointMass("block", 1.0)
+    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin)))
+    with pytest.raises(mbd.AssemblyError, match="'foot' sticks while it is closed, and slides with friction=mu"):
+        mbd.assemble(model, {"place.y": 0.0}, {"place.x": 1.0}, closed="foot")
+    with pytest.raises(mbd.AssemblyError) as caught:
+        mbd.assemble(model, {"place.y": 0.0}, {"place.y": 1.0}, closed="foot")
+    assert "sticks" not in str(caught.value), "it opens"
+
+
 def test_constraints_that_can_never_hold_together_are_told_each():
     model, body = point()
     model.constrain(

@@ -89,9 +89,12 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
             )
         elif abs(position) > EQUAL_RTOL or abs(velocity) > EQUAL_RTOL * speed:
             place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
+            sticks = row.contact >= 0 and k != equations.contacts[row.contact].rows[0] and row.friction < 0
+            slide = f"{row.owner!r} sticks while it is closed, and slides with friction=mu; "
             found.append(
                 f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "
-                f"name fewer values{'' if attempt.projected else PROJECT_ADVICE}" + sets.get(repr(row.owner), "")
+                f"{slide if sticks and not row.is_velocity else ''}name fewer values"
+                f"{'' if attempt.projected else PROJECT_ADVICE}" + sets.get(repr(row.owner), "")
             )
     return found
 

@@ -140,15 +140,26 @@ class Ledger:
         found = {kind: sum((p.energy for p in self.of(kind) if not p.withheld), nothing) for kind in self.kinds}
         return {**found, "numerical": self.numerical}
 
-    def __getitem__(self, name: str) -> Vector:
-        """'kinetic', 'potential', 'total', 'numerical', a part, stored energy or kind by its name [J]."""
-        columns = {
+    @property
+    def _columns(self) -> dict[str, Vector]:
+        return {
             **self.by_kind(), **{part.name: part.energy for part in self.stored},
             "kinetic": self.kinetic, "potential": self.potential, "total": self.total, **self.work,
         }  # fmt: skip
+
+    def __getitem__(self, name: str) -> Vector:
+        """'kinetic', 'potential', 'total', 'numerical', a part, stored energy or kind by its name [J]."""
+        columns = self._columns
         if name not in columns:
             raise UnknownNameError(nearest(name, columns, "part of the energy", "The ledger has"))
         return columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
+    def __iter__(self) -> Iterator[str]:
+        """The names that it has."""
+        return iter(self._columns)
 
     def to_dataframe(self, by: Literal["element", "kind"] = "element") -> DataFrame:
         """A pandas table [J]: `time` as index; kinetic, potential, total; each part, or each kind; numerical."""

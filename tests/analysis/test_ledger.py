@@ -255,6 +255,13 @@ def test_the_ledger_is_a_table_by_element_or_by_kind():
         books.to_dataframe(by="cause")
 
 
+def test_the_ledger_says_which_names_it_has():
+    books = struck_leg(mbd.HHT(alpha=0.05), 2e-3).energy
+    assert {"kinetic", "total", "hip loss", "joint loss", "numerical"} <= {*books}
+    assert all(name in books and len(books[name]) == len(books.time) for name in books)
+    assert "x" not in books and 0 not in books
+
+
 def test_elements_of_one_kind_are_told_with_their_sum():
     model = slider(gravity=9.81, loss=mbd.Viscous(0.3), mass=1.0)
     other = mbd.PointMass("other", mass=1.0)
