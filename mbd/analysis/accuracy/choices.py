@@ -12,10 +12,11 @@ import numpy as np
 from mbd.analysis.accuracy.published import Published, published, table_of
 from mbd.analysis.accuracy.settings import Setting, is_high, long_steps, steps_of, tolerances
 from mbd.analysis.accuracy.truth import motion
-from mbd.bodies.values import is_number, names_given, shown
+from mbd.analysis.wanted import names_wanted, scalars_wanted
+from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
-from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
+from mbd.errors import ModelError, SimulationError
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.capabilities import refusals
@@ -98,7 +99,7 @@ def plan(
     faults += _wrong_schemes(integrators) + _wrong_schemes(None if also is None else [also])
     faults += _wrong_numbers(dts, "dts", "steps [s]", "a step must be a positive number of seconds")
     faults += _wrong_numbers(tols, "tols", "tolerances [m, rad]", "a tolerance must be a positive error of coordinates")
-    faults += [] if quantities is None else _named(quantities)[1]
+    faults += [] if quantities is None else names_wanted(quantities, "quantities")[1]
     if known is not None and quantities is not None:
         faults.append("either quantities or known values: with these, they are the quantities")
     if faults:
@@ -228,20 +229,8 @@ def _probe(
     )
 
 
-def _named(wanted: Any) -> tuple[tuple[str, ...], list[str]]:
-    names, faults = names_given(wanted, "quantities", "results, such as ['left hip.angle']")
-    return names, faults or ([] if names else ["quantities is empty; give names such as those in run.names"])
-
-
 def _quantities(probe: Trajectory, wanted: Any) -> tuple[str, ...]:
     """Scalars behind the names; every wrong name with the nearest."""
     if wanted is None:
         return tuple(motion(probe))
-    names, faults = _named(wanted)
-    if faults:
-        raise ModelError(faults)
-    wrong = [name for name in names if name not in probe]
-    if wrong:
-        known = (*probe.names, *probe.columns.vectors)
-        raise UnknownNameError([nearest(name, known, "quantity") for name in wrong])
-    return tuple(dict.fromkeys(part for name in names for part in probe.columns.components(name)))
+    return scalars_wanted(probe, wanted, "quantities", "quantity")

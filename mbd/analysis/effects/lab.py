@@ -16,11 +16,12 @@ from mbd.analysis.effects.contribution import Change, Contribution, Together
 from mbd.analysis.effects.result import Effects
 from mbd.analysis.effects.scenes import Element, Scene, elements, reduced
 from mbd.analysis.effects.timing import Pair, Timing, timed
-from mbd.bodies.values import is_number, names_given, shown
+from mbd.analysis.wanted import names_wanted, scalars_wanted
+from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.cost import cost
 from mbd.equations.derivation import FrontDoor
-from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
+from mbd.errors import MbdError, ModelError, SimulationError
 from mbd.integrators import Integrator
 from mbd.progress import Progress, share_bar
 from mbd.results.ledger import Ledger
@@ -232,7 +233,7 @@ def _check(model: Any, start: Any, tolerance: Any, outputs: Any, options: Mappin
     faults = [] if isinstance(start, State) else [f"start must be a State from mbd.assemble(model, …), not {start!r}"]
     if not isinstance(model, Description | FrontDoor):
         faults.append(f"model must be an mbd.Model or mbd.Lagrangian, not {shown(model)}")
-    faults += [] if outputs is None else _named(outputs)[1]
+    faults += [] if outputs is None else names_wanted(outputs, "outputs")[1]
     if not is_number(tolerance) or not math.isfinite(tolerance) or tolerance <= 0.0:
         faults.append(f"tolerance must be a positive part of an output's range such as 1e-3, not {tolerance!r}")
     faults += [f"effects() has no option {name!r}; it has {', '.join(OPTIONS)}" for name in options
@@ -241,20 +242,8 @@ def _check(model: Any, start: Any, tolerance: Any, outputs: Any, options: Mappin
         raise ModelError(faults)
 
 
-def _named(wanted: Any) -> tuple[tuple[str, ...], list[str]]:
-    names, faults = names_given(wanted, "outputs", "results, such as ['left hip.angle']")
-    return names, faults or ([] if names else ["outputs is empty; give names such as those in run.names"])
-
-
 def _outputs(run: Trajectory, wanted: Any) -> tuple[str, ...]:
     """Scalars behind the names; every wrong name with the nearest."""
     if wanted is None:
         return tuple(name for name, _ in run.facts.coordinates)
-    names, faults = _named(wanted)
-    if faults:
-        raise ModelError(faults)
-    wrong = [name for name in names if name not in run]
-    if wrong:
-        known = (*run.names, *run.columns.vectors)
-        raise UnknownNameError([nearest(name, known, "output") for name in wrong])
-    return tuple(dict.fromkeys(part for name in names for part in run.columns.components(name)))
+    return scalars_wanted(run, wanted, "outputs", "output")

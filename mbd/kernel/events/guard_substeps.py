@@ -19,7 +19,7 @@ from mbd.kernel.stepping.candidate import accept_guards, carry
 from mbd.kernel.stepping.charts import find_chart_end, leave_chart
 from mbd.kernel.stepping.restart import compose, consistent, fill_block
 
-__all__ = ["copy_ends", "interpolate_candidate", "parts_to_take", "put_candidate_back"]
+__all__ = ["copy_candidate", "copy_ends", "interpolate_candidate", "parts_to_take"]
 
 INTERPOLATION_ULPS = 16.0
 """Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""
@@ -38,7 +38,7 @@ def parts_to_take(K: Switching, h: float) -> int:
         if part < K.n_substeps:
             interpolate_candidate(K, t, h, part / K.n_substeps, asked)
         else:
-            put_candidate_back(K)
+            copy_candidate(K, False)
         fired = judge(K, h / K.n_substeps)
         if fired:
             answer = part - 1 if part > 1 else -1
@@ -58,21 +58,17 @@ def copy_ends(K: Guards, out: bool) -> None:
     if out and K.vector == 0:
         find_chart_end(K)
     o = carry(K.guards0, K.inside, 0, K.n_watched, out)
-    o = carry(K.guards1, K.inside, o, K.n_watched, out)
-    o = carry(K.lam, K.inside, o, K.n_rows, out)
+    carry(K.lam, K.inside, o, K.n_rows, out)
+    copy_candidate(K, out)
+
+
+def copy_candidate(K: Guards, out: bool) -> None:
+    """The same of the candidate alone; guards and multipliers of the accepted state stay what they are."""
+    o = carry(K.guards1, K.inside, K.n_watched + K.n_rows, K.n_watched, out)
     o = carry(K.lam1, K.inside, o, K.n_rows, out)
     o = carry(K.q1, K.inside, o, K.n_q, out)
     o = carry(K.y1, K.inside, o, K.n, out)
     carry(K.rate1, K.inside, o, K.n, out)
-
-
-def put_candidate_back(K: Guards) -> None:
-    """The candidate with its guards and multipliers; those of the accepted state stay what they are."""
-    o = carry(K.guards1, K.inside, K.n_watched, K.n_watched, False)
-    o = carry(K.lam1, K.inside, o + K.n_rows, K.n_rows, False)
-    o = carry(K.q1, K.inside, o, K.n_q, False)
-    o = carry(K.y1, K.inside, o, K.n, False)
-    carry(K.rate1, K.inside, o, K.n, False)
 
 
 def needs_multipliers(K: Contacts) -> bool:

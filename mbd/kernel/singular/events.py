@@ -12,7 +12,7 @@ from mbd.kernel.algebra.orthogonal import square
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CROSS, LOG_EVENT
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
-from mbd.kernel.events.guard_substeps import copy_ends, interpolate_candidate, put_candidate_back
+from mbd.kernel.events.guard_substeps import copy_candidate, copy_ends, interpolate_candidate
 from mbd.kernel.events.guards import judge_user
 from mbd.kernel.records import DependentRows, Kernel, SingularSteps, Switching
 from mbd.kernel.singular.step_size import MAX_NOISE, NOISE_RTOL, motion, noise_coefficient, row_norms
@@ -77,7 +77,7 @@ def show(K: Switching, t: float, h: float, s: float) -> None:
     if s < 1.0:
         interpolate_candidate(K, t, h, s, False)
     else:
-        put_candidate_back(K)
+        copy_candidate(K, False)
 
 
 def root_inside(K: Switching, e: int, t: float, h: float, low: float, high: float) -> float:
@@ -219,7 +219,7 @@ def log_passed_events(K: Switching, h: float) -> None:
         log_event(K, LOG_EVENT, first, 0.0, NO_IMPULSE)
         store_state(K, K.q1, K.y1, K.rate1, K.lam1)
         K.time = t
-        put_candidate_back(K)
+        copy_candidate(K, False)
         K.side[first] = -K.side[first]
         K.crossed[first] = -1.0
     copy_ends(K, False)
