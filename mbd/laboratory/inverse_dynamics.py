@@ -26,7 +26,8 @@ from mbd.joints.translation import Translation
 from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate, all_plates, loaded_model, wrenches
 from mbd.laboratory.least_norm import Balanced, balanced
-from mbd.laboratory.motion import Motion, motion_of, parameters_of, record_of
+from mbd.laboratory.motion import Motion, motion_of
+from mbd.laboratory.motion_record import parameters_of, record_of
 from mbd.laboratory.pins import Pin, pin_moments, without_pins
 from mbd.laboratory.scatter import noise_remarks
 from mbd.notes import doubt

@@ -13,9 +13,9 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.forces.smoothing import smoothed
-from mbd.laboratory.motion import derivatives
 from mbd.laboratory.nearest_posture import Postures, Problem
 from mbd.laboratory.quaternion_rates import make_continuous, quaternion_rates
+from mbd.laboratory.splines import derivatives
 from mbd.results.record import Record
 from mbd.results.trajectory import Trajectory
 

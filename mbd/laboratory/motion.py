@@ -8,30 +8,24 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.linalg.lapack import dpttrf, dpttrs
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.assemble import assemble
 from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.python import array_function
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
-from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.samples import Samples, in_degrees
 from mbd.laboratory.closed_loops import close_loops, refuse_open_loops
 from mbd.laboratory.quaternion_rates import make_continuous, quaternion_rates
 from mbd.laboratory.recording import Recording
+from mbd.laboratory.splines import GROUP, Spline
 from mbd.notes import doubt
-from mbd.results.record import Record
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["Motion", "derivatives", "motion_of", "parameters_of", "record_of"]
+__all__ = ["Motion", "motion_of"]
 
-GROUP = 8
-"""Columns that are differentiated at once, so that they stay in the processor's cache; two orientations."""
 MAX_FRAME_INTERVAL = 2.0
 """Time between frames above which it may be in milliseconds [s]."""
 
@@ -202,7 +196,7 @@ def _differentiate(
     waiting : (values, where their first derivatives go, and the second ones)
     spinning : (first place of a quaternion in q, places of its angular velocity in v)
     """
-    spline = _Spline(time) if waiting or spinning else None
+    spline = Spline(time) if waiting or spinning else None
     if spline is None:
         return
     for start in range(0, len(waiting), GROUP):
@@ -363,75 +357,6 @@ def _require_finite(given: Mapping[str, Any], time: Vector) -> None:
             raise ModelError(f"motion: the values of {key!r} are too large, up to {np.abs(table).max():.3g}")
 
 
-def derivatives(time: Vector, values: Matrix) -> tuple[Matrix, Matrix]:
-    """First and second derivative of the spline through values (R, n) at their times; zero of a single frame."""
-    spline = _Spline(time)
-    first, second = np.empty((2, values.shape[1], len(time)))
-    for start in range(0, values.shape[1], GROUP):
-        part = slice(start, start + GROUP)
-        first[part], second[part] = spline.slopes(values[:, part].T)
-    return first.T, second.T
-
-
-class _Spline:
-    """Derivatives at the knots of not-a-knot cubic splines, of a few columns at a time in memory that is used again.
-
-    Continuity of the second derivative, ``c₀ s₀ + 2 (c₀ + c₁) s₁ + c₁ s₂ = 3 (c₀ m₀ + c₁ m₁)`` with slopes m of the
-    chords and c one over their widths, is symmetric and positive definite, with the ends, ``s₀ = e − f s₁``, inserted.
-    """
-
-    def __init__(self, time: Vector) -> None:
-        self.time = time
-        if len(time) < 4:  # a line or a parabola
-            return
-        h = self.h = np.diff(time)
-        c = self.c = 1.0 / h
-        diagonal = 2.0 * (c[:-1] + c[1:])
-        for k, other in (0, 1), (-1, -2):
-            diagonal[k] -= (h[k] + h[other]) * c[k] * c[other]
-        *self.factors, _ = dpttrf(diagonal, c[1:-1])
-        count = len(time)
-        self.chord, self.bend, self.right, self.first, self.second = (
-            np.empty((GROUP, count - less)) for less in (1, 1, 2, 0, 0)
-        )
-
-    def slopes(self, rows: Matrix) -> tuple[Matrix, Matrix]:
-        """First and second derivatives (n, R) of up to `GROUP` rows; the next call overwrites them."""
-        if len(self.time) < 4:
-            zero = np.zeros(rows.shape)
-            curve = CubicSpline(self.time, rows.T) if len(self.time) > 1 and len(rows) else None
-            return (zero, zero) if curve is None else (curve(self.time, 1).T, curve(self.time, 2).T)
-        h, c = self.h, self.c
-        n = len(rows)
-        chord, bend, right, first, second = (
-            each[:n] for each in (self.chord, self.bend, self.right, self.first, self.second)
-        )
-        np.subtract(rows[:, 1:], rows[:, :-1], out=chord)
-        chord *= c
-        np.multiply(chord, 3.0 * c, out=bend)
-        np.add(bend[:, 1:], bend[:, :-1], out=right)
-        ends = []
-        for k, other in (0, 1), (-1, -2):
-            width = h[k] + h[other]
-            e = (h[k] + 2.0 * width) * h[other] * chord[:, k] + h[k] ** 2 * chord[:, other]
-            e /= width * h[other]
-            right[:, k] -= e * c[k]
-            ends.append((e, width * c[other]))
-        first[:, 1:-1] = dpttrs(*self.factors, right.T, overwrite_b=True)[0].T
-        for (e, f), k, inner in zip(ends, (0, -1), (1, -2), strict=True):
-            first[:, k] = e - f * first[:, inner]
-        # s'' = 2 c (3 m - 2 s - s of the next knot), of the last knot from its left
-        twice = 2.0 * c
-        second[:, -1] = (4.0 * first[:, -1] + 2.0 * first[:, -2] - 6.0 * chord[:, -1]) * c[-1]
-        inside = second[:, :-1]
-        np.multiply(first[:, :-1], -2.0, out=inside)
-        inside -= first[:, 1:]
-        inside *= twice
-        bend *= 2.0
-        inside += bend
-        return first, second
-
-
 # loops --------------------------------------------------------------------------------------------------------------
 def _closed(
     model: Any, mechanism: Mechanism, motion: Motion, missing: list[str], changed: Mapping[str, float]
@@ -452,104 +377,3 @@ def _closed(
     shown_names = ", ".join(map(repr, missing[:4])) + (f" and {len(missing) - 4} more" if missing[4:] else "")
     remarks = (*motion.notes, f"{shown_names} follow from the closed loops")
     return Motion(motion.time, found.q, found.v, found.a, None, remarks)
-
-
-# the record ---------------------------------------------------------------------------------------------------------
-def parameters_of(mechanism: Mechanism, motion: Motion, changed: Mapping[str, float], model: Any) -> Vector | Matrix:
-    """The parameters at the frames: those of the run, if it is one of the very same equations, with changes."""
-    run = motion.run
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}) if changed else {})
-    if run is None or run.record.equations is not mechanism.equations:
-        return values
-    own = run.record.parameters_at(np.arange(len(run.time), dtype=np.intp))
-    if not changed:
-        return own
-    places = [k for k, each in enumerate(mechanism.equations.parameters) if each.name in changed]
-    own = np.array(own)
-    own[..., places] = values[places]
-    return own
-
-
-def record_of(mechanism: Mechanism, motion: Motion, parameters: Vector | Matrix) -> Record:
-    """The frames as rows of a run, with the contact and friction forces that are known.
-
-    Those of a run act as they did; contacts of a recorded motion are open, and dry friction of joints slides.
-    """
-    equations, count = mechanism.equations, len(motion.time)
-    several = parameters.ndim == 2
-    changes = [(k, parameters[k]) for k in range(1, count)] if several else []
-    n_z, rows = equations.n_z, len(equations.rows)
-    record = Record(
-        equations, parameters[0] if several else parameters, [each.name for each in equations.parameters],
-        motion.time, motion.q, motion.v, np.zeros((count, n_z)), motion.a, np.zeros((count, n_z)),
-        np.zeros((count, rows)), np.zeros((count, len(equations.contacts)), dtype=np.uint8),
-        parameter_changes=changes, phase=np.zeros((count, len(equations.frictions)), dtype=np.int8),
-    )  # fmt: skip
-    if motion.run is not None:
-        return _with_forces(equations, record, motion.run)
-    if n_z:
-        raise CapabilityError(
-            f"inverse dynamics of a recorded motion does not know {equations.states[0].name!r}, a state of a force; "
-            "leave the force out by model.without(…), or give a run"
-        )
-    return _sliding(equations, record) if equations.frictions else record
-
-
-def _with_forces(equations: Equations, record: Record, run: Trajectory) -> Record:
-    """The same with the contacts of a run: multipliers, frictions and states, found by name."""
-    other = run.record.equations
-    source = run.record
-    if other is None:
-        if equations.contacts or equations.frictions or equations.n_z:
-            raise CapabilityError(
-                "motion: contact and friction forces of a run that was read from a file are not known by row; give the "
-                "run itself, or a model without contacts"
-            )
-        return record
-    lam, closed = record.lam.copy(), record.closed.copy()
-    phase, z, s = record.phase.copy(), record.z.copy(), record.s.copy()
-    theirs = {(row.owner, row.part): k for k, row in enumerate(other.rows)}
-    bilateral = set(equations.bilateral)
-    for k, row in enumerate(equations.rows):
-        if k not in bilateral and (row.owner, row.part) in theirs:
-            lam[:, k] = source.lam[:, theirs[row.owner, row.part]]
-    _copy([c.name for c in equations.contacts], [c.name for c in other.contacts], closed, source.closed)
-    _copy(_friction_names(equations), _friction_names(other), phase, source.phase)
-    _copy([c.name for c in equations.states], [c.name for c in other.states], z, source.z)
-    _copy([c.name for c in equations.states], [c.name for c in other.states], s, source.s)
-    same = [c.name for c in other.contacts] == [c.name for c in equations.contacts]
-    start = source.start if same and other.n_anchors == equations.n_anchors else None
-    return replace(record, lam=lam, closed=closed, phase=phase, z=z, s=s, start=start)
-
-
-def _friction_names(equations: Equations) -> list[str]:
-    return [f"{equations.rows[friction.row].title}" for friction in equations.frictions]
-
-
-def _copy(names: list[str], others: list[str], into: NDArray[Any], source: NDArray[Any]) -> None:
-    places = {name: k for k, name in enumerate(others)}
-    for k, name in enumerate(names):
-        if name in places:
-            into[:, k] = source[:, places[name]]
-
-
-def _sliding(equations: Equations, record: Record) -> Record:
-    """Dry friction of joints slides in the direction of its rate; that of open contacts is off."""
-    phase, lam = record.phase.copy(), record.lam.copy()
-    always = [k for k, friction in enumerate(equations.frictions) if friction.contact < 0]
-    nodes = [equations.frictions[k].rate for k in always] + [equations.frictions[k].sliding for k in always]
-    inputs = {
-        "t": record.time, "q": record.q, "v": record.v, "z": record.z, "a": record.a, "s": record.s, "lam": record.lam,
-        "anchor": np.zeros((len(record.time), equations.n_anchors)), "switch": record.closed,
-        "slip": np.zeros_like(phase),
-    }  # fmt: skip
-    found = array_function(nodes)(inputs, record.parameters_at(np.arange(len(record.time), dtype=np.intp)))
-    rates, limits = (dict(zip(always, part, strict=True)) for part in (found[: len(always)], found[len(always) :]))
-    for k in always:
-        group = equations.frictions[k].group
-        size = np.linalg.norm([rates[each] for each in group or (k,)], axis=0)
-        moves = size > 0.0
-        phase[:, k] = moves if group else np.sign(rates[k])
-        way = np.divide(rates[k], size, out=np.zeros_like(rates[k]), where=moves)
-        lam[:, equations.frictions[k].row] = way * limits[k]
-    return replace(record, phase=phase, lam=lam)

@@ -27,7 +27,8 @@ from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate
 from mbd.laboratory.inverse_dynamics import inverse_dynamics
 from mbd.laboratory.least_activation import least_activation
-from mbd.laboratory.motion import Motion, record_of
+from mbd.laboratory.motion import Motion
+from mbd.laboratory.motion_record import record_of
 from mbd.results.columns import ModelColumns
 from mbd.results.tables import library
 from mbd.tape.derivatives import gradient

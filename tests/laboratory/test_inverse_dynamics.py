@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import mbd
-from mbd.laboratory.motion import derivatives
+from mbd.laboratory.splines import derivatives
 from tests.laboratory.newton_euler import inertia_of, inverse, rotation
 
 
