@@ -470,4 +470,6 @@ def _spins(joint: Joint, body: Body, values: Mapping[str, float]) -> bool:
 
 
 def _weights(body: Body, values: Mapping[str, float]) -> list[float]:
-    return [values[f"{body.name}.{field}"] for field in body.fields() if field.startswith(("mass", "inertia"))]
+    """Its mass and inertias; one where something else of the same name has taken its place, as `name_faults` says."""
+    fields = [field for field in body.fields() if field.startswith(("mass", "inertia"))]
+    return [values.get(f"{body.name}.{field}", 1.0) for field in fields]

@@ -79,3 +79,11 @@ def test_vectors_are_arguments_by_their_names(axis):
     keys = start.keys()
     assert {f"ball.orientation.{'xyz'[axis]}", f"body.end.{'xyz'[axis]}"} <= set(keys) and len(set(keys)) == len(keys)
     assert all(np.all(np.isfinite(start[name])) for name in keys)
+
+
+def test_a_force_of_the_name_of_a_body_is_told():
+    model, wheel = mbd.Model("cart"), mbd.RigidBody("wheel", 0.2, 0.001)
+    model.connect(mbd.Revolute("pin", model.ground.origin, wheel.origin))
+    model.apply(mbd.Motor("wheel", model.joints[0], lambda t: t, arguments=["t"]))
+    with pytest.raises(mbd.ModelError, match="the name 'wheel' is used 2 times"):
+        mbd.assemble(model)
