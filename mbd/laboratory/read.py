@@ -32,6 +32,8 @@ ANGLE = re.compile(
     r"(angle|flexion|extension|rotation|adduction|abduction|tilt|list|obliquity)(_[lr])?$", re.IGNORECASE
 )
 """Channels that are angles by their names."""
+JOINT = re.compile("hip|knee|ankle|subtalar|shoulder|elbow|wrist|lumbar|trunk", re.IGNORECASE)
+"""Joints of a body, none of which turns by more than a turn."""
 MAX_MARKER_DISTANCE = 50.0
 """Distance of markers from each other that no laboratory has [m]."""
 
@@ -90,9 +92,15 @@ def _plate(plate: PlateRecord, turn: np.ndarray) -> PlateRecord:
 
 def _doubt_units(recording: Recording) -> None:
     for name, values in recording.channels.items():
-        if ANGLE.search(name) and (swing := in_degrees(values[np.isfinite(values)])):
+        known = values[np.isfinite(values)]
+        if not ANGLE.search(name) or not len(known):
+            continue
+        swing, how = in_degrees(known), "swings to and fro"
+        if not swing and JOINT.search(name) and np.ptp(known) > math.tau:  # half of a swing, or a part of it
+            swing, how = float(np.ptp(known)), "turns"
+        if swing:
             doubt(
-                f"{recording.name}: {name!r} swings to and fro by {swing:.3g} rad, {swing / math.tau:.1f} turns; it is "
+                f"{recording.name}: {name!r} {how} by {swing:.3g} rad, {swing / math.tau:.1f} turns; it is "
                 "probably in degrees: say so by inDegrees=yes in the header, or by 'knee_angle [deg]' above the column"
             )
             break

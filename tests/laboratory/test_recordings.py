@@ -122,6 +122,17 @@ def test_angles_in_degrees_under_a_header_of_radians_are_doubted(tmp_path, name,
     )
 
 
+@pytest.mark.parametrize(("name", "last", "doubted"), [
+    ("knee_angle_r", 64.0, True), ("left hip.flexion", 35.0, True), ("hip flexion [deg]", 64.0, False),
+    ("hip.flexion [rad]", 1.2, False), ("wheel.angle", 64.0, False), ("knee moment", 64.0, False),
+])  # fmt: skip
+def test_half_a_swing_of_a_joint_in_degrees_without_a_unit_is_doubted(tmp_path, name, last, doubted, recwarn):
+    rows = [f"{k / 100},{5.0 + (last - 5.0) * k / 59}" for k in range(60)] if last > 2.0 else ["0,0", "0.1,1.2"]
+    mbd.read(written(tmp_path, "swing.csv", f"time,{name}\n" + "\n".join(rows) + "\n"))
+    said = [str(each.message) for each in recwarn]
+    assert ["turns by" in text and "probably in degrees" in text for text in said] == ([True] if doubted else [])
+
+
 CSV_VARIANTS = {
     "as it is": CSV,
     "semicolons and commas": CSV.replace(",", ";").replace(".1;", ",1;").replace("0.2;", "0,2;"),
