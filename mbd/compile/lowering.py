@@ -287,7 +287,8 @@ def _places(outputs: Sequence[Node]) -> dict[int, list[int]]:
     """Where each node is asked for, by its index."""
     places: dict[int, list[int]] = {}
     for k, node in enumerate(outputs):
-        places.setdefault(node.index, []).append(k)
+        if not node.is_untouched:
+            places.setdefault(node.index, []).append(k)
     return places
 
 

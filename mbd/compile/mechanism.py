@@ -185,11 +185,21 @@ class Mechanism:
                     require_room_for_tangent(len(self.equations.tape.nodes))
                     outputs = programs.newton(self.equations, active)
                     order = self._order(pattern(outputs, self.layout.n + len(active.rows)), active.rows)
+                    if order is not None:
+                        outputs = self._as_eliminated(outputs, active, order)
                     return {"tangent": outputs, "residual": programs.residual(self.equations, active)}, {"order": order}
 
                 facts, (tangent, residual) = self._add("mode", active, ("tangent", "residual"), make)
                 self._modes[active] = ModeCode(active, tangent, residual, order=_numbers(facts["order"]))
             return self._modes[active]
+
+    def _as_eliminated(self, outputs: Sequence[Node], active: ActiveSet, order: list[int]) -> list[Node]:
+        """The tangent of a mode without the zeros that nobody reads who eliminates in this order."""
+        n, n_v, m = self.layout.n, self.layout.n_v, len(active.rows)
+        asked = {int(place) for places in written(_numbers(order), n, n_v, active.stabilized) for place in places}
+        asked.update(range((n + m) ** 2, (n + m) ** 2 + active.tail(n)))
+        untouched = self.equations.tape.untouched
+        return [untouched if node.is_zero and k not in asked else node for k, node in enumerate(outputs)]
 
     def _composed(self, active: ActiveSet) -> ModeCode:
         """A mode of parts, each of which is made the first time that a mode needs it."""

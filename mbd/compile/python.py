@@ -137,6 +137,8 @@ def scalar_source(outputs: Sequence[Node], layout: Layout, operations: Mapping[s
         if text is None:  # a constant, or an input that is asked for the first time
             if node.op == "const":
                 text = _literal(node.data)
+            elif node.is_untouched:
+                text = "0.0"
             else:
                 kind, index = node.data
                 text = f"v{node.index}"

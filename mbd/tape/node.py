@@ -17,6 +17,9 @@ from mbd.tape.table import Table
 
 __all__ = ["BINARY", "CONDITIONS", "UNARY", "Node", "Scalar", "Table", "Tape"]
 
+UNTOUCHED = "untouched"
+"""Kind of the input that stands for an output as it was before."""
+
 
 def _is_scalar(value: object) -> bool:
     """False for arrays, whose own arithmetic then goes element by element."""
@@ -153,6 +156,11 @@ class Node:
         return self.op == "const"
 
     @property
+    def is_untouched(self) -> bool:
+        """Whether this is `Tape.untouched`."""
+        return self.op == "input" and bool(self.data[0] == UNTOUCHED)
+
+    @property
     def is_zero(self) -> bool:
         return self.op == "const" and self.data == 0.0
 
@@ -209,6 +217,11 @@ class Tape:
     def input(self, kind: str, index: int = 0) -> Node:
         """The node of a run-time input, known by its kind ('t', 'q', 'v', 'p', …) and place."""
         return self._make(("input", kind, index), "input", (), (kind, index))
+
+    @property
+    def untouched(self) -> Node:
+        """An output that compiled code leaves as it finds it; interpreted code writes 0."""
+        return self.input(UNTOUCHED)
 
     def table(
         self,

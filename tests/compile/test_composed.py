@@ -62,7 +62,7 @@ def test_a_sum_of_parts_is_the_program_of_the_mode(name, stabilized, backend, mo
         for program in ("tangent", "residual"):
             a, b = getattr(one, program), getattr(other, program)
             assert a.size == b.size
-            found, left, cleared = np.full(a.size, np.nan), np.full(a.size, np.nan), np.zeros(a.size)
+            found, left, cleared = np.zeros(a.size), np.full(a.size, np.nan), np.zeros(a.size)
             a(block, parameters, found)
             b(block, parameters, left)
             b(block, parameters, cleared)

@@ -162,6 +162,27 @@ def assert_same_run(one, two):
         np.testing.assert_allclose(getattr(a, part), getattr(b, part), rtol=0, atol=bound * scale, err_msg=part)
 
 
+@pytest.mark.parametrize("stabilized", [False, True])
+def test_a_tangent_touches_what_its_order_asks_for_alone(stabilized):
+    """Which grows with the number of loops, while the matrix grows with its square."""
+    touched = []
+    for loops in (LOOPS, 2 * LOOPS):
+        mechanism = mechanism_of(four_bars(loops).start[0])
+        mode = mechanism.mode(ActiveSet(tuple(range(mechanism.layout.n_rows)), (), stabilized, (), ()))
+        n, m, n_v = mechanism.layout.n, mechanism.layout.n_rows, mechanism.layout.n_v
+        block = np.random.default_rng(loops).uniform(-1.0, 1.0, mechanism.layout.size)
+        out, cleared = np.full(mode.tangent.size, np.nan), np.zeros(mode.tangent.size)
+        mode.tangent(block, mechanism.parameters(), out)
+        mode.tangent(block, mechanism.parameters(), cleared)
+        known, tail = ~np.isnan(out), mode.active.tail(n)
+        np.testing.assert_array_equal(out[known], cleared[known])
+        assert not cleared[~known].any()
+        assert known[np.concatenate(orders.written(mode.order, n, n_v, stabilized))].all()
+        assert known[(n + m) ** 2 : (n + m) ** 2 + tail].all()
+        touched.append(int(np.count_nonzero(known)))
+    assert touched[1] < 2.1 * touched[0] < 0.5 * mode.tangent.size
+
+
 @pytest.mark.sampled(2)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_a_chain_of_loops_moves_as_with_dense_factors(scheme, monkeypatch):
