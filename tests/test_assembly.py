@@ -10,6 +10,7 @@ import sympy
 from hypothesis import given, settings, strategies as st
 
 import mbd
+from mbd.assembly import inertia
 from mbd.assembly.posture import damped_step
 from mbd.compile.mechanisms import mechanism_of
 from tests.simulation.mechanisms import ball, box, falling, kneed_walker, kneed_walker_start, pendulum, point, two_balls
@@ -353,3 +354,27 @@ def test_the_damped_step_takes_rows_of_any_rank_and_size(rows: int, columns: int
         balance = J.T @ (h + J @ x) + damping * x
         assert np.all(np.isfinite(x))
         assert np.linalg.norm(balance) <= 1e-13 * scale * (np.linalg.norm(h) + scale * np.linalg.norm(x))
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1), n=st.integers(2, 9), power=st.integers(-16, 0), sign=st.sampled_from([-1.0, 1.0])
+)
+def test_bounds_of_norms_and_factors_find_no_weak_motion_that_singular_values_do_not(seed, n, power, sign):
+    """And none is lost: what they pass has none that is below the limits."""
+    rng = np.random.default_rng(seed)
+    Q = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    A = (Q * np.append(sign * 10.0**power, rng.uniform(0.5, 2.0, n - 1))) @ Q.T
+    A = 0.5 * (A + A.T)
+    scale = np.sqrt(np.max(np.abs(A), axis=1))
+    scaled = A / np.outer(scale, scale)
+    smallest = np.linalg.svd(scaled)[1][-1]
+    if inertia._is_regular(scaled[np.newaxis], n):
+        assert smallest > (1.0 - 1e-3) * n * inertia.ROUND_OFF_RTOL
+        assert not inertia._weak_motions(A, n)
+    else:
+        assert smallest < n * n * inertia.ROUND_OFF_RTOL
+    least = np.linalg.eigvalsh(scaled)[0]
+    if inertia._is_definite(scaled[np.newaxis], -1e-9):
+        assert least > -1e-9
+    else:
+        assert least < -1e-10

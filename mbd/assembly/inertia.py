@@ -81,7 +81,10 @@ def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
     scale = np.sqrt(np.max(np.abs(matrix), axis=1))
     scale[scale == 0.0] = 1.0
     scaled, found, largest = matrix / np.outer(scale, scale), list[tuple[float, Vector]](), 1e-300
-    for islands in alike_islands(scaled, n):
+    groups = list(alike_islands(scaled, n))
+    if all(_is_regular(scaled[islands[:, :, np.newaxis], islands[:, np.newaxis]], len(matrix)) for islands in groups):
+        return []
+    for islands in groups:
         _, sizes, right = np.linalg.svd(scaled[islands[:, :, np.newaxis], islands[:, np.newaxis]])
         largest = max(largest, float(np.max(sizes)))
         for place, k in zip(*np.nonzero(sizes < len(matrix) * ROUND_OFF_RTOL), strict=True):
@@ -90,6 +93,24 @@ def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
             found.append((float(sizes[place, k]), motion / scale))
     weak = [(size / largest, motion) for size, motion in found if size / largest < ROUND_OFF_RTOL]
     return sorted(weak, key=lambda each: -each[0])
+
+
+def _is_regular(blocks: Matrix, size: int) -> bool:
+    """Whether the inverses, whose norms bound singular values, tell that none is small; cheaper than these values."""
+    try:
+        bound = np.linalg.norm(np.linalg.inv(blocks), axis=(1, 2))
+    except np.linalg.LinAlgError:
+        return False
+    return bool(np.all(bound * size * ROUND_OFF_RTOL < 1.0))
+
+
+def _is_definite(blocks: Matrix, least: float) -> bool:
+    """Whether factors tell that all eigenvalues are above `least`, which is negative; cheaper than these values."""
+    try:
+        np.linalg.cholesky(blocks - 0.5 * least * np.eye(blocks.shape[-1]))
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def lost_sentence(name: str, size: float) -> str:
@@ -125,6 +146,8 @@ def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
     scaled, rows = M / np.outer(scale, scale), B / scale
     least, motion = -1e-9, np.zeros(0)
     for own, lines in islands_of_rows(scaled, rows):
+        if _is_definite(scaled[own[:, :, np.newaxis], own[:, np.newaxis]], least):
+            continue
         held = lines.shape[1]
         free = np.linalg.svd(rows[lines[:, :, np.newaxis], own[:, np.newaxis]])[2][:, held:] if held else None
         block = scaled[own[:, :, np.newaxis], own[:, np.newaxis]]

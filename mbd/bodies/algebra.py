@@ -55,8 +55,15 @@ def norm(a: Triple) -> Scalar:
 
 
 def rotate(R: Rotation, a: Triple) -> Triple:
-    """R a."""
+    """R a; of a plane, whose rotations are most of what is traced, without the terms that are zero."""
+    if R[0][0].__class__ is Node and _turns_about_z(R):
+        return (R[0][0] * a[0] + R[0][1] * a[1], R[1][0] * a[0] + R[1][1] * a[1], R[2][2] * a[2])
     return (dot(R[0], a), dot(R[1], a), dot(R[2], a))
+
+
+def _turns_about_z(R: Rotation) -> bool:
+    (_, _, xz), (_, _, yz), (zx, zy, _) = R
+    return all(part.is_zero if part.__class__ is Node else part == 0.0 for part in (xz, yz, zx, zy))
 
 
 def transpose(R: Rotation) -> Rotation:

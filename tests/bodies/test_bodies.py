@@ -8,7 +8,9 @@ import pytest
 
 import mbd
 from mbd.bodies import Ground
+from mbd.bodies.algebra import axis_rotation, dot, product, rotate, transpose
 from mbd.errors import ModelError
+from mbd.tape.node import Tape
 from tests.helpers import FreeScope
 
 BODIES = [
@@ -131,3 +133,14 @@ def test_wrong_numbers_are_refused_at_once(make, told):
 def test_a_planar_inertia_is_exempt_from_the_triangle_inequality():
     assert mbd.RigidBody("wheel", 1.0, (0.0, 0.0, 3.0)).faults() == []
     assert mbd.Link("thigh", 1.0, 0.4, 0.2, inertia=5.0).faults() == []
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8)])
+@pytest.mark.parametrize("flat", [False, True])
+def test_a_rotation_is_traced_as_the_products_with_its_rows(axis, flat):
+    """Where it turns about z, terms that are zero are left out, which changes no expression."""
+    tape = Tape()
+    R = axis_rotation(axis, tape.input("q", 0))
+    a = (tape.input("q", 1), tape.input("q", 2), 0.0 if flat else tape.input("q", 3))
+    for known in (R, product(R, R), transpose(R)):
+        assert [tape.lift(part) for part in rotate(known, a)] == [tape.lift(dot(row, a)) for row in known]
