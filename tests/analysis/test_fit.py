@@ -251,3 +251,15 @@ def test_a_coordinate_behind_a_quaternion_is_held_as_it_is_named():
         value = start[f"{name}.angle"] + 0.02
         moved = changed_start(model, start, {f"{name}.angle": value, f"{name}.rate": 0.1}, {}, "auto")
         assert moved[f"{name}.angle"] == value and moved[f"{name}.rate"] == 0.1
+
+
+def test_each_run_of_a_fit_is_asked_once_for_all_columns_of_the_same_times(monkeypatch):
+    model, start = pendulum()
+    run = mbd.simulate(model, start, mbd.Newmark(), dt=0.02, until=2.0)
+    names, asked, own = ["pin.angle", "pin.angle.rate", "rod.end.x"], [], mbd.Trajectory.at
+    data = {"time": TIMES} | {name: run.at(TIMES)[name] for name in names}
+    monkeypatch.setattr(mbd.Trajectory, "at", lambda *given, **more: asked.append(0) or own(*given, **more))
+    search = _Search(model, start, Data.read(data, None, None), ("rod.center",), mbd.Newmark(), 0.02, None, 2.0, "auto")
+    search.check()
+    search.least(np.array([1.2]), np.array([0.1]), np.array([3.0]))
+    assert search.runs > 2 and len(asked) == search.runs

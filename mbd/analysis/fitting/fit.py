@@ -264,6 +264,7 @@ class _Search:
     problem: str = ""
     run: Trajectory | None = None
     at: Vector | None = None
+    left: Vector | None = None
     best: _Trial | None = None
 
     def check(self) -> None:
@@ -289,7 +290,7 @@ class _Search:
         """The run with these values; None if it fails."""
         if self.at is not None and np.array_equal(values, self.at):
             return self.run
-        self.at, self.run = values.copy(), None
+        self.at, self.run, self.left = values.copy(), None, None
         self.runs += 1
         try:
             given = dict(zip(self.names, map(float, values), strict=True))
@@ -308,13 +309,24 @@ class _Search:
     def residuals(self, values: Vector) -> Vector:
         """Computed less measured, over the scales; infinite where the run does not get there."""
         run = self.made(values)
+        if self.left is None:
+            self.left = self._left(run)
+        return self.left.copy()
+
+    def _left(self, run: Trajectory | None) -> Vector:
         if run is None or run.time[-1] < max((times[-1] for times, _ in self.data.columns.values()), default=0.0):
             self.problem = self.problem if run is None else run.message
             return np.full(self.data.count, np.inf)
-        parts = [
-            (np.asarray(run.at(times)[name]) - seen) / self.data.scales[name]
-            for name, (times, seen) in self.data.columns.items()
-        ]
+        alike = dict[bytes, list[str]]()
+        for name, (times, _) in self.data.columns.items():
+            alike.setdefault(times.tobytes(), []).append(name)
+        read = dict[str, Vector]()
+        for names in alike.values():
+            read |= run.at(self.data.columns[names[0]][0]).read(*names)
+        parts = list[Vector]()
+        for name, (times, seen) in self.data.columns.items():
+            computed = read[name] if np.isfinite(read[name]).all() else run.at(times)[name]  # which says what is wrong
+            parts.append((computed - seen) / self.data.scales[name])
         for name, instant in self.data.events.items():
             found = instants_of(run).get(name, math.inf)
             if not math.isfinite(found):
