@@ -135,17 +135,6 @@ def test_what_a_mode_of_a_lagrangian_sets_is_checked(name: str, value: float, me
         model.require_valid()
 
 
-def test_schemes_keep_their_order_across_transitions() -> None:
-    model = knee()
-    start = mbd.assemble(model, {"knee.angle": 0.8})
-    _, (q, _) = oracle(1.0, 0.8)
-    errors = []
-    for dt in (4e-3, 2e-3, 1e-3):
-        errors.append(abs(mbd.simulate(model, start, mbd.HHT(alpha=0.0), dt=dt, until=1.0).final.q[0] - q))
-    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
-    assert np.all(np.abs(orders - 2.0) < 0.15), orders
-
-
 def test_energy_is_balanced_though_a_clutch_moves_what_a_spring_stores() -> None:
     model = mbd.Model("clutch")
     rod = mbd.Link("rod", mass=2.0, length=0.4, center=0.2, inertia=0.03)

@@ -132,7 +132,7 @@ class Report(SchemeAbilities):
     failure_time: float = place("detail")
     failure_size: float = place("detail")  # its residual, or whatever is too large
     failure_step: float = place("detail")
-    failure_index: int = place("state")  # contact, column or row
+    failure_index: int = place("state")  # contact, column, row or guard
     unforeseen_change: float = place(
         "detail"
     )  # growth of rates that nothing predicted: see `mbd.kernel.stepping.resolution`

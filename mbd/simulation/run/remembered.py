@@ -145,7 +145,8 @@ def _judged(kept: Kernel, memory: Memory, run: RunData) -> str:
 
 def _of_state(v: Kernel) -> dict[str, tuple[int, int]]:
     """Least and largest value of each number in `state`; those of rows and lines of results are set to 0 anyway."""
-    indices = v.n + max(v.n_rows, v.n_contacts, v.n_frictions)  # columns of rows come after those of velocities
+    # columns of rows come after those of velocities; transitions are numbered as guards are
+    indices = v.n + max(v.n_rows, v.n_contacts, v.n_frictions, v.n_guards)
     return {
         "n_active": (0, v.n_rows), "grid_steps": (0, NO_LIMIT), "restart_due": (0, 2), "n_switches": (0, NO_LIMIT),
         "steps_since_row": (0, NO_LIMIT), "failure_index": (-1, indices), "n_dropped": (0, v.n_rows),
