@@ -79,8 +79,10 @@ def choose_turns(work: Posture, rows: Sequence[int]) -> None:
     for turn, angle in zip(turns, angles, strict=True):
         off = float(angle) - targets.get(turn.name, 0.0)
         work.anchors[turn.anchor] -= turn.sign * whole_turns(off)
-    for turn in turns:
-        if turn.name and turn.name not in targets and turn.anchor in _in_rows(work, rows):
+    free = [turn for turn in turns if turn.name and turn.name not in targets]
+    asked = _in_rows(work, rows) if free else set()
+    for turn in free:
+        if turn.anchor in asked:
             h = _residuals(work, rows)
             work.anchors[turn.anchor] += 1.0
             slope = _residuals(work, rows) - h

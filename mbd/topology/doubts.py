@@ -234,12 +234,16 @@ def _awaited(model: Any) -> list[str]:
 
 def _twice(model: Any) -> list[str]:
     """Joints of one kind and axis between the same points."""
-    joints = [joint for joint in getattr(model, "joints", ()) if hasattr(joint, "parent")]
+    alike: dict[tuple[type, frozenset[str]], list[Any]] = {}
+    for joint in getattr(model, "joints", ()):
+        if hasattr(joint, "parent"):
+            alike.setdefault((type(joint), frozenset({joint.parent.full_name, joint.child.full_name})), []).append(
+                joint
+            )
     return [
         f"'{one.name}' and '{other.name}' hold the same points together; leave one out, or their reactions are shared "
         "in no definite way"
+        for joints in alike.values()
         for one, other in combinations(joints, 2)
-        if type(one) is type(other)
-        and {one.parent.full_name, one.child.full_name} == {other.parent.full_name, other.child.full_name}
-        and getattr(one, "axis", None) == getattr(other, "axis", None)
+        if getattr(one, "axis", None) == getattr(other, "axis", None)
     ]
