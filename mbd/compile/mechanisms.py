@@ -1,14 +1,19 @@
-"""Derived and compiled mechanisms, kept as long as the model that they were made from is unchanged."""
+"""Derived and compiled mechanisms, kept as long as the model that they were made from is unchanged.
+
+The last few are kept by their words, too: a model that says the same as another one has the same equations.
+"""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Collection, Mapping
+from collections import OrderedDict
+from collections.abc import Collection, Hashable, Mapping
 from operator import is_
 from typing import Any
 from weakref import WeakKeyDictionary
 
 from mbd.compile.forking import free_in_child
+from mbd.compile.identity import identity_of_words
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
@@ -20,6 +25,9 @@ __all__ = ["mechanism_of", "require_model", "tunable_model"]
 
 _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept]] = WeakKeyDictionary()
 _TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept]] = WeakKeyDictionary()
+_BY_WORDS: OrderedDict[Hashable, Mechanism] = OrderedDict()
+"""The mechanisms that were asked for last, by what their models say."""
+MOST_BY_WORDS = 8
 _LOCK = threading.Lock()
 free_in_child(_LOCK)
 
@@ -125,10 +133,31 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
     if known is not None and known.serves(now):
         kept: Mechanism = known.made
         return kept
-    described = model
-    if tunable:
-        described = model.with_tunable(*sorted(tunable))
-    made = Mechanism(derive(described), backend)
+    key = backend, tunable, _words(model)
+    with _LOCK:
+        made = _BY_WORDS.get(key) if key[-1] else None
+    if made is None:
+        made = _derived(model, backend, tunable)
+    with _LOCK:
+        _KNOWN[model][backend, tunable] = _Kept(model, now, made)
+        if key[-1]:
+            _BY_WORDS[key] = made
+            _BY_WORDS.move_to_end(key)
+            while len(_BY_WORDS) > MOST_BY_WORDS:
+                _BY_WORDS.popitem(last=False)
+    return made
+
+
+def _words(model: Any) -> str | None:
+    """What the equations of a model follow from, as a digest; None where they may depend on more."""
+    if not isinstance(model, Description) or type(model).__module__ != "mbd.model" or model.controllers:
+        return None
+    points = [[*body.points.items()] for body in bodies_of(model)]
+    return identity_of_words(model.name, *_description(model), model.markers, points)
+
+
+def _derived(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
+    made = Mechanism(derive(model.with_tunable(*sorted(tunable)) if tunable else model), backend)
     if made.backend.note:
         doubt(made.backend.note, of=PROCESS)
     if tunable:
@@ -139,6 +168,4 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
         made.without_effect = tunable - {parameter.name for parameter in made.equations.parameters}
         idle = sorted(made.without_effect)
         made.notes += [f"{name!r} enters no equation of this model: its value has no effect" for name in idle]
-    with _LOCK:
-        _KNOWN[model][backend, tunable] = _Kept(model, now, made)
     return made

@@ -178,7 +178,8 @@ def test_the_environment_asks_for_a_level_too(monkeypatch, jobs, level):
 
 def walk(monkeypatch, jobs, when, hasty=0):
     """A walk of 0.9 s in which level 2 comes before call number `when` of the kernel."""
-    monkeypatch.setattr(mechanisms, "_KNOWN", type(mechanisms._KNOWN)())
+    for kept in ("_KNOWN", "_BY_WORDS"):
+        monkeypatch.setattr(mechanisms, kept, type(getattr(mechanisms, kept))())
     monkeypatch.setattr(llvm, "MAX_QUICK_LINES", hasty)
     walker = kneed_walker()
     start = kneed_walker_start(walker)

@@ -93,6 +93,7 @@ def test_threads_that_share_a_model_get_the_same_bits():
     alone = walk(*fresh())
     for _ in range(3):
         walker, start = fresh()
+        mechanisms._BY_WORDS.clear()
         mechanisms._KNOWN.pop(walker, None)  # derived and compiled by the threads themselves
         with ThreadPoolExecutor(4) as pool:
             futures = [pool.submit(walk, walker, start) for _ in range(4)]

@@ -1,0 +1,162 @@
+"""A model that says the same as one before has its equations; one that may mean something else has its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mbd
+from mbd.compile import mechanisms
+from mbd.compile.mechanisms import mechanism_of
+from tests.fuzz.structures import DRIVEN, SPACE, structure
+
+made = structure.__wrapped__
+"""A random mechanism of a number, described anew each time."""
+NUMBERS = [*range(0, 160, 9), *range(SPACE, SPACE + 160, 19), *range(DRIVEN, DRIVEN + 160, 19)]
+
+
+def rod(torque: Any, **words: Any) -> mbd.Model:
+    model = mbd.Model("rod", **words)
+    link = mbd.Link("rod", mass=1.3, length=0.7, center=0.3, inertia=0.05)
+    hinge = mbd.Revolute("hinge", model.ground.origin, link.start)
+    model.connect(hinge)
+    model.apply(mbd.Motor("drive", hinge, torque=torque))
+    return model
+
+
+def end(model: mbd.Model) -> float:
+    return float(mbd.simulate(model, mbd.assemble(model), dt=0.01, until=0.2)["hinge.angle"][-1])
+
+
+@pytest.fixture
+def _forgotten() -> Iterator[None]:
+    mechanisms._BY_WORDS.clear()
+    yield
+    mechanisms._BY_WORDS.clear()
+
+
+def test_random_mechanisms_described_twice_are_derived_once_and_move_alike_to_the_bit(monkeypatch):
+    shared = 0
+    for number in NUMBERS[::3]:
+        one, other = made(number), made(number)
+        shared += mechanism_of(one.model) is mechanism_of(other.model)
+        runs = []
+        for _ in range(2):
+            start = mbd.assemble(other.model, position=other.position, project=True)
+            runs.append(mbd.simulate(other.model, start, mbd.HHT(), dt=1e-3, until=5e-3, contact="events").record)
+            monkeypatch.setattr(mechanisms, "_words", lambda model: None)
+            other = made(number)
+        monkeypatch.undo()
+        assert np.array_equal(runs[0].q, runs[1].q, equal_nan=True), number
+        assert np.array_equal(runs[0].v, runs[1].v, equal_nan=True), number
+    assert shared >= 0.8 * len(NUMBERS[::3])
+
+
+def _numbers(words: Any, met: dict[int, Any]) -> Iterator[tuple[Any, str, float]]:
+    """Every number in a field of a word, and of what the word refers to."""
+    if id(words) in met:
+        return
+    met[id(words)] = words
+    if is_dataclass(words) and not isinstance(words, type):
+        for each in fields(words):
+            value = getattr(words, each.name)
+            if isinstance(value, float):
+                yield words, each.name, value
+            else:
+                yield from _numbers(value, met)
+    elif isinstance(words, list | tuple):
+        for part in words:
+            yield from _numbers(part, met)
+
+
+def test_every_number_of_a_random_mechanism_counts():
+    changed = 0
+    for number in NUMBERS:
+        model = made(number).model
+        before = mechanisms._words(model)
+        if before is None:
+            continue
+        groups = (model.joints, model.forces, model.constraints)
+        for word, name, value in [*_numbers(groups, {})]:
+            object.__setattr__(word, name, float(np.nextafter(value, np.inf)))
+            after = mechanisms._words(model)
+            object.__setattr__(word, name, value)
+            assert after != before, (number, word, name)
+            changed += 1
+        assert mechanisms._words(model) == before
+    assert changed > 300
+
+
+@dataclass(frozen=True)
+class Gains:
+    stiff: float
+    damp: float = 0.1
+
+
+SIZE = 2.0
+
+
+def scaled(t: Any) -> Any:
+    return SIZE * mbd.sin(t)
+
+
+@pytest.mark.usefixtures("_forgotten")
+def test_functions_are_the_same_if_all_that_they_refer_to_is(monkeypatch):
+    def captured(size: Any) -> mbd.Model:
+        return rod(lambda t: size * mbd.sin(t))
+
+    def default(size: float) -> mbd.Model:
+        return rod(lambda t, size=size: size * mbd.sin(t))
+
+    def of_gains(size: float) -> mbd.Model:
+        gains = Gains(size)
+        return rod(lambda t: gains.stiff * mbd.sin(t))
+
+    for make in (captured, default, of_gains):
+        mechanisms._BY_WORDS.clear()
+        assert mechanism_of(make(2.0)) is mechanism_of(make(2.0))
+        assert end(make(3.0)) == pytest.approx(1.5 * end(make(2.0)), rel=0.01)
+    first = mechanism_of(rod(scaled))
+    assert mechanism_of(rod(scaled)) is first
+    monkeypatch.setitem(globals(), "SIZE", 3.0)
+    assert mechanism_of(rod(scaled)) is not first
+    assert end(rod(scaled)) == end(captured(3.0))
+    assert mechanism_of(rod(lambda t: mbd.sin(t))) is not mechanism_of(rod(lambda t: mbd.cos(t)))
+
+
+@pytest.mark.usefixtures("_forgotten")
+def test_a_function_that_holds_what_can_be_changed_belongs_to_its_own_model():
+    def counted(log: list[float]) -> mbd.Model:
+        model = rod(0.0)
+        angle = mbd.measure(lambda q: q - 0.05, "hinge.angle", unit="rad")
+        model.constrain(mbd.Event("passing", angle, direction=0, reset=lambda v: log.append(1.0) or {}))
+        return model
+
+    logs = [[], []]
+    for log in logs:
+        model = counted(log)
+        mbd.simulate(model, mbd.assemble(model, position={"hinge.angle": 0.4}), dt=0.01, until=0.5)
+    assert len(logs[0]) == len(logs[1]) > 0
+
+
+@pytest.mark.usefixtures("_forgotten")
+def test_named_points_gravity_and_names_of_inputs_count():
+    first = mechanism_of(rod(1.0))
+    pointed = rod(1.0)
+    pointed.joints[0].child.body.point(0.0, -0.5, 0.0, name="mark")
+    assert mechanism_of(pointed) is not first
+    assert "rod.mark.x" in mbd.simulate(pointed, mbd.assemble(pointed), dt=0.01, until=0.02).names
+    assert mechanism_of(rod(1.0, gravity=(0.0, -1.6, 0.0))) is not first
+    assert mechanism_of(rod(1.0, tunable=["gravity.x"])) is not first
+    assert mechanism_of(rod(1.0)) is first
+
+
+@pytest.mark.usefixtures("_forgotten")
+def test_only_the_last_few_are_kept():
+    for k in range(3 * mechanisms.MOST_BY_WORDS):
+        mechanism_of(rod(1.0 + 0.1 * k))
+    assert len(mechanisms._BY_WORDS) == mechanisms.MOST_BY_WORDS
