@@ -291,8 +291,10 @@ def _content(cell: types.CellType) -> Any:
 
 
 def _is_library(item: Any) -> bool:
-    """Whether something belongs to Python, to an installed package or to this one."""
+    """Whether something belongs to Python, to an installed package or to this one, where its name tells what it is."""
     if isinstance(item, types.FunctionType):
+        if "<" in item.__qualname__:  # made in another function, of whose values it may hold some
+            return False
         path = item.__code__.co_filename
     else:
         module = item if isinstance(item, types.ModuleType) else sys.modules.get(item.__module__)

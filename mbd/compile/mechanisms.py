@@ -15,8 +15,11 @@ from weakref import WeakKeyDictionary
 from mbd.compile.forking import free_in_child
 from mbd.compile.identity import identity_of_words
 from mbd.compile.mechanism import Mechanism
+from mbd.constraints.base import Constraint
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
+from mbd.forces.base import Force
+from mbd.joints.base import Joint
 from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
 from mbd.topology.description import Description
@@ -151,6 +154,9 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
 def _words(model: Any) -> str | None:
     """What the equations of a model follow from, as a digest; None where they may depend on more."""
     if not isinstance(model, Description) or type(model).__module__ != "mbd.model" or model.controllers:
+        return None
+    kinds = (model.joints, Joint), (model.forces, Force), (model.constraints, Constraint)
+    if not all(isinstance(word, kind) for words, kind in kinds for word in words):
         return None
     points = [[*body.points.items()] for body in bodies_of(model)]
     return identity_of_words(model.name, *_description(model), model.markers, points)

