@@ -138,7 +138,7 @@ class StoredStates:
 
     @cached_property
     def anchors(self) -> Matrix:
-        """What each contact captured where it last closed, or began to stick, or holds from the start, until it opens."""
+        """What each contact captured where it closed or began to stick, or holds from the start, until it opens."""
         start, wrapped = self.record.start, self.equations.wrapped
         held = np.zeros((len(self.record.time), self.equations.n_anchors))
         counts = [turn.anchor for turn in self.equations.turns]

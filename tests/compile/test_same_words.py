@@ -12,6 +12,7 @@ import pytest
 import mbd
 from mbd.compile import mechanisms
 from mbd.compile.mechanisms import mechanism_of
+from mbd.hardcases.shakers import table
 from tests.fuzz.structures import DRIVEN, SPACE, structure
 
 made = structure.__wrapped__
@@ -125,6 +126,9 @@ def test_functions_are_the_same_if_all_that_they_refer_to_is(monkeypatch):
     monkeypatch.setitem(globals(), "SIZE", 3.0)
     assert mechanism_of(rod(scaled)) is not first
     assert end(rod(scaled)) == end(captured(3.0))
+    assert mechanism_of(table.__wrapped__(1.0, 9.81, 0.1, 3.0)) is not mechanism_of(
+        table.__wrapped__(1.0, 9.81, 0.2, 3.0)
+    )
     assert mechanism_of(rod(lambda t: mbd.sin(t))) is not mechanism_of(rod(lambda t: mbd.cos(t)))
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import mbd
 
@@ -26,18 +25,27 @@ def sliding_rod(curvature: float, lean: float, speed: float) -> tuple[mbd.Model,
     return model, start
 
 
-@settings(max_examples=12)
-@given(curvature=st.floats(-1.0, 1.5), lean=st.floats(-0.4, 0.4), speed=st.floats(-0.6, -0.2))
-def test_forces_of_a_foot_that_sticks_after_a_slide_are_right_between_rows(curvature, lean, speed):
-    model, start = sliding_rod(curvature, lean, speed)
-    exact = mbd.simulate(model, start, mbd.RadauIIA(), tol=1e-10, until=0.25)
-    stuck = [event.time for event in exact.events if event.kind == "stuck"]
-    loosened = [event.time for event in exact.events if event.kind in ("slipped", "open")]
-    end = min([t for t in loosened if stuck and t > stuck[0]], default=0.25)
-    if not stuck or end - stuck[0] < 0.02:
-        return
-    times = np.linspace(stuck[0] + 2e-3, end - 2e-3, 40)
-    for scheme in (mbd.RadauIIA(), mbd.RungeKutta853()):
-        run = mbd.simulate(model, start, scheme, dt=0.02, until=0.25)
-        for name in ("foot.force", "foot.friction.forward"):
-            assert run.at(times)[name] == pytest.approx(exact.at(times)[name], abs=2e-4), name
+def test_forces_of_a_foot_that_sticks_after_a_slide_are_right_between_rows():
+    compared = 0
+
+    @settings(max_examples=15)
+    @given(
+        curvature=st.sampled_from((-0.8, 0.5, 1.3)), lean=st.floats(-0.4, 0.4), speed=st.floats(-1.5, -0.8)
+    )  # fmt: skip
+    def holds(curvature, lean, speed):
+        nonlocal compared
+        model, start = sliding_rod(curvature, lean, speed)
+        exact = mbd.simulate(model, start, mbd.RadauIIA(), tol=1e-10, until=0.3)
+        stuck = next((event.time for event in exact.events if event.kind == "stuck"), 1.0)
+        ends = [event.time for event in exact.events if event.kind in ("slipped", "opened") and event.time > stuck]
+        times = np.linspace(stuck + 2e-3, min([*ends, 0.3]) - 2e-3, 40)
+        if times[-1] < times[0] + 0.02:
+            return
+        compared += 1
+        for scheme in (mbd.RadauIIA(), mbd.RungeKutta853()):
+            run = mbd.simulate(model, start, scheme, dt=0.06, until=0.3)
+            for name in ("foot.force", "foot.friction.forward"):
+                assert run.at(times)[name] == pytest.approx(exact.at(times)[name], abs=2e-3), name
+
+    holds()
+    assert compared >= 5
