@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from itertools import accumulate, pairwise
+from math import prod
 from time import perf_counter
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import ref
 
 import numpy as np
@@ -55,25 +56,39 @@ class ModeCode:
     returns: Any = None
 
 
-@dataclass(frozen=True)
 class AccelerationTerms:
     """The parts of ``M a + f + R λ = 0``, ``h``, ``ḣ``, ``ḧ = B a + bias`` of all rows, and what closing contacts hold.
+
+    Each is cut out of the output of their program when somebody first looks at it: few are looked at.
 
     M (n, n), f (n,), R (n, n_rows), B (n_rows, n), h, rate, bias (n_rows,), captured (n_anchors,), kinetic [J],
     limits (n_frictions,) largest frictions [N, N m], impulses (n_impulses, n_v) w P of the user's as contacts close.
     """
 
-    M: Vector
+    M: Matrix
     f: Vector
-    R: Vector
-    B: Vector
+    R: Matrix
+    B: Matrix
     h: Vector
     rate: Vector
     bias: Vector
     captured: Vector
     kinetic: float
     limits: Vector
-    impulses: Vector
+    impulses: Matrix
+
+    def __init__(self, out: Vector, parts: Mapping[str, tuple[slice, tuple[int, ...]]]) -> None:
+        self._out, self._parts = out, parts
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            if name not in vars(self).get("_parts", ()):
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+            place, shape = self._parts[name]
+            part = self._out[place]
+            vars(self)[name] = found = part.reshape(shape) if shape else float(part[0])
+            return found
 
     def saddle(self, rows: Sequence[int]) -> Matrix:
         """``[M R; B 0]`` of some rows."""
@@ -432,22 +447,28 @@ class Mechanism:
         UnknownNameError
             for a name that is not a run-time parameter, with the nearest one.
         """
-        names = [parameter.name for parameter in self.equations.parameters]
-        p = [parameter.value for parameter in self.equations.parameters]
+        tables = len(self.equations.tables)  # more may follow
+        places, own = self.kept((Mechanism.parameters, tables), self._own_parameters)
+        p, given = own.copy(), folded or {}
         for name, value in (values or {}).items():
-            if name in self.without_effect or (name not in names and (folded or {}).get(name) == value):
+            place = places.get(name)
+            if name in self.without_effect or (place is None and given.get(name) == value):
                 continue
-            if name not in names and name in (folded or {}):
+            if place is None and name in given:
                 raise ModelError(
                     f"{name!r} is an exact 0 or ±1 of the model, which is part of its equations; name it in "
                     "tunable=[…] of the model"
                 )
-            if name not in names:
-                raise UnknownNameError(nearest(name, {*names, *(folded or {})}, "parameter", "There are"))
-            p[names.index(name)] = float(value)
-        for table in self.equations.tables:
-            p += table.flat
-        return np.array(p, dtype=float)
+            if place is None:
+                raise UnknownNameError(nearest(name, {*places, *given}, "parameter", "There are"))
+            p[place] = float(value)
+        return p
+
+    def _own_parameters(self) -> tuple[dict[str, int], Vector]:
+        """Places of parameters by name, and the parameter vector with the values of the model."""
+        own, tables = self.equations.parameters, self.equations.tables
+        values = [each.value for each in own] + [value for table in tables for value in table.flat]
+        return {each.name: k for k, each in enumerate(own)}, np.array(values, dtype=float)
 
     def block(self, t: float, q: Vector, y: Vector, anchors: Vector, penalties: Sequence[int] = ()) -> Vector:
         """The block of inputs at a state, without accelerations and multipliers."""
@@ -484,23 +505,22 @@ class Mechanism:
 
     def terms_of(self, block: Vector, parameters: Vector) -> AccelerationTerms:
         """The same at the inputs in a block; its accelerations and multipliers enter no more than R and the limits."""
-        n, rows = self.layout.n, self.layout.n_rows
         out = np.zeros(self.sizes["accelerations"])
         self.common["accelerations"](block, parameters, out)
-        M, f, R, B, h, rate, bias, captured, kinetic, limits, impulses = [out[part] for part in self._parts]
-        return AccelerationTerms(
-            M.reshape(n, n), f, R.reshape(n, rows), B.reshape(rows, n), h, rate, bias, captured, float(kinetic[0]),
-            limits, impulses.reshape(len(self.equations.impulses), self.layout.n_v),
-        )  # fmt: skip
+        return AccelerationTerms(out, self._parts)
 
     @cached_property
-    def _parts(self) -> list[slice]:
-        """Where the parts of `AccelerationTerms` stand in the output of their program."""
+    def _parts(self) -> dict[str, tuple[slice, tuple[int, ...]]]:
+        """Places of the parts of `AccelerationTerms` in the output of their program, and shapes: () of one number."""
         layout = self.layout
         n, rows = layout.n, layout.n_rows
-        lengths = (n * n, n, n * rows, rows * n, rows, rows, rows, layout.n_anchors, 1, layout.n_frictions)
-        starts = list(accumulate(lengths, initial=0))
-        return [slice(a, b) for a, b in pairwise([*starts, self.sizes["accelerations"]])]
+        shapes: dict[str, tuple[int, ...]] = {
+            "M": (n, n), "f": (n,), "R": (n, rows), "B": (rows, n), "h": (rows,), "rate": (rows,), "bias": (rows,),
+            "captured": (layout.n_anchors,), "kinetic": (), "limits": (layout.n_frictions,),
+            "impulses": (len(self.equations.impulses), layout.n_v),
+        }  # fmt: skip
+        ends = pairwise(accumulate(map(prod, shapes.values()), initial=0))
+        return {name: (slice(*pair), shape) for (name, shape), pair in zip(shapes.items(), ends, strict=True)}
 
     @cached_property
     def sizes(self) -> dict[str, int]:

@@ -9,7 +9,6 @@ from typing import Any, Literal
 import numpy as np
 
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.mechanisms import mechanism_of
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import GaitError, ModelError
 from mbd.gait.alike import require_alike
@@ -134,7 +133,7 @@ def map_of(
     section, mirror, strides = cycle
     values = {**start.parameters, **(parameters or {})}
     plain = ReturnMap(model, scheme, dt, section, None, strides, functions or {}, longest, values, backend, start)
-    mechanism = mechanism_of(model, backend, plain.plain(values))
+    mechanism = plain.mechanism
     section_named(plain.manager, section)
     options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": 1e-6}
     refused = refusals(mechanism.equations, scheme, options)
@@ -143,11 +142,11 @@ def map_of(
     _require_the_same_later(mechanism, model)
     vector = plain.vector(values)
     if mirror is not None:
-        own = {**getattr(model, "parameters", {}), **plain.plain(values)}
+        own = {**plain.folded, **plain.plain(values)}
         plain.mirror = require_alike(mechanism, mirror_of(mechanism.equations, mirror, section), vector, own, model)
     plain.fixed = moving_on(mechanism, vector) if modulo is None else increments_named(mechanism, modulo)
     if modulo is None:
-        own = {**getattr(model, "parameters", {}), **plain.plain(values)}
+        own = {**plain.folded, **plain.plain(values)}
         plain.heading = heading_of(model, mechanism, vector, own, reset_names(mechanism.equations))
     return plain
 

@@ -84,7 +84,7 @@ def _of_arrival(map_: ReturnMap, chart: Chart, arrival: Arrival) -> Measured | A
 def numbers_of(chart: Chart, arrival: Arrival) -> Measured:
     """The numbers of an arrival in the coordinates of a chart."""
     steps = [number for _, time, length in arrival.steps for number in (time, length)]
-    numbers = np.concatenate([chart.of(arrival.state), [arrival.period], arrival.travel, steps])
+    numbers = np.array([*chart.of(arrival.state).tolist(), arrival.period, *arrival.travel.tolist(), *steps])
     return Measured(numbers, chart.size, arrival)
 
 

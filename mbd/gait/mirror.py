@@ -7,7 +7,8 @@ z, y and x under which the mechanism is its own mirror image (`mbd.gait.alike`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -50,9 +51,17 @@ class Mirror:
         """The mirror image of a name."""
         return exchanged(name, self.sides)
 
+    @cached_property
+    def _images(self) -> dict[frozenset[str], frozenset[str]]:
+        """Those that were asked for."""
+        return {}
+
     def names(self, names: frozenset[str]) -> frozenset[str]:
         """The mirror images of names."""
-        return frozenset(map(self.name, names))
+        found = self._images.get(names)
+        if found is None:
+            found = self._images[names] = frozenset(map(self.name, names))
+        return found
 
     def of_q(self, q: Any) -> Matrix:
         """Mirror images of coordinates (…, n_q)."""
@@ -78,9 +87,9 @@ class Mirror:
         """The mirror image of a state."""
         anchors = self.of_anchors(state.anchors) if len(state.anchors) == len(self.anchors) else state.anchors
         armed = None if state.armed is None else self.names(state.armed)
-        return replace(
-            state, q=self.of_q(state.q), v=self.of_v(state.v), z=state.z[self.z], anchors=anchors, armed=armed,
-            mode=Mode(self.names(state.mode.closed)), memory=None,
+        return State(
+            state.time, self.of_q(state.q), self.of_v(state.v), state.z[self.z], Mode(self.names(state.mode.closed)),
+            armed, anchors, state.names, state.velocity_names, state.moved, state.parameters,
         )  # fmt: skip
 
 
@@ -100,6 +109,9 @@ def mirror_of(equations: Equations, sides: Any, section: str = "") -> Mirror:
     ):
         raise ModelError(f"mirror must be two words in names, such as ('left', 'right'), or None, not {sides!r}")
     one, two = sides
+    known: dict[tuple[str, str, str], Mirror] = equations.memory.setdefault("mirrors", {})
+    if (one, two, section) in known:
+        return known[one, two, section]
     lists = {
         "coordinate": [c.name for c in equations.coordinates],
         "velocity": list(equations.velocity_names),
@@ -121,7 +133,8 @@ def mirror_of(equations: Equations, sides: Any, section: str = "") -> Mirror:
         raise ModelError([*faults[:-1], f"{faults[-1]}; name both sides alike, or take mirror=None"])
     q, v, z = (_places(lists[kind], (one, two)) for kind in ("coordinate", "velocity", "state"))
     anchors, states = _anchor_places(equations, lists["contact"], (one, two))
-    return Mirror((one, two), q, v, z, anchors, section=section, states=states)
+    found = known[one, two, section] = Mirror((one, two), q, v, z, anchors, section=section, states=states)
+    return found
 
 
 def _rule_faults(equations: Equations, sides: tuple[str, str]) -> list[str]:

@@ -6,12 +6,15 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import field, replace
+from functools import cached_property
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.manager import manager_of
+from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.compile.python import ScalarFunction, scalar_function
@@ -125,13 +128,9 @@ class ReturnMap:
         self._of_both_sides: set[tuple[str, float]] = set()
         plain = self.plain(self.values)
         self.mechanism: Mechanism = mechanism_of(self.model, self.backend, plain)
-        self.folded = getattr(self.model, "parameters", {})
-        self._check = self.model.parameter_check()
         self.manager = manager_of(self.mechanism, self.vector(self.values))
-        places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
         self.penalties = {contact.name for contact in self.manager.contacts if contact.kind == "penalty"}
-        places = {name: place or self._center(name) for name, place in places.items()}
-        self.feet = {name: place for name, place in places.items() if place}
+        self.feet: dict[str, str] = self.mechanism.kept(ReturnMap, self._feet)
         words = [word for word in getattr(self.model, "constraints", ()) if isinstance(word, Constraint)]
         self.rolling = {word.name for word in words if isinstance(getattr(word, "measure", None), RollingSole)}
         self.inert = {
@@ -141,6 +140,24 @@ class ReturnMap:
         self.parameter_steps: dict[str, float] = {}
         """Differences of parameters whose effect was seen, by name, with which later derivatives begin."""
         self._repeated: dict[tuple[float, float] | None, RepeatedRun] = {}
+
+    @cached_property
+    def folded(self) -> Mapping[str, float]:
+        """Parameters of the model, some of which are part of the equations."""
+        found: Mapping[str, float] = getattr(self.model, "parameters", {})
+        return found
+
+    @cached_property
+    def _check(self) -> ParameterCheck:
+        """The judgement of values of parameters."""
+        found: ParameterCheck = self.model.parameter_check()
+        return found
+
+    def _feet(self) -> dict[str, str]:
+        """Names of the places of contacts."""
+        places = {contact.name: contact.place for contact in Facts.of(self.mechanism.equations).contacts}
+        places = {name: place or self._center(name) for name, place in places.items()}
+        return {name: place for name, place in places.items() if place}
 
     def _center(self, contact: str) -> str:
         """The middle of the disk or ball of a contact; '' where it has none that is among the results."""
@@ -179,8 +196,11 @@ class ReturnMap:
         """The parameter vector."""
         last = self._last
         if last is None or last[0] != values:
-            last = self._last = dict(values), self.mechanism.parameters(self.plain(values), self.folded)
+            last = self._last = dict(values), self._vector(self.plain(values))
         return last[1]
+
+    def _vector(self, plain: Mapping[str, float]) -> Vector:
+        return self.mechanism.parameters(plain, self.folded if plain else {})
 
     def faults(self, values: Values) -> list[str]:
         """Why no walk of the map has these values of parameters, one sentence each.
@@ -258,7 +278,8 @@ class ReturnMap:
         walk.period, walk.travel = walk.period + after.time, walk.travel + (self.turned * moved if odd else moved)
         equations = self.mechanism.equations
         anchors = counted_from(equations, after.anchors, after.time)
-        state = replace(after, time=0.0, anchors=anchors, moved={}, parameters={})
+        state = State(0.0, after.q, after.v, after.z, after.mode, after.armed, anchors, after.names,
+                      after.velocity_names)  # fmt: skip
         last = [e.name for e in end.events if e.kind == "event" and e.time == after.time]
         walk.stored = stored_by(equations, last if self.mirror is None else [self.mirror.name(name) for name in last])
         walk.state = self.mirror.state(state) if self.mirror is not None else state
@@ -306,7 +327,8 @@ class ReturnMap:
         if last and end.state is not None and strikes and len(stance) == 1 and len(strikes) <= 2:
             begun = was if len(strikes) == 1 else now
             if len(strikes) == 1 or stance[0] not in self.rolling:
-                lengths[-1] = float(np.linalg.norm(self.ahead(now[self.section] - begun[stance[0]])))
+                way = self.ahead(now[self.section] - begun[stance[0]])
+                lengths[-1] = sqrt(way @ way)
             if len(strikes) == 2:
                 lengths[0] = float(np.linalg.norm(self.forward * moved)) - lengths[-1]
         return [(event.name, event.time, length) for event, length in zip(strikes, lengths, strict=True)]
@@ -340,8 +362,7 @@ class ReturnMap:
         """Arrives, or why not, as far as the end alone tells; `explained` tells falls."""
         if end.state is None:
             return Outcome("not on the section", end.problem, 0.0)
-        finite = np.all(np.isfinite(end.state.q)) and np.all(np.isfinite(end.state.v))
-        if end.problem or not finite:
+        if end.problem or not (np.isfinite(end.state.q).all() and np.isfinite(end.state.v).all()):
             return Outcome("numerical error", end.problem or "the state is not finite", end.time)
         if end.stopped_by != self.section:
             if end.stopped_by:
@@ -360,7 +381,7 @@ class ReturnMap:
         if end.state is None or self.section not in self.feet or len(stance) != 1 or self.section in start.mode.closed:
             return False
         before, after = (places[self.section] - places[stance[0]] for places in (was, now))
-        return float(before @ after) > 0.0 and float(np.linalg.norm(before)) > 0.0
+        return float(before @ after) > 0.0 and float(before @ before) > 0.0
 
     def explained(self, state: State, outcome: Outcome, values: Values | None = None) -> Outcome:
         """The outcome with falls named; makes the run once more where that needs its rows."""
@@ -386,6 +407,8 @@ class ReturnMap:
 
     def other_events(self, one: Arrival, other: Arrival) -> str:
         """What the events of another walk have more or less that changes its motion, in words; '' where nothing."""
+        if one.events == other.events:
+            return ""
         before, after = (Counter(e for e in each.events if e[0] not in self.inert) for each in (one, other))
         more, less = sorted((after - before).elements()), sorted((before - after).elements())
         if not more and not less:
@@ -395,14 +418,15 @@ class ReturnMap:
 
     def against(self, section: Section, arrival: Arrival) -> Outcome:
         """The outcome, where other contacts are closed than on the section a name for that."""
-        has, needs = (mode.closed - self.penalties for mode in (arrival.state.mode, section.mode))
         if not arrival.outcome.good:
             return arrival.outcome
         if others := section.other_states(arrival.state):
             text = f"comes to other states at {arrival.period:.3g} s: {others}"
             return Outcome("other states", text, arrival.period)
-        if has == needs:
+        closed, wanted = arrival.state.mode.closed, section.mode.closed
+        if closed == wanted or closed - self.penalties == wanted - self.penalties:
             return arrival.outcome
+        has, needs = closed - self.penalties, wanted - self.penalties
         missing, more = sorted(needs - has), sorted(has - needs)
         sets = ((missing, "open"), (more, "closed"))
         what = " and ".join(f"{', '.join(map(repr, names))} {word}" for names, word in sets if names)

@@ -86,7 +86,8 @@ def on_section(section: Section, start: State, parameters: Vector, near: float =
     same = start.mode.closed == section.mode.closed and len(start.anchors) == section.mechanism.layout.n_anchors
     if not same or section.other_states(start):
         return None
-    h, _ = section.positions(start.q, parameters, start.anchors)
+    y = np.concatenate([start.v, start.z])
+    h, _ = section.positions(section.terms(start.q, y, parameters, start.anchors), start.q, parameters, start.anchors)
     if not np.max(np.abs(h), initial=0.0) <= near:
         return None
     try:

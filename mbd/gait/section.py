@@ -15,7 +15,7 @@ on the chart.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from functools import cached_property
 from itertools import accumulate, pairwise
 
@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.pose import Posture
 from mbd.assembly.posture import position_rows
-from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanism import AccelerationTerms, Mechanism
 from mbd.dataclass import dataclass
 from mbd.equal import RANK_RTOL, REST_SPEED
+from mbd.equations.equations import Contact
 from mbd.errors import SimulationError
 from mbd.gait.heading import Heading
 from mbd.gait.machines import remembered, state_anchors
@@ -91,13 +92,32 @@ class Section:
         """1 for each closed contact."""
         return self.manager.flags(self.mode.closed)
 
-    def positions(self, q: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Callable[[], Matrix]]:
+    @cached_property
+    def touching(self) -> list[Contact]:
+        """Unilateral contacts that are closed."""
+        return [each for each in self.manager.contacts if each.name in self.mode and each.kind == "unilateral"]
+
+    @cached_property
+    def _following(self) -> list[int]:
+        """Numbers of the anchors that these hold at q, and of those that machines have stored."""
+        return [*(k for contact in self.touching for k in contact.anchors), *self.stored]
+
+    @cached_property
+    def _picked(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """`places` and `rates` as indices."""
+        return np.array(self.places, dtype=np.intp), np.array(self.rates, dtype=np.intp)
+
+    def terms(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> AccelerationTerms:
+        """What holds of positions and velocities follows from these."""
+        return self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
+
+    def positions(
+        self, terms: AccelerationTerms, q: Vector, parameters: Vector, anchors: Vector
+    ) -> tuple[Vector, Callable[[], Matrix]]:
         """h of all that holds of positions, and what gives G = ∂h/∂x."""
-        mechanism, n_v = self.mechanism, self.mechanism.layout.n_v
-        terms = mechanism.acceleration_terms(0.0, q, np.zeros(mechanism.layout.n), parameters, anchors)
-        picked = list(self.places)
+        mechanism, n_v, (picked, _) = self.mechanism, self.mechanism.layout.n_v, self._picked
         if not self.gaps:
-            return terms.h[picked], lambda: np.vstack([terms.B[picked][:, :n_v]])
+            return terms.h[picked], lambda: np.ascontiguousarray(terms.B[picked][:, :n_v])
         guards = self._guards(q, np.zeros(mechanism.layout.n - n_v), parameters, anchors)
         here = guards(np.zeros(n_v))
 
@@ -108,11 +128,11 @@ class Section:
 
         return np.concatenate([terms.h[picked], here[[value for value, _ in self.gaps]]]), slopes
 
-    def velocities(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> tuple[Vector, Matrix]:
+    def velocities(
+        self, terms: AccelerationTerms, q: Vector, y: Vector, parameters: Vector, anchors: Vector
+    ) -> tuple[Vector, Matrix]:
         """ḣ and B of all that holds of velocities, and the event that watches them with its gradient."""
-        n_v = self.mechanism.layout.n_v
-        terms = self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
-        picked, speeds = list(self.rates), list(self.speeds)
+        n_v, (_, picked), speeds = self.mechanism.layout.n_v, self._picked, list(self.speeds)
         if not speeds:
             return terms.rate[picked], terms.B[picked][:, :n_v]
         v, z = y[:n_v], y[n_v:]
@@ -125,14 +145,9 @@ class Section:
 
     def anchored(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> Vector:
         """The anchors with what closed unilateral contacts hold at q, and machines have just stored."""
-        if not len(anchors):
-            return np.array(anchors, dtype=float)
-        terms = self.mechanism.acceleration_terms(0.0, q, y, parameters, anchors)
         found = np.array(anchors, dtype=float)
-        for contact, flag in zip(self.manager.contacts, self.flags, strict=True):
-            if flag and contact.kind == "unilateral":
-                found[list(contact.anchors)] = terms.captured[list(contact.anchors)]
-        found[list(self.stored)] = terms.captured[list(self.stored)]
+        if len(anchors) and self._following:
+            found[self._following] = self.terms(q, y, parameters, anchors).captured[self._following]
         return found
 
     def _guards(self, q: Vector, z: Vector, parameters: Vector, anchors: Vector) -> Callable[[Vector], Vector]:
@@ -164,8 +179,9 @@ class Chart:
     def __init__(self, section: Section, state: State, parameters: Vector) -> None:
         self.section, self.state, self.parameters = section, state, parameters
         layout, q, y = section.mechanism.layout, state.q, np.concatenate([state.v, state.z])
-        _, slopes = section.positions(q, parameters, state.anchors)
-        _, B = section.velocities(q, y, parameters, state.anchors)
+        terms = section.terms(q, y, parameters, state.anchors)
+        _, slopes = section.positions(terms, q, parameters, state.anchors)
+        _, B = section.velocities(terms, q, y, parameters, state.anchors)
         G = slopes()
         G[:, list(section.fixed)] = 0.0
         unmoved = np.eye(layout.n_v)[list(section.fixed)]
@@ -199,30 +215,30 @@ class Chart:
         if section.held:
             anchors[list(section.held)] += parts[3]
         move, size = self.places @ parts[0], np.inf
+        v, z = base.v + self.rates @ parts[1], base.z + parts[2]
+        y = np.concatenate([v, z])
         for _ in range(CORRECTIONS):
             q = compose(base.q, move)
-            h, slopes = section.positions(q, parameters, anchors)
-            before, size = size, float(np.max(np.abs(h), initial=0.0))
+            terms = section.terms(q, y, parameters, anchors)
+            h, slopes = section.positions(terms, q, parameters, anchors)
+            before, size = size, float(np.abs(h).max(initial=0.0))
             if size <= FINE or (size >= before and size < 1e-12):
                 break
             move = move - self.off_places @ np.linalg.lstsq(slopes() @ self.off_places, h, rcond=None)[0]
         if not size < 1e-9:
             raise SimulationError(f"no state of the section is near: {size:.2g} m or rad are left of its rows")
-        z = base.z + parts[2]
-        v = base.v + self.rates @ parts[1]
-        rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
+        rate, B = section.velocities(terms, q, y, parameters, anchors)
         along = B @ self.off_rates
-        for _ in range(2 if not section.speeds else CORRECTIONS):  # ḣ is linear in v, what an event watches may not be
+        # ḣ is linear in v, what an event watches may not be
+        for _ in range((CORRECTIONS if section.speeds else 2) if len(rate) else 0):
             change = self.off_rates @ np.linalg.lstsq(along, rate, rcond=None)[0]
             v, rate = v - change, rate - B @ change
             if section.speeds:
-                rate, B = section.velocities(q, np.concatenate([v, z]), parameters, anchors)
+                y = np.concatenate([v, z])
+                rate, B = section.velocities(section.terms(q, y, parameters, anchors), q, y, parameters, anchors)
                 along = B @ self.off_rates
         anchors = section.anchored(q, np.concatenate([v, z]), parameters, anchors)
-        found = replace(
-            base, time=0.0, q=q, v=v, z=z, anchors=anchors, mode=section.mode, armed=section.armed, memory=None,
-            moved={}, parameters={},
-        )  # fmt: skip
+        found = State(0.0, q, v, z, section.mode, section.armed, anchors, base.names, base.velocity_names)
         self._last = asked, found
         return found
 
@@ -326,12 +342,16 @@ def _carried(
 
 def _row_space(rows: Matrix) -> Matrix:
     """An orthonormal basis (n, r) of the row space."""
+    if not len(rows):
+        return np.zeros((rows.shape[1], 0))
     _, sizes, V = np.linalg.svd(rows, full_matrices=False)
     return np.asarray(V[sizes > RANK_RTOL * max(float(np.max(sizes, initial=0.0)), 1e-300)].T)
 
 
 def _null_space(rows: Matrix) -> Matrix:
     """An orthonormal basis (n, n − r) of the null space."""
+    if not len(rows):
+        return np.eye(rows.shape[1])
     _, sizes, V = np.linalg.svd(rows, full_matrices=True)
     rank = int(np.sum(sizes > RANK_RTOL * max(float(np.max(sizes, initial=0.0)), 1e-300)))
     return np.asarray(V[rank:].T)

@@ -34,7 +34,13 @@ def moving_on(mechanism: Mechanism, parameters: Vector) -> tuple[int, ...]:
             identical, doubtful = _without_effect(mechanism)
             found = [*identical, *(k for k in doubtful if _changes_nothing(mechanism, parameters, k))]
             known = equations.memory["moving on"] = tuple(sorted(found))
-    return tuple(k for k in known if _follows(mechanism, parameters, k))
+    last: dict[bytes, tuple[int, ...]] = mechanism.kept(moving_on, dict)
+    found = last.get(parameters.tobytes())
+    if found is None:
+        found = tuple(k for k in known if _follows(mechanism, parameters, k))
+        last.clear()
+        last[parameters.tobytes()] = found
+    return found
 
 
 def _without_effect(mechanism: Mechanism) -> tuple[list[int], list[int]]:
@@ -92,6 +98,14 @@ def _changes_nothing(mechanism: Mechanism, parameters: Vector, k: int) -> bool:
 
 def reset_names(equations: Equations) -> set[str] | None:
     """Names that resets of events set or read; None where functions may read any."""
+    if "names of resets" not in equations.memory:
+        equations.memory["names of resets"] = _reset_names(equations)
+    known: set[str] | None = equations.memory["names of resets"]
+    return known
+
+
+def _reset_names(equations: Equations) -> set[str] | None:
+    """The same, looked for."""
     found: set[str] = set()
     for guard in equations.guards:
         if guard.reset is None:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from mbd.results.record import EventRecord
 from mbd.simulation.many_runs import Ends, ManyRuns, may_be_many, start_line
 from mbd.simulation.marching import Run
 from mbd.simulation.run.begin import begin
+from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.run.late_resets import reset_ends
 from mbd.simulation.simulate import REST_SPEED, laid_out, prepared
 from mbd.state import State
@@ -77,6 +79,7 @@ class RepeatedRun:
         first = replace(start, time=0.0, memory=None)
         self._arguments = model, first, integrator, dt, until, dict(parameters), options
         self._laid_out = laid_out(*self._arguments)
+        finalize(self, keep_idle, self._laid_out.stepper).atexit = False
         self.alone = may_be_many(self._laid_out, late_resets=True)
         """Why runs are made one by one; '' if they need not be."""
         boundaries = self._laid_out.boundaries
@@ -138,6 +141,12 @@ class RepeatedRun:
         return [self._end(ends, k, start, each[k]) for k, start in enumerate(starts)]
 
     @cached_property
+    def _names(self) -> list[str]:
+        """Of contacts, and of the guards behind them."""
+        manager = self._laid_out.manager
+        return [*manager.names, *(guard.name for guard in manager.guards)]
+
+    @cached_property
     def _many(self) -> ManyRuns:
         """Arrays of their own, so that runs of both kinds may follow each other."""
         many = ManyRuns(self._laid_out)
@@ -168,7 +177,7 @@ class RepeatedRun:
             return self(start, values)
         events = run.log.events(ends.lines[k, : ends.n_lines[k]], 0)
         number = int(ends.stopped_by[k])
-        names = [*run.manager.names, *(guard.name for guard in run.manager.guards)]
+        names = self._names
         before = run.manager.mode(ends.before[k]).closed
         return End(ends.state(run, k, values), tuple(events), before, names[number] if number >= 0 else "", "")
 

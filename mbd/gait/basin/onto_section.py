@@ -49,10 +49,9 @@ class OntoSection:
             self._held = len(values), len(rates)
             self._positions = array_function([*values, *(slope for node in values for slope in gradient(node, x))])
             self._velocities = array_function([*rates, *(slope for node in rates for slope in gradient(node, v))])
-            held = [(contact.anchors, contact.captured) for contact, flag in zip(
-                equations.contacts, section.flags, strict=True) if flag and contact.kind == "unilateral"]  # fmt: skip
-            self._anchors = [k for anchors, _ in held for k in anchors]
-            self._captured = array_function([node for _, nodes in held for node in nodes]) if self._anchors else None
+            self._anchors = [k for contact in section.touching for k in contact.anchors]
+            captured = [node for contact in section.touching for node in contact.captured]
+            self._captured = array_function(captured) if self._anchors else None
 
     def __call__(
         self, q: Matrix, v: Matrix, z: Matrix, anchors: Matrix, parameters: Vector | Matrix

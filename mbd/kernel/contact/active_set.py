@@ -36,6 +36,9 @@ class ActiveSetManager:
     def __init__(self, equations: Equations, trivial: Collection[int] = ()) -> None:
         self.trivial = frozenset(trivial)
         self.contacts: list[Contact] = []
+        self.names: list[str] = []
+        self._flags: dict[frozenset[str], Integers] = {}
+        self._modes: dict[tuple[int, ...], Mode] = {}
         self.guards: list[Guard] = []
         self._row_contact = [row.contact for row in equations.rows]
         self._row_level = [int(row.is_velocity) for row in equations.rows]
@@ -56,11 +59,8 @@ class ActiveSetManager:
     def register(self, contact: Contact) -> int:
         """Add a contact; its number."""
         self.contacts.append(contact)
+        self.names.append(contact.name)
         return len(self.contacts) - 1
-
-    @property
-    def names(self) -> list[str]:
-        return [contact.name for contact in self.contacts]
 
     @property
     def instants(self) -> dict[str, tuple[int, ...]]:
@@ -79,12 +79,20 @@ class ActiveSetManager:
 
     def flags(self, closed: Iterable[str]) -> Integers:
         """1 for each closed contact, in order of registration."""
-        closed = set(closed)
-        return np.array([int(contact.name in closed) for contact in self.contacts], dtype=np.int64)
+        closed = frozenset(closed)
+        found = self._flags.get(closed)
+        if found is None:
+            found = self._flags[closed] = np.array([int(name in closed) for name in self.names], dtype=np.int64)
+        return found.copy()
 
     def mode(self, flags: Sequence[int] | Integers) -> Mode:
         """The closed contacts by name."""
-        return Mode(frozenset(c.name for c, flag in zip(self.contacts, flags, strict=True) if flag))
+        key = tuple(flags)
+        found = self._modes.get(key)
+        if found is None:
+            closed = frozenset(name for name, flag in zip(self.names, key, strict=True) if flag)
+            found = self._modes[key] = Mode(closed)
+        return found
 
     def active_rows(
         self, flags: Sequence[int] | Integers, sticks: Sequence[int] | Integers | None = None

@@ -7,7 +7,8 @@ them, and the reset is written in numbers and expressions of coordinates, rates 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,22 +49,24 @@ def reset_ends(run: RunData, guard: Guard, q: Matrix, y: Matrix, parameters: Mat
     -------
     (N,) whether each was given finite numbers; one that was not stays as it is
     """
-    n_q, places, known = run.kernel.n_q, _places(run), _known(run)
+    plan = run.mechanism.kept((reset_ends, id(guard)), lambda: _plan(run, guard))
     whole = np.hstack([q, y, np.broadcast_to(parameters, (len(q), parameters.shape[1]))])
-    wanted = {}
-    for name, value in guard.reset.items():
-        if is_expression(value):
-            names, function = function_of_expression(value)
-            columns = [whole[:, known[_spelled(each)]] for each in names]
-            wanted[name] = _column(function, columns, len(q))
-        else:
-            wanted[name] = np.full(len(q), float(value))
-    sound = np.all([np.isfinite(column) for column in wanted.values()], axis=0)
-    for name, column in wanted.items():
-        place = places[_spelled(name)]
+    wanted = [(place, _column(function, [whole[:, k] for k in read], len(q))) for place, function, read in plan]
+    sound = np.all([np.isfinite(column) for _, column in wanted], axis=0)
+    n_q = run.kernel.n_q
+    for place, column in wanted:
         target = q[:, place] if place < n_q else y[:, place - n_q]
         target[sound] = column[sound]
     return np.asarray(sound)
+
+
+def _plan(run: RunData, guard: Guard) -> list[tuple[int, Callable[..., Any], list[int]]]:
+    """Of each number that is set: its place in (q, v, z), what gives it, and the places that this takes it from."""
+    places, known, found = _places(run), _known(run), list[tuple[int, Callable[..., Any], list[int]]]()
+    for name, value in guard.reset.items():
+        names, function = function_of_expression(value) if is_expression(value) else ((), partial(float, value))
+        found.append((places[_spelled(name)], function, [known[_spelled(each)] for each in names]))
+    return found
 
 
 def _column(function: Any, columns: list[Vector], count: int) -> Vector:
