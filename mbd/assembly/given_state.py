@@ -70,18 +70,16 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
     faults = malformed(start)
     if faults:
         raise ModelError(faults)
-    names = tuple(coordinate.name for coordinate in equations.coordinates)
-    anchors = equations.n_anchors
+    names, anchors = equations.configuration.names, equations.n_anchors
     sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
     if start.names != names or not sizes:
         raise ModelError(
             f"the start has the coordinates {', '.join(start.names) or 'none'} and {len(start.z)} states, but "
             f"the model has {', '.join(names)} and {equations.n_z} states; assemble it from this model"
         )
-    contacts = [*sorted(start.mode.closed), *sorted(start.armed or ())]
     known = manager.names
-    unknown = [nearest(name, known, "contact") for name in dict.fromkeys(contacts) if name not in known]
-    if unknown:
+    contacts = dict.fromkeys([*sorted(start.mode.closed), *sorted(start.armed or ())])
+    if unknown := [nearest(name, known, "contact") for name in contacts if name not in known]:
         raise UnknownNameError(unknown)
     if len(start.anchors) != anchors and (start.mode.closed or (len(start.anchors) and equations.turns)):
         raise ModelError(
@@ -117,7 +115,7 @@ def _not_finite(start: State, equations: Equations) -> list[str]:
 
 def beyond_angles(equations: Equations, q: Vector) -> list[str]:
     """Which angles of a position (n_q,) are too large, one phrase each."""
-    if not (np.abs(q) > MAX_ANGLE).any():
+    if not np.abs(q).max(initial=0.0) > MAX_ANGLE:
         return []
     return [
         f"{coordinate.name!r} = {value:.6g} rad, where neighbouring numbers are {np.spacing(abs(value)):.2g} rad apart"

@@ -45,7 +45,12 @@ class Energies:
             return array_function([equations.kinetic, equations.potential])
 
     @cached_property
-    def _kinds(self) -> frozenset[str]:
+    def _function(self) -> Function:
+        assert self._machine is not None
+        return self._machine(NAME, [self._equations.kinetic, self._equations.potential])
+
+    @cached_property
+    def kinds(self) -> frozenset[str]:
         """The kinds of inputs that the energies depend on."""
         nodes = live([self._equations.kinetic, self._equations.potential])
         return frozenset(node.data[0] for node in nodes if node.op == "input")
@@ -56,12 +61,11 @@ class Energies:
         if self._machine is None or self.calls <= MIN_CALLS or rows > MIN_STATES:
             return self._arrays(inputs, parameters)
         block, out = np.zeros((rows, self._layout.size)), np.empty((rows, 2))
-        for kind in self._kinds & inputs.keys():
+        for kind in self.kinds & inputs.keys():
             place, values = self._layout.place(kind, 0), np.asarray(inputs[kind], dtype=float)
             block[:, place : place + (values.shape[1] if values.ndim == 2 else 1)] = values.reshape(rows, -1)
         given = np.ascontiguousarray(parameters, dtype=float)
         several = [given] * rows if given.ndim == 1 else given
-        function = self._machine(NAME, [self._equations.kinetic, self._equations.potential])
         for k in range(rows):
-            function(block[k], several[k], out[k])
+            self._function(block[k], several[k], out[k])
         return [out[:, 0].copy(), out[:, 1].copy()]

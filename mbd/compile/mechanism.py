@@ -90,9 +90,10 @@ class AccelerationTerms:
             vars(self)[name] = found = part.reshape(shape) if shape else float(part[0])
             return found
 
-    def saddle(self, rows: Sequence[int]) -> Matrix:
-        """``[M R; B 0]`` of some rows."""
-        return np.block([[self.M, self.R[:, rows]], [self.B[rows], np.zeros((len(rows), len(rows)))]])
+    def saddle(self, rows: Sequence[int], R: Matrix | None = None) -> Matrix:
+        """``[M R; B 0]`` of some rows, with another R if one is given."""
+        R = self.R if R is None else R
+        return np.block([[self.M, R[:, rows]], [self.B[rows], np.zeros((len(rows), len(rows)))]])
 
 
 T = TypeVar("T")

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from functools import cached_property
 from typing import Any, Literal, Protocol
 
 from mbd.configuration import Configuration
@@ -490,7 +491,7 @@ class Equations:
     def n_z(self) -> int:
         return len(self.states)
 
-    @property
+    @cached_property
     def n_anchors(self) -> int:
         """Values that machines hold, then those that contacts do, then the whole turns of cut joints."""
         held = sum(len(contact.anchors) for contact in self.contacts)
@@ -501,7 +502,7 @@ class Equations:
         """Anchors before those of contacts."""
         return sum(len(machine.anchors) for machine in self.machines)
 
-    @property
+    @cached_property
     def wrapped(self) -> tuple[Turn, ...]:
         """The turns that are counted along the motion."""
         return tuple(turn for turn in self.turns if turn.rate is not None)

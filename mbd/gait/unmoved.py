@@ -32,8 +32,8 @@ def moving_on(mechanism: Mechanism, parameters: Vector) -> tuple[int, ...]:
         equations = mechanism.equations
         with equations.tape.lock:
             identical, doubtful = _without_effect(mechanism)
-            found = [*identical, *(k for k in doubtful if _changes_nothing(mechanism, parameters, k))]
-            known = equations.memory["moving on"] = tuple(sorted(found))
+            free = [*identical, *(k for k in doubtful if _changes_nothing(mechanism, parameters, k))]
+            known = equations.memory["moving on"] = tuple(sorted(free))
     last: dict[bytes, tuple[int, ...]] = mechanism.kept(moving_on, dict)
     found = last.get(parameters.tobytes())
     if found is None:

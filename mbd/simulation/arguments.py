@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
-import numpy as np
-
 from mbd.bodies.promises import promise_faults
 from mbd.bodies.values import among, is_number, named_number_faults, shown
 from mbd.errors import ModelError, UnknownNameError, nearest
@@ -101,7 +99,7 @@ def _times(start: Any, dt: Any, until: Any) -> list[str]:
         return [f"until must be a finite time [s], an event's name, or (name, latest time), not {shown(until)}"]
     if last < begin:
         return [f"until = {last:g} s lies before the start at {begin:g} s"]
-    if is_number(dt) and 0.0 < dt < 8.0 * np.spacing(max(abs(float(begin)), abs(float(last)))):
+    if is_number(dt) and 0.0 < dt < 8.0 * math.ulp(max(abs(float(begin)), abs(float(last)))):
         return [f"dt = {dt:g} s is too small to be told apart at t = {last:g} s; use a larger dt or an earlier end"]
     if is_number(dt) and math.isfinite(dt) and last > begin and dt > MAX_STEP_RATIO * max(abs(begin), abs(last)):
         return [f"dt = {dt:g} s is more than {MAX_STEP_RATIO:g} times the end at t = {last:g} s, and too large for "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from functools import cached_property
 from itertools import accumulate, chain
 
 import numpy as np
@@ -39,6 +40,8 @@ class ActiveSetManager:
         self.names: list[str] = []
         self._flags: dict[frozenset[str], Integers] = {}
         self._modes: dict[tuple[int, ...], Mode] = {}
+        self._penalties: list[int] = []
+        self._active: dict[tuple[tuple[int, ...], tuple[int, ...] | None], tuple[int, ...]] = {}
         self.guards: list[Guard] = []
         self._row_contact = [row.contact for row in equations.rows]
         self._row_level = [int(row.is_velocity) for row in equations.rows]
@@ -58,11 +61,12 @@ class ActiveSetManager:
 
     def register(self, contact: Contact) -> int:
         """Add a contact; its number."""
+        self._penalties += [len(self.contacts)] if contact.kind == "penalty" else []
         self.contacts.append(contact)
         self.names.append(contact.name)
         return len(self.contacts) - 1
 
-    @property
+    @cached_property
     def instants(self) -> dict[str, tuple[int, ...]]:
         """Guards by the names of events; 'knee phase: stance' are all transitions that enter this state."""
         found: dict[str, tuple[int, ...]] = {guard.name: (e,) for e, guard in enumerate(self.guards)}
@@ -104,18 +108,22 @@ class ActiveSetManager:
         flags : 1 for each closed contact
         sticks : 1 for each friction that sticks; None: none does
         """
-        rows = zip(self._row_contact, self._row_friction, strict=True)
-        return tuple(
-            k
-            for k, (contact, friction) in enumerate(rows)
-            if k not in self.trivial
-            and (contact < 0 or flags[contact])
-            and (friction < 0 or (sticks is not None and sticks[friction]))
-        )
+        key = tuple(flags), None if sticks is None else tuple(sticks)
+        found = self._active.get(key)
+        if found is None:
+            rows = zip(self._row_contact, self._row_friction, strict=True)
+            found = self._active[key] = tuple(
+                k
+                for k, (contact, friction) in enumerate(rows)
+                if k not in self.trivial
+                and (contact < 0 or flags[contact])
+                and (friction < 0 or (sticks is not None and sticks[friction]))
+            )
+        return found
 
     def penalties(self, flags: Sequence[int] | Integers) -> tuple[int, ...]:
         """Numbers of the penalty contacts that act."""
-        return tuple(c for c, contact in enumerate(self.contacts) if contact.kind == "penalty" and flags[c])
+        return tuple(c for c in self._penalties if flags[c])
 
     def tables(self) -> ContactTables:
         """Rules as arrays; see `mbd.kernel.records`."""

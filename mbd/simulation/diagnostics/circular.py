@@ -14,7 +14,6 @@ determinants must be positive.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,7 +45,7 @@ def circular_laws(stepper: Stepper, least: float = SINGULAR_RTOL) -> str:
     terms = stepper.terms(stepper.manager.penalties(flags), None, v.lam[: v.n_rows])
     if not rows or not all(np.isfinite(part).all() for part in (terms.M, terms.R, terms.B)):
         return ""
-    free, whole = replace(terms, R=terms.B.T).saddle(rows), terms.saddle(rows)
+    free, whole = terms.saddle(rows, terms.B.T), terms.saddle(rows)
     # how the law changes its determinant
     (sign, size), (other, changed) = np.linalg.slogdet(free), np.linalg.slogdet(whole)
     ratio = sign * other * np.exp(min(changed - size, 50.0)) if sign != 0.0 and np.isfinite(size) else 1.0

@@ -196,7 +196,8 @@ class EnergyWatch(EnergyFindings):
         if run.parameter_changes:
             parameters = record_of(run, table).parameters_at(chosen)
         self.rows += len(chosen)
-        kinetic, potential = run.mechanism.energies(inputs_of(run, table), parameters)
+        energies = run.mechanism.energies
+        kinetic, potential = energies(inputs_of(run, table, energies.kinds), parameters)
         return kinetic, potential
 
     def _overflow(self, run: RunData) -> None:

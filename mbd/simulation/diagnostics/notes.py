@@ -101,7 +101,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     """The notes of a run that is over, and those of them that put its result in doubt."""
     equations = run.mechanism.equations
     notes: list[Note] = [*_doubts(run)]
-    if np.max(np.abs(run.start.q), initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
+    if np.abs(run.start.q).max(initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
         notes = [*degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))), *notes]
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     notes.append(_redundancy(run, record) if run.stepper.dependent else singular_start(run))

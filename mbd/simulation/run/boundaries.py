@@ -80,7 +80,11 @@ class Boundaries:
 
     def remembered(self) -> dict[str, Any]:
         """For a run that goes on from here."""
-        return {"begin": self.begin_time, "samples": dict(self.samples), "states": without_sharing(self.states)}
+        return {
+            "begin": self.begin_time,
+            "samples": dict(self.samples),
+            "states": without_sharing(self.states) if self.states else {},
+        }
 
     def take_up(self, remembered: Mapping[str, Any], now: float) -> None:
         """Go on with the samples and states of an earlier run."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from mbd.equations.programs import ActiveSet, follows_multipliers
 from mbd.errors import MemoryLimitError, ModelError
 from mbd.integrators.base import Integrator
 from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
-from mbd.kernel import codes
+from mbd.kernel import codes, entry
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.contact.contact_log import room_to_log
 from mbd.kernel.records import PROGRAMS, Kernel
@@ -101,7 +102,7 @@ class Stepper:
         self.straight = self.compiled  # with straight-line code for factors, which machine code alone is worth
         self.judges_starts = self.compiled
         self.own = own_scheme(integrator)
-        self.stabilized = integrator.stabilized
+        self.stabilized, self._is_high_order = integrator.stabilized, integrator.order() > 2
         layout = mechanism.layout
         self.kernel = self._sizes(dt, options)
         judged = layout.n_frictions > 0 or any(
@@ -219,6 +220,20 @@ class Stepper:
         """Lengths of arrays that do not follow from the sizes of the kernel alone."""
         return given
 
+    @cached_property
+    def columns(self) -> dict[str, Any]:
+        """Places in a row of the results by their letters; time stands alone."""
+        v = self.kernel
+        lengths = {
+            "q": v.n_q, "v": v.n_v, "z": v.n - v.n_v, "a": v.n_v, "s": v.n - v.n_v, "lam": v.n_rows,
+            "closed": v.n_contacts, "phase": None,
+        }  # fmt: skip
+        found, first = dict[str, Any](time=0), 1
+        for name, length in lengths.items():
+            found[name] = slice(first, None if length is None else first + length)
+            first += length or 0
+        return found
+
     def place_of(self, name: str) -> slice:
         """Where a kept array stands in `reals` or `integers`."""
         return self.shelves.place_of(name)
@@ -252,7 +267,7 @@ class Stepper:
                 raise
             raise MemoryLimitError(f"t = {float(v.time):.9g} s: {refused}") from refused  # what has run is kept
         count, width = int(v.n_modes), v.n_contacts + v.n_rows + v.n_frictions
-        phases = np.maximum(2 * (sticks == 1), slip != 0.0)
+        phases = np.maximum(2 * (sticks == 1), slip != 0.0) if v.n_frictions else sticks
         if PROGRAMS * (count + 1) > len(v.mode_code):
             v.mode_key = np.concatenate([v.mode_key, np.zeros_like(v.mode_key)])
             v.mode_code = np.concatenate([v.mode_code, np.zeros_like(v.mode_code)])
@@ -315,7 +330,7 @@ class Stepper:
         if v.auto:
             v.strategy = int(v.fallback > 0)
         # parts in which a step of a scheme of order 3 or more is looked at for guards
-        v.n_substeps = 4 if self.integrator.order() > 2 and not v.strategy else 1
+        v.n_substeps = 4 if self._is_high_order and not v.strategy else 1
         return self._advance_compiled() if self.compiled else self._advance_plain()
 
     def keep_row(self) -> None:
@@ -347,9 +362,7 @@ class Stepper:
 
     def _enter(self, address: int) -> int:
         """Call the compiled kernel with a table."""
-        from mbd.kernel.entry import entry
-
-        return int(entry()(address))
+        return int(entry.entry()(address))
 
     def _advance_plain(self) -> int:
         from mbd.kernel.stepping.advance import advance

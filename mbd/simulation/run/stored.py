@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,27 +32,20 @@ def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -
     )  # fmt: skip
 
 
-def inputs_of(run: RunData, table: Matrix) -> dict[str, Any]:
-    """Rows of the kernel as inputs of energies, with the anchors of now."""
+def inputs_of(run: RunData, table: Matrix, kinds: Collection[str]) -> dict[str, Any]:
+    """Rows of the kernel as inputs of some kinds, time among them, of energies, with the anchors of now."""
     parts = _parts(run, table)
-    phase = parts.pop("phase")
-    anchors = run.kernel.anchors[: run.kernel.n_anchors].reshape(1, -1).repeat(len(table), axis=0)
-    named = {"t": parts.pop("time"), "anchor": anchors, "switch": parts.pop("closed")}
-    return {**parts, **named, "slip": phase * (np.abs(phase) == 1.0)}
+    named = {"t": parts["time"], "switch": parts["closed"]} | parts
+    if "anchor" in kinds:
+        named["anchor"] = run.kernel.anchors[: run.kernel.n_anchors].reshape(1, -1).repeat(len(table), axis=0)
+    if "slip" in kinds:
+        named["slip"] = parts["phase"] * (np.abs(parts["phase"]) == 1.0)
+    return {kind: named[kind] for kind in ("t", *kinds) if kind in named}
 
 
 def _parts(run: RunData, table: Matrix) -> dict[str, Any]:
     """Columns of the kernel's rows by their letters."""
-    v = run.kernel
-    n_q, n_v, n, rows = v.n_q, v.n_v, v.n, v.n_rows
-    at_v, at_a = 1 + n_q, 1 + n_q + n
-    at_lam, at_closed = at_a + n, at_a + n + rows
-    at_friction = at_closed + v.n_contacts
-    return {
-        "time": table[:, 0], "q": table[:, 1:at_v], "v": table[:, at_v : at_v + n_v], "z": table[:, at_v + n_v : at_a],
-        "a": table[:, at_a : at_a + n_v], "s": table[:, at_a + n_v : at_lam], "lam": table[:, at_lam:at_closed],
-        "closed": table[:, at_closed:at_friction], "phase": table[:, at_friction:],
-    }  # fmt: skip
+    return {name: table[:, place] for name, place in run.stepper.columns.items()}
 
 
 def _bytes(values: Matrix, kind: Any) -> NDArray[Any]:
