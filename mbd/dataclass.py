@@ -50,8 +50,11 @@ class _Placeholder:
                 delattr(owner, name)
         for name, value in self.fields.items():
             setattr(owner, name, value)
-        frozen = self.options.get("frozen", False)
-        dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen)(owner)
+        frozen, first = self.options.get("frozen", False), not any(map(dataclasses.is_dataclass, owner.__mro__[1:]))
+        own = first and not {"__setattr__", "__delattr__"} & owner.__dict__.keys()
+        dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen and not own)(owner)
+        if frozen and own:
+            _freeze(owner)
         if self.options.get("repr", True) and "__repr__" not in owner.__dict__:
             owner.__repr__ = _shown(owner)
         if self.options.get("eq", True):
@@ -79,6 +82,24 @@ def _lazy(owner: type | None = None, /, **options: bool) -> Any:
         if name not in owner.__dict__:
             setattr(owner, name, _Placeholder(owner, name, options, fields))
     return owner
+
+
+def _freeze(owner: Any) -> None:
+    """Make a dataclass without others among its bases a frozen one; `dataclasses` compiles a text for each of them."""
+    names = frozenset(field.name for field in dataclasses.fields(owner))
+
+    def __setattr__(self: Any, name: str, value: Any) -> None:  # noqa: N807
+        if type(self) is owner or name in names:
+            raise dataclasses.FrozenInstanceError(f"cannot assign to field {name!r}")
+        super(owner, self).__setattr__(name, value)
+
+    def __delattr__(self: Any, name: str) -> None:  # noqa: N807
+        if type(self) is owner or name in names:
+            raise dataclasses.FrozenInstanceError(f"cannot delete field {name!r}")
+        super(owner, self).__delattr__(name)
+
+    owner.__dataclass_params__.frozen = True
+    owner.__setattr__, owner.__delattr__ = __setattr__, __delattr__
 
 
 def _shown(owner: Any) -> Any:

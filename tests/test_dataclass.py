@@ -81,7 +81,7 @@ def outcome(work: Any) -> Any:
 
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("options", ["", "(eq=False)", "(frozen=True)", "(frozen=True, eq=False)", "(repr=False)"])
-@pytest.mark.parametrize("first", range(12))
+@pytest.mark.parametrize("first", range(16))
 def test_a_class_is_the_one_of_the_standard_library_whatever_is_asked_first(
     options: str, body: str, first: int
 ) -> None:
@@ -96,6 +96,10 @@ def test_a_class_is_the_one_of_the_standard_library_whatever_is_asked_first(
             lambda: repr(one(1.0, y=2.0)).replace("mbd.dataclass", "dataclasses").partition(" at ")[0],
             lambda: setattr(one(1.0), "x", 4.0),
             lambda: delattr(one(1.0), "x"),
+            lambda: setattr(one(1.0), "w", 4.0),
+            lambda: vars(type("Part", (kind,), {})(1.0)) | {"w": setattr(type("Part", (kind,), {})(1.0), "w", 4.0)},
+            lambda: setattr(type("Part", (kind,), {})(1.0), "x", 4.0),
+            lambda: repr(kind.__dataclass_params__).partition("frozen")[2],
             lambda: [(each.name, each.type, each.init, each.kw_only) for each in fields(kind)],
             lambda: kind.__match_args__,
             lambda: vars(replace(one(1.0, y=2.0), x=5.0)),
