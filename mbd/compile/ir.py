@@ -14,16 +14,10 @@ from mbd.compile.lowering import MAX_OPERATIONS, PART_OPERATIONS, lower
 from mbd.tape.node import Node
 from mbd.trees.llvm import Straight, helpers
 
-__all__ = ["LIBRARY", "MAX_LINES", "Module"]
+__all__ = ["MAX_LINES", "Module"]
 
 MAX_LINES = 2500
 """Lines of text after which a piece is full: some 1000 operations, with what goes in and out of their functions."""
-
-LIBRARY = (
-    "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fmod", "free", "log", "malloc", "memset", "pow", "sin",
-    "sinh", "tan", "tanh",
-)  # fmt: skip
-"""Functions of the C library that the code may call, by their C names."""
 
 
 class Module:

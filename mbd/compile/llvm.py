@@ -44,7 +44,6 @@ from mbd.compile.cache import ObjectCache, default_cache, key_of
 from mbd.compile.forking import COMPILING
 from mbd.compile.functions import ByName
 from mbd.compile.host import host
-from mbd.compile.ir import LIBRARY, Module
 from mbd.compile.layout import Layout
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
@@ -68,6 +67,13 @@ PASSES = {"from level": 3, "speed_level": 3, "slp_vectorization": True}
 """Passes over the IR, and from which level on; part of the key of every object file."""
 
 _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+
+
+LIBRARY = (
+    "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fmod", "free", "log", "malloc", "memset", "pow", "sin",
+    "sinh", "tan", "tanh",
+)  # fmt: skip
+"""Functions of the C library that the code may call, by their C names."""
 
 
 @cache
@@ -278,6 +284,8 @@ class Library(ByName[MachineFunction]):
                 raise ModelError(f"this library already has a function {name!r}; give every function its own name")
         begin = time.perf_counter()
         final = 0 if rarely else self.level
+        from mbd.compile.ir import Module  # not where all code is in the cache
+
         module = Module(programs, self.layout, host().fused, **CUTS.get(final, {}))
         text = module.text()
         written = time.perf_counter()

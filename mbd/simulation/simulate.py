@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import platform
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -33,10 +33,6 @@ from mbd.simulation.run.control import reset_faults
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.run.strategy import chosen
-from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
-from mbd.simulation.tolerance.judged import judged
-from mbd.simulation.tolerance.search import MAX_STEP_SHARE
-from mbd.simulation.tolerance.trials import Trial
 from mbd.state import State, of_model
 
 __all__ = ["REST_SPEED", "laid_out", "prepared", "simulate"]
@@ -198,6 +194,11 @@ class _Motion:
 
     def to_tolerance(self, tol: float, tol_of: Sequence[str] | None) -> tuple[RunData, Trajectory, str]:
         """The run whose error agrees with a tolerance; where an event ends it, the first guess is that it takes 1 s."""
+        from mbd.simulation.tolerance.calibrate import calibrated, first_allowed
+        from mbd.simulation.tolerance.judged import judged
+        from mbd.simulation.tolerance.search import MAX_STEP_SHARE
+        from mbd.simulation.tolerance.trials import Trial
+
         equations = mechanism_of(self.model, self.options["backend"], self.changed).equations
         names, scheme, driven = judged(equations, tol_of), self.scheme, bool(driving_rows(equations))
         length = 1.0 if isinstance(self.until, str | tuple) else (float(self.until) - self.start.time) or 1.0
@@ -293,6 +294,6 @@ def _versions() -> dict[str, str]:
     """What computes: told by the packages themselves, as asking for their metadata takes 50 ms."""
     import mbd
 
-    found = {"python": platform.python_version(), "mbd": mbd.__version__, "numpy": np.__version__}
+    found = {"python": sys.version.split()[0], "mbd": mbd.__version__, "numpy": np.__version__}
     llvmlite = import_module("llvmlite") if find_spec("llvmlite") else None
     return {**found, "llvmlite": getattr(llvmlite, "__version__", "not installed")}

@@ -31,7 +31,6 @@ from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Contact
 from mbd.results.columns import ModelColumns
-from mbd.results.energy import doubted_ledger, kinds_of_work
 from mbd.simulation.run.stored import inputs_of, record_of, whole_record
 
 if TYPE_CHECKING:
@@ -152,6 +151,8 @@ class EnergyWatch(EnergyFindings):
             return self.problem
         if not self._is_suspicious(run):
             return ""
+        from mbd.results.energy import doubted_ledger  # few runs come here
+
         columns = ModelColumns(whole_record(run), run.mechanism.equations)
         lending = _lending(run)
         ledger, doubt = doubted_ledger(columns, lending)
@@ -272,6 +273,8 @@ def _swing(values: Vector) -> Vector:
 
 def kinds_of(mechanism: Mechanism) -> frozenset[str]:
     if mechanism not in KINDS:
+        from mbd.results.energy import kinds_of_work
+
         KINDS[mechanism] = kinds_of_work(mechanism.equations)
     return KINDS[mechanism]
 

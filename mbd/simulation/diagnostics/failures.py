@@ -8,10 +8,7 @@ from dataclasses import replace
 from mbd.kernel import codes
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
-from mbd.simulation.diagnostics.causes import Words, cause_of, last_events
 from mbd.simulation.diagnostics.circular import NEARLY_SINGULAR_RTOL, circular_laws
-from mbd.simulation.diagnostics.jamming import may_jam
-from mbd.simulation.diagnostics.residuals import residuals_of
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
@@ -28,6 +25,8 @@ codes.TOO_SMALL, codes.DEPENDENT, codes.OUTGROWN, codes.GAINED})  # fmt: skip
 
 def attempt(run: RunData) -> Callable[[str, State], Failure]:
     """What a run has just tried, noted before it is taken back; the failure, given its sentence and the state kept."""
+    from mbd.simulation.diagnostics.residuals import residuals_of
+
     v = run.kernel
     newton = v.failure_time > run.now and v.block_time == v.failure_time
     time = max(float(v.failure_time), run.now)
@@ -66,6 +65,9 @@ def explanation(
     swiftest : largest rate of a coordinate in any row so far [m/s, rad/s]
     beyond : what `out_of_reach` says: the cause of whatever else is found
     """
+    from mbd.simulation.diagnostics.causes import Words, cause_of
+    from mbd.simulation.diagnostics.jamming import may_jam
+
     values = stepper.kernel
     now = float(values.time)
     time = float(values.failure_time) if values.failure_time > now else now
@@ -81,6 +83,8 @@ def crowded(events: Sequence[EventRecord], now: float, dt: float) -> str:
     """A sentence if there were too many events within the last dt, '' otherwise."""
     if len(events) <= MAX_EVENTS_PER_STEP or events[-MAX_EVENTS_PER_STEP].time < now - dt:
         return ""
+    from mbd.simulation.diagnostics.causes import last_events
+
     return (
         f"t = {now:.9g} s: more than {MAX_EVENTS_PER_STEP} events within one dt: {last_events(events)}; use a "
         "smaller dt, or where it applies a softer stiffness, a larger rest_speed or locate='root'"

@@ -12,7 +12,6 @@ import numpy as np
 from mbd.assembly.doubtful import degrees
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.equations.equations import Contact
-from mbd.forces.muscles import Muscle
 from mbd.kernel.codes import PULL
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
@@ -163,8 +162,12 @@ def _doubts(run: RunData) -> list[str]:
 
 def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]:
     """Muscles that push as the run begins: out of equilibrium, or on a path shorter than their tendon alone."""
-    slack, short = [], []
-    muscles = [force for force in getattr(run.model, "forces", ()) if isinstance(force, Muscle)]
+    slack, short, forces = list[str](), list[str](), getattr(run.model, "forces", ())
+    if not forces:
+        return [], []
+    from mbd.forces.muscles import Muscle
+
+    muscles = [force for force in forces if isinstance(force, Muscle)]
     for name, muscle in ((each.name, each) for each in muscles):
         asked = [columns.node(f"{name}.{field}") for field in ("force", "length", "max_force", "tendon_length")]
         force, length, most, tendon = (float(x[0]) for x in columns.evaluate(asked, columns.part(np.array([0]), asked)))
