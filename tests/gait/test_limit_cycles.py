@@ -444,3 +444,20 @@ def test_sides_that_were_alike_are_compared_again_with_other_parameters():
     again = search()
     assert np.array_equal(first.state.q, again.state.q) and np.array_equal(first.state.v, again.state.v)
     assert first.period == again.period
+
+
+@pytest.mark.parametrize("others", [{}, {"gamma": 0.0092}])
+def test_a_search_leaves_its_arrays_to_the_next_which_finds_the_same_to_the_bit(others) -> None:
+    model, start = simplest()
+
+    def found(values):
+        gait = mbd.limit_cycle(model, start, section="heel strike", parameters=values)
+        assert gait.map_derivative is not None
+        return [each.tobytes() for each in (gait.state.q, gait.state.v, gait.multipliers, gait.map_derivative.matrix)]
+
+    first, idle = found({}), mechanism_of(model).idle
+    left = set(map(id, idle.values()))
+    assert left
+    found(others)
+    assert found({}) == first
+    assert set(map(id, idle.values())) == left
