@@ -67,7 +67,7 @@ class BranchPoint:
 class Corrected:
     """A solution near a prediction: the state, the parameter, what the map gave there, corrections that it took.
 
-    left : by how much one more correction would change the parameter
+    left : by how much one more correction would change the parameter; u : as in `Continuation.corrected`
     """
 
     state: State
@@ -75,6 +75,7 @@ class Corrected:
     found: Measured
     corrections: int
     left: float = 0.0
+    u: Vector | None = None
 
 
 @dataclass(frozen=True)
@@ -226,7 +227,7 @@ class Continuation:
             if residual <= self.tol:
                 step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
                 uncertain = self.width * abs(float(step[-1]))
-                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, uncertain)
+                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, uncertain, u)
             if residual > MAX_CONTRACTION * before:
                 renewed = self.matrix_at(chart, u, value, found)
                 if renewed is None or residual > 4.0 * before:

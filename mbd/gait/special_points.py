@@ -15,6 +15,7 @@ from dataclasses import field, replace
 
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
@@ -179,11 +180,14 @@ def _at(given: Continuation, one: BranchPoint, place: float, levels: int) -> tup
     """The point at a distance along the tangent of another one, with what is left of its equations in the parameter;
     None where there is none.
     """
-    for tol in (RESIDUAL_RATIO * given.tol, given.tol):
-        try:
-            corrected = replace(given, tol=tol).corrected(one, one.tangent, place)
-            if isinstance(corrected, Corrected):
-                return given.point(corrected, given.whole(one), levels), corrected.left
-        except MbdError:
-            return None
-    return None
+    best: Corrected | None = None
+    guess: Vector | None = None
+    try:
+        for tol in (given.tol, RESIDUAL_RATIO * given.tol):
+            corrected = replace(given, tol=tol).corrected(one, one.tangent, place, guess)
+            if not isinstance(corrected, Corrected):
+                break
+            best, guess = corrected, corrected.u
+        return None if best is None else (given.point(best, given.whole(one), levels), best.left)
+    except MbdError:
+        return None

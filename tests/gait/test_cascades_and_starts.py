@@ -79,3 +79,13 @@ def test_errors_of_special_points_hold_the_points():
         gait = cycle_of("p + x - x**2", f"{k}*y + 0.2*x", 0.9, 0.9**0.5, 0.2 * 0.9**0.5 / (1.0 - k))
         doubling = mbd.branch(gait, "scale", 1.1, step=0.1).points("doubling")[0]
         assert abs(doubling.value - 1.0) <= doubling.error + 1e-15 and doubling.error < 1e-9
+
+
+def test_special_points_far_from_the_points_of_a_branch_solve_their_equations():
+    """x' = p − x² doubles at 3/4, 5/4 and 1.368098939391258, the last between points that lie far apart."""
+    gait = cycle_of("p - x**2", "0.2*y", 0.5, 0.366, 0.0)
+    for right, to in ((0.75, 1.0), (1.25, 1.4005), (1.368098939391258, 1.4005)):
+        branch = mbd.branch(gait, "scale", to)
+        (point,) = [each for each in branch.points("doubling") if abs(each.value - right) < 0.01]
+        assert abs(point.value - right) <= point.error + 1e-15 and point.error < 1e-11
+        gait = branch.switch(point) if gait.strides < 4 else gait
