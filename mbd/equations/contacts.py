@@ -150,8 +150,9 @@ def _idle(scope: DerivationScope, node: Node, title: str, kinds: set[str], unit:
         return []
     if "t" in kinds:
         return [f"{title} prescribes in time what no motion changes; let it depend on the posture"]
+    asked = [each.data for each in live([node]) if each.op == "input"]
     given: dict[Node | tuple[str, int], float] = {
-        ("p", k): parameter.value for k, parameter in enumerate(scope.parameters.found)
+        (kind, k): scope.parameters.found[k].value for kind, k in asked if kind == "p"
     }
     (size,) = evaluate([node], given)
     if abs(size) > EQUAL_RTOL:
