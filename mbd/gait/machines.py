@@ -126,9 +126,18 @@ def _is_itself(node: Node, anchor: int) -> bool:
 
 
 def stored_by(equations: Equations, names: Sequence[str]) -> frozenset[int]:
-    """Anchors that transitions store whose events have these names."""
+    """Anchors that transitions store whose events have these names, and that follow from the motion there alone.
+
+    What is made of other values that are held, or of forces, is none of them: these may be others after the transition.
+    """
     taken = {guard.name: guard.transition for guard in equations.guards if guard.transition is not None}
-    return frozenset(anchor for name in names if name in taken for anchor in taken[name].stored)
+    nodes = {a: node for each in equations.machines for a, node in zip(each.anchors, each.captured, strict=True)}
+    found = {anchor for name in names if name in taken for anchor in taken[name].stored}
+    return frozenset(anchor for anchor in found if _of_motion(nodes[anchor]))
+
+
+def _of_motion(node: Node) -> bool:
+    return not any(each.op == "input" and each.data[0] in ("anchor", "lam", "a", "s") for each in live([node]))
 
 
 def images(equations: Equations, sides: tuple[str, str]) -> tuple[Numbers, dict[int, Vector]]:

@@ -131,6 +131,36 @@ def test_return_maps_with_remembered_values_have_exact_derivatives(section: str,
             np.testing.assert_allclose(exact, one_sided(gait, c, h), atol=1e-7 * np.max(np.abs(exact)))
 
 
+def test_what_is_stored_of_other_remembered_values_is_a_part_of_the_gait_where_it_is_stored() -> None:
+    """The rate of the torso at the strike before the last one moves its rest: a dimension of the return map."""
+    plain, _ = walker(remembers=True)
+    model = plain.without("stance", "left hold", "right hold", "left back", "right back")
+    joints = {joint.name: joint for joint in model.joints}
+    steps = [mbd.Transition("left", "right", on="right foot"), mbd.Transition("right", "left", on="left foot")]
+    memory = {"now": "waist.rate", "before": "stance.now"}
+    model.constrain(mbd.Mode("stance", ("left", "right"), transitions=steps, remembers=memory))
+
+    def hold(q: Any, v: Any, before: Any) -> Any:
+        return 100.0 * (q - math.pi - 0.1 * before) + 20.0 * v
+
+    reads = ["waist.angle", "waist.rate", "stance.before"]
+    for side in ("left", "right"):
+        model.apply(
+            mbd.Motor(f"{side} hold", joints["waist"], torque={side: lambda *x: -hold(*x)}, by="stance",
+                      arguments=reads),
+            mbd.Motor(f"{side} back", joints[f"{side} hip"], torque={side: hold}, by="stance", arguments=reads),
+        )  # fmt: skip
+    start = mbd.assemble(
+        model, {"left hip.angle": 0.271, "right hip.angle": -0.271, "waist.angle": math.pi},
+        {"left hip.rate": -1.0924, "right hip.rate": -0.3774, "waist.rate": 0.0}, closed=["left foot"],
+    )  # fmt: skip
+    strike = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right"))
+    later = mbd.limit_cycle(model, strike.state, section="grip: soft to firm", mirror=("left", "right"))
+    np.testing.assert_allclose(strike.period, later.period, atol=1e-9)
+    sizes = [np.sort(np.abs(each.multipliers))[::-1][:3] for each in (strike, later)]
+    np.testing.assert_allclose(sizes[0], sizes[1], atol=1e-6)
+
+
 def test_runs_of_many_starts_are_those_of_each_to_the_bit() -> None:
     model, start = walker(remembers=True)
     rates = np.linspace(-0.1, 0.1, 4)
