@@ -15,7 +15,7 @@ from reprlib import recursive_repr
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeVar
 
-__all__ = ["LateFields", "dataclass", "found_late", "makes_late"]
+__all__ = ["LateFields", "changed_late", "dataclass", "found_late", "makes_late"]
 
 
 class _Factory:
@@ -209,6 +209,15 @@ def found_late(one: Late, name: str, make: Callable[[], Any]) -> Late:
 def makes_late(one: LateFields, name: str) -> Any:
     """What finds out a field that nobody has looked at; None of others."""
     return vars(one).get("_late", {}).get(name)
+
+
+def changed_late(one: LateFields, name: str, change: Callable[[Any], Any]) -> None:
+    """Change a field; one that nobody has looked at is changed as it is made."""
+    make = makes_late(one, name)
+    if make is None:
+        vars(one)[name] = change(getattr(one, name))
+    else:
+        vars(one)["_late"] = {**vars(one)["_late"], name: lambda: change(make())}
 
 
 if TYPE_CHECKING:

@@ -141,6 +141,8 @@ class StoredStates:
         """What each contact captured where it closed or began to stick, or holds from the start, until it opens."""
         start, wrapped = self.record.start, self.equations.wrapped
         held = np.zeros((len(self.record.time), self.equations.n_anchors))
+        if not held.size:
+            return held
         counts = [turn.anchor for turn in self.equations.turns]
         if counts and start is not None and len(start.anchors) == held.shape[1]:
             held[:, counts] = start.anchors[counts]

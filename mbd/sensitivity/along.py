@@ -86,8 +86,8 @@ def along(run: Trajectory, wrt: Sequence[Any], names: Sequence[str], held: Colle
         see `mbd.sensitivities`.
     """
     rows = RunRows(run)
-    wanted = directions(rows, wrt)
-    programs = programs_of(rows, wanted)
+    wanted = directions(rows.mechanism, wrt)
+    programs = programs_of(rows.mechanism, wanted, rows.record.parameters)
     seen, slopes, shifts = list[int](), list[Matrix](), list[Vector]()
 
     def visit(row: int, motion: Motion, mode: Mode, rates: Rates) -> None:

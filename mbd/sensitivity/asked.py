@@ -11,16 +11,18 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.bodies.values import among, is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of, tunable_model
-from mbd.dataclass import dataclass
+from mbd.dataclass import changed_late, dataclass
+from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
+from mbd.results.facts import Facts
 from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
 from mbd.sensitivity.derivative import Differentiated, passed
 from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.made_run import made_with
 from mbd.sensitivity.outputs import lines_of, taken_apart, usual
-from mbd.sensitivity.result import Sensitivities
+from mbd.sensitivity.result import Sensitivities, words_of
 from mbd.sensitivity.run_data import ADVICE, Source, refused
 from mbd.sensitivity.starts import Direction, restitution_names
 from mbd.sensitivity.tangent_names import refuse_parts, start_names, whole_names
@@ -87,7 +89,7 @@ class Asked:
         """What made the run."""
         return Source(model, scheme)
 
-    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
+    def take(self, run: Trajectory, found: Differentiated, wanted: Sequence[Direction]) -> None:
         """What was asked for, from the derivatives at the end and at events."""
         raise NotImplementedError
 
@@ -95,16 +97,23 @@ class Asked:
 class Table(Asked):
     """Derivatives of results as a table."""
 
-    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
-        names = usual(found.rows) if self.of is None else taken_apart(found.rows, self.of)
-        lines = lines_of(found.rows, found.programs, found.walked, names)
-        facts, columns = run.facts, tuple(each.name for each in wanted)
-        self.found = Sensitivities(
-            lines.names, columns, lines.matrix, lines.values, run,
-            tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in lines.names),
-            tuple("rad" if ".turn." in name else unit(name, facts) for name in columns),
-            written=tuple(dict.fromkeys(name for each in found.rows.controllers for name in each.writes)),
-        )  # fmt: skip
+    def take(self, run: Trajectory, found: Differentiated, wanted: Sequence[Direction]) -> None:
+        self.found = Sensitivities(run=run, **self.fields(found, wanted))
+
+    def fields(self, found: Differentiated, wanted: Sequence[Direction]) -> dict[str, Any]:
+        """Fields of `Sensitivities` but for the run."""
+        rows = found.rows
+        names = usual(rows) if self.of is None else taken_apart(rows, self.of)
+        lines = lines_of(rows, found.programs, found.walked, names)
+        columns = tuple(each.name for each in wanted)
+        of_units, wrt_units = rows.mechanism.kept(
+            (Table, lines.names, columns), lambda: _units(lines.names, columns, rows.run.facts)
+        )
+        written = tuple(dict.fromkeys(name for each in rows.controllers for name in each.writes))
+        return {
+            "of": lines.names, "wrt": columns, "matrix": lines.matrix, "values": lines.values,
+            "of_units": of_units, "wrt_units": wrt_units, "written": written,
+        }  # fmt: skip
 
 
 class EndState(Asked):
@@ -123,7 +132,7 @@ class EndState(Asked):
     def source(self, model: Any, scheme: Integrator) -> Source | None:
         return None
 
-    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
+    def take(self, run: Trajectory, found: Differentiated, wanted: Sequence[Direction]) -> None:
         at_end = found.walked.motion.tangent
         self.found = np.vstack([at_end.q, at_end.y, at_end.anchors, at_end.t])
 
@@ -151,9 +160,17 @@ class Carried(Table):
             )
         return model, replace(start, memory=None)
 
-    def take(self, run: Trajectory, found: Differentiated, wanted: list[Direction]) -> None:
-        super().take(run, found, wanted)
-        run.record.stats["sensitivities"] = self.found.as_words()
+    def take(self, run: Trajectory, found: Differentiated, wanted: Sequence[Direction]) -> None:
+        fields = self.fields(found, wanted)
+        changed_late(run.record, "stats", lambda stats: stats | {"sensitivities": words_of(fields)})
+
+
+def _units(of: Sequence[str], wrt: Sequence[str], facts: Facts) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Units of results and of what they are differentiated by."""
+    return (
+        tuple("s" if name == "time" or ".time" in name else unit(name, facts) for name in of),
+        tuple("rad" if ".turn." in name else unit(name, facts) for name in wrt),
+    )
 
 
 def request_of(wrt: Any, controllers: Any) -> Asked:
@@ -206,19 +223,28 @@ def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any
     single, grouped = names_in(wrt)
     _check_controllers(getattr(model, "controllers", ()), controllers, {*single, *grouped})
     mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
-    inputs = {parameter.name for parameter in mechanism.equations.parameters}
-    own = {coordinate.name for coordinate in mechanism.equations.coordinates}
-    start = start_names(mechanism.equations)
-    if inputs.union(own, start).issuperset((*single, *grouped)):
+    equations = mechanism.equations
+    if mechanism.kept(with_inputs, lambda: _names_of(equations)).issuperset((*single, *grouped)):
         return model
-    folded = getattr(model, "parameters", {})
-    known = {*inputs, *folded, *start, *restitution_names(mechanism.equations)}
-    whole = whole_names(mechanism.equations)
+    folded, own = getattr(model, "parameters", {}), _names_of(equations)
+    known = {*own, *folded, *restitution_names(equations)}
+    whole = whole_names(equations)
     for name in (*single, *grouped):
         if name not in known and not (name in whole and name in single):
-            refuse_parts(mechanism.equations, [name], "wrt")
+            refuse_parts(equations, [name], "wrt")
             raise UnknownNameError(
                 "wrt: " + nearest(name, known, "coordinate, rate of the start or parameter", "There are")
             )
-    more = [name for name in (*single, *grouped) if name in folded and name not in inputs and name not in own]
+    inputs = _inputs_of(equations)
+    more = [name for name in (*single, *grouped) if name in folded and name not in inputs]
     return tunable_model(model, more) if more else model
+
+
+def _names_of(equations: Equations) -> frozenset[str]:
+    """Parameters, coordinates, and what else a start has."""
+    return _inputs_of(equations).union(start_names(equations))
+
+
+def _inputs_of(equations: Equations) -> frozenset[str]:
+    """Parameters and coordinates."""
+    return frozenset([*(each.name for each in equations.parameters), *(each.name for each in equations.coordinates)])

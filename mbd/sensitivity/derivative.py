@@ -73,7 +73,7 @@ def end_of(found: Differentiated) -> tuple[Matrix, Vector]:
 def passed(
     run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = (),
     source: Source | None = None, made: Any = None,
-) -> tuple[Differentiated, list[Direction]]:  # fmt: skip
+) -> tuple[Differentiated, Sequence[Direction]]:  # fmt: skip
     """The pass over a run, and its directions.
 
     The run is made once more, to the bit, by the kernel with derivatives (`mbd.sensitivity.tangent`), unless it carried
@@ -86,7 +86,7 @@ def passed(
         wanted, programs, start = made.ready.wanted, made.ready.programs, made.ready.start
         walked = tangent_run(rows, programs, start, restitutions_of(wanted), made=made)
         return Differentiated(rows, programs, walked), wanted
-    wanted = directions(rows, wrt)
-    programs = programs_of(rows, wanted)
+    wanted = directions(rows.mechanism, wrt)
+    programs = programs_of(rows.mechanism, wanted, rows.record.parameters)
     start, restitutions = start_tangent(rows, programs, wanted, held), restitutions_of(wanted)
     return Differentiated(rows, programs, tangent_run(rows, programs, start, restitutions)), wanted

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -22,7 +21,6 @@ from mbd.sensitivity.starts import Direction, directions, programs_of, restituti
 from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
 from mbd.simulation.marching import Run
 from mbd.simulation.run.ends import call
-from mbd.simulation.run.remembered import sealed
 from mbd.simulation.run.savepoints import restore, save
 from mbd.simulation.run.stored import record_of
 
@@ -36,7 +34,7 @@ Ways = Callable[[Mapping[str, float]], tuple[Sequence[Any], Sequence[str]]]
 class Ready:
     """What a run is differentiated by, and the derivatives of its start."""
 
-    wanted: list[Direction]
+    wanted: Sequence[Direction]
     programs: Programs
     start: Tangent
 
@@ -54,38 +52,26 @@ class MadeRun(TangentRun):
 
     def at_start(self) -> Self:
         """The same; what rows hold at the first instant, which derivatives of the start follow, is found and undone."""
-        rows = self._rows()
-        ways, held = self.ways(dict(zip(rows.record.parameter_names, self.first_parameters, strict=False)))
-        wanted = directions(rows, ways)
-        programs = programs_of(rows, wanted)
+        mechanism, values = self.mechanism, self.first_parameters
+        names = (parameter.name for parameter in mechanism.equations.parameters)
+        ways, held = self.ways(dict(zip(names, values, strict=False)))
+        wanted = directions(mechanism, ways)
+        programs = programs_of(mechanism, wanted, values)
         self.moved_with_jump = lambda: None
         self.begin_tangents(programs.places)
         super().at_start()
         point = save(self)
         if call(self, self.now, np.inf) == codes.DONE and self.kernel.n_stored:
             self.collect()
-            rows = self._rows()
+            rows = RunRows(Trajectory(record_of(self, self.table[:1])))
             self.ready = Ready(wanted, programs, start_tangent(rows, programs, wanted, held))
         restore(self, point)
         self.history, self.of_times, self.of_rows = [], [], {}
         if self.ready is not None:
             some = slice(0, min(len(wanted), DIRECTIONS))
-            seed(self, Charted(programs), rows.record.q[0], self.ready.start, restitutions_of(wanted), some)
+            seed(self, Charted(programs), self.table[0, 1 : 1 + self.kernel.n_q], self.ready.start,
+                 restitutions_of(wanted), some)  # fmt: skip
         return self
-
-    def _rows(self) -> RunRows:
-        """The first row, of zeros before it is there."""
-        first = self.table[:1] if self.stored else np.zeros_like(self.table[:1])
-        return RunRows(Trajectory(record_of(self, first)))
-
-    def complete(self) -> tuple[Trajectory, str]:
-        """The same state; a run that continues from the end needs no derivatives."""
-        run, problem = super().complete()
-        final = run.record.final
-        if final is None or final.memory is None:
-            return run, problem
-        memory = sealed(replace(final.memory, scheme=self.stepper.plain.memory))
-        return Trajectory(replace(run.record, final=replace(final, memory=memory))), problem
 
 
 def made_with(ways: Ways, *given: Any) -> Run:

@@ -96,13 +96,16 @@ class _Watched:
                 yield friction.name
 
 
-def refuse_sided_start(rows: RunRows, programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> None:
+def refuse_sided_start(
+    rows: RunRows, programs: Programs, at_row: Callable[[int], tuple[Motion, Rates]]
+) -> None:  # fmt: skip
     """Raise a `OneSidedError` where a change of the start decides what happens first.
 
-    motion, mode, rates : at the first row
+    at_row : gives the motion and rates of a row with their derivatives
     """
     if not _is_any(programs):
         return
+    (motion, rates), mode = at_row(0), rows.mode(0)
     watched, within = _Watched(programs, motion, mode, rates), INSTANT_RTOL * _duration(rows)
     if names := dict.fromkeys(watched.starting()):
         raise sided(
@@ -112,25 +115,28 @@ def refuse_sided_start(rows: RunRows, programs: Programs, motion: Motion, mode: 
         raise sided(f"the run starts where {_listed(names)} happens, and a change decides whether it does")
 
 
-def refuse_sided_grip(programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> None:
+def refuse_sided_grip(
+    rows: RunRows, programs: Programs, row: int, at_row: Callable[[int], tuple[Motion, Rates]]
+) -> None:  # fmt: skip
     """Raise a `OneSidedError` where dry friction holds with its limit, and a change decides whether it is enough.
 
-    motion, mode, rates : at the start, or just after an event
+    row : that of the start, or just after an event; at_row : see `refuse_sided_start`
     """
     if not programs.equations.frictions:
         return
+    (motion, rates), mode = at_row(row), rows.mode(row)
     values, slopes = programs.limits(motion.at(mode, rates.rate, rates.lam))
     Z = motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
     names = []
     for f, friction in enumerate(programs.equations.frictions):
         group = list(friction.group or (f,))
-        rows = [programs.equations.frictions[each].row for each in group]
-        size = float(np.linalg.norm(rates.lam[rows]))
-        if f != group[0] or not set(rows) <= set(mode.held) or size == 0.0:
+        own = [programs.equations.frictions[each].row for each in group]
+        size = float(np.linalg.norm(rates.lam[own]))
+        if f != group[0] or not set(own) <= set(mode.held) or size == 0.0:
             continue
-        along = rates.lam[rows] / size
-        change = slopes[f] @ Z - along @ rates.of_lam[rows]
-        terms = np.abs(slopes[f]) @ np.abs(Z) + np.abs(along) @ np.abs(rates.of_lam[rows])
+        along = rates.lam[own] / size
+        change = slopes[f] @ Z - along @ rates.of_lam[own]
+        terms = np.abs(slopes[f]) @ np.abs(Z) + np.abs(along) @ np.abs(rates.of_lam[own])
         if abs(values[f] - size) <= ROUND_OFF * size and np.any(np.abs(change) > EQUAL_RTOL * terms):
             names.append(friction.name)
     if names:
@@ -192,8 +198,8 @@ def with_both_sides(
     another start, with other parameters
     """
     rows = RunRows(run)
-    wanted = directions(rows, ways)
-    tangent = start_tangent(rows, programs_of(rows, wanted), wanted, held)
+    wanted = directions(rows.mechanism, ways)
+    tangent = start_tangent(rows, programs_of(rows.mechanism, wanted, rows.record.parameters), wanted, held)
     found: dict[tuple[str, str], tuple[float, float]] = {}
     shown: list[str] = []
     for k, way in enumerate(wanted):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
@@ -13,13 +15,12 @@ from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
+from mbd.tape.node import Node
 
 __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
 
 RESULT_RTOL = 1e-7
 """Difference of a result from that of the run, over its size, that is round-off [-]."""
-MAX_CHECKED_ROWS = 64
-"""Rows from which the size of a result is known."""
 
 
 @dataclass(frozen=True)
@@ -73,53 +74,64 @@ def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]
         for a name that is neither a result nor the instant of an event that happened.
     """
     rates = with_sliding(programs, found.motion, found.mode, found.rates)
-    instants = {name: instant_of(name, found) for name in of}
-    instants["time"] = float(rows.run.time[-1]), found.motion.tangent.t
-    wanted = _at_rows(rows, found, [name for name in of if instants[name] is None])
+    instants = {"time": (float(rows.run.time[-1]), found.motion.tangent.t)}
+    for name in of if found.instants else ():
+        if name not in instants and (instant := instant_of(name, found)) is not None:
+            instants[name] = instant
+    names = tuple(dict.fromkeys(name for name in of if name not in instants))
+    places = rows.mechanism.kept((lines_of, names), lambda: _places(rows, found, names))
     at = found.motion.at(found.mode, rates.rate, rates.lam)
     at.lam, at.anchors = rates.lam, _with_turns(rows, programs, at.anchors)
     tangent = found.motion.tangent.stacked(programs.columns, rates.of_rate, rates.of_lam)
-    values, slopes = programs.results(list(wanted), at)
-    lines = slopes @ tangent
-    for name, value in zip(wanted, values, strict=True):
-        if not _is_found_again(float(value), wanted[name]):  # its size may be that of a peak between these rows
-            _require_found_again(name, float(value), _at_rows(rows, found, [name], len(rows.record.time))[name])
-    results = dict(zip(wanted, zip(values, lines, strict=True), strict=True))
-    each = [instants[name] or results[name] for name in of]
-    size = len(found.motion.tangent.t)
-    return Lines(
-        tuple(of), np.array([value for value, _ in each]), np.array([line for _, line in each]).reshape(len(of), size)
-    )
+    results, slopes = programs.results(names, at)
+    _require_found_again(rows, names, places, results)
+    numbers = {name: k for k, name in enumerate((*names, *instants))}
+    chosen = [numbers[name] for name in of]
+    values = np.concatenate([results, [value for value, _ in instants.values()]])
+    matrix = np.vstack([slopes @ tangent, *(line for _, line in instants.values())])
+    return Lines(tuple(of), values[chosen], matrix[chosen])
 
 
-def _at_rows(rows: RunRows, found: Passed, names: Sequence[str], most: int = MAX_CHECKED_ROWS) -> dict[str, Vector]:
-    """Named results at some rows of the run and the last one, evaluated together."""
-    single, columns = list[str](), rows.run.columns
-    for name in names:
+def _places(rows: RunRows, found: Passed, names: Sequence[str]) -> tuple[NDArray[np.intp], list[tuple[int, Node]]]:
+    """Where in (q, v, z) each named result is, −1 for what is not the state; numbers and expressions of the latter."""
+    at, others, columns = np.full(len(names), -1), list[tuple[int, Node]](), rows.stored
+    starts = {"q": 0, "v": rows.mechanism.layout.n_q, "z": rows.mechanism.layout.n_q + rows.mechanism.layout.n_v}
+    for k, name in enumerate(names):
         try:
             parts = columns.components(name)
         except UnknownNameError:
             times = [f"{each.fired.name}.time" for each in found.instants]
-            known = {*rows.run.names, *times, "time"}
+            known = {*columns.names, *times, "time"}
             raise UnknownNameError("of: " + nearest(name, known, "result", "The run has")) from None
         if len(parts) > 1:
             raise UnknownNameError(f"of: {name!r} has three components; ask for {name + '.x'!r}, '.y' or '.z'")
-        single += parts
-    stored, count = rows.stored, len(rows.record.time)
-    some = np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
-    nodes = [stored.node(part) for part in single]
-    return dict(zip(names, stored.evaluate(nodes, stored.part(some, nodes)), strict=True))
+        place = columns.identity(parts[0])[0]
+        if place is not None and place[0] in starts:
+            at[k] = starts[place[0]] + place[1]
+        else:
+            others.append((k, columns.node(parts[0])))
+    return at, others
 
 
-def _is_found_again(value: float, wanted: Vector) -> bool:
-    """Whether a result at the end is the last of those at rows."""
-    return bool(abs(value - wanted[-1]) <= RESULT_RTOL * max(1.0, float(np.max(np.abs(wanted)))))
+def _require_found_again(rows: RunRows, names: Sequence[str], places: Any, values: Vector) -> None:
+    """Refuse named results at the end that are not the last of those at the rows.
 
-
-def _require_found_again(name: str, value: float, wanted: Vector) -> None:
-    """Refuse a named result at the end where it is not the last of those at the rows."""
-    if not _is_found_again(value, wanted):
-        raise refused(f"{name!r} is {wanted[-1]:.9g} at its end, which the pass does not find again ({value:.9g})")
+    places : of `_places`
+    """
+    at, others = places
+    record, stored = rows.record, rows.stored
+    last = np.array([len(record.time) - 1])
+    wanted = np.concatenate([record.q[-1], record.v[-1], record.z[-1], [np.nan]])[at]
+    if others:
+        numbers, nodes = zip(*others, strict=True)
+        wanted[list(numbers)] = np.ravel(stored.evaluate(nodes, record.part(last, rows.anchors[last])))
+    off = np.abs(values - wanted)
+    for k in map(int, np.flatnonzero(~(off <= RESULT_RTOL * np.maximum(1.0, np.abs(wanted))))):
+        size = float(np.abs(stored.at_rows(names[k : k + 1])[0]).max())  # that of a peak before the end
+        if not off[k] <= RESULT_RTOL * size:
+            raise refused(
+                f"{names[k]!r} is {wanted[k]:.9g} at its end, which the pass does not find again ({values[k]:.9g})"
+            )
 
 
 def _with_turns(rows: RunRows, programs: Programs, anchors: Vector) -> Vector:

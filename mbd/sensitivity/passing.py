@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -118,7 +118,8 @@ def tangent_run(
         states.append(run.at_state())
 
     def joined(parts: Sequence[Matrix]) -> Matrix:
-        return np.concatenate([part[..., :width] for part, (_, width) in zip(parts, runs, strict=True)], axis=-1)
+        cut = [part[..., :width] for part, (_, width) in zip(parts, runs, strict=True)]
+        return cut[0] if len(cut) == 1 else np.concatenate(cut, axis=-1)
 
     at_end = {name: (number, joined([each[name][1] for each in states])) for name, (number, _) in states[0].items()}
     end = _motion(charted, at_end, start.p)
@@ -126,8 +127,9 @@ def tangent_run(
     if not located and visit is None:
         return Passed(end[0], last, end[1])
     sizes = np.cumsum([0, 1, layout.n_q, layout.n, layout.n, layout.n_rows])
-    names, anchors = ("clock", "q", "y", "rate", "lam"), rows.anchors
+    names = "clock", "q", "y", "rate", "lam"
 
+    @cache
     def at_row(row: int) -> tuple[Motion, Rates]:
         numbers = np.concatenate(
             [[rows.ends[row]], rows.record.q[row], rows.y(row), rows.rate(row), rows.record.lam[row]]
@@ -136,9 +138,7 @@ def tangent_run(
         found = {
             name: (numbers[a:b], lanes[a:b]) for name, a, b in zip(names, sizes[:-1], sizes[1:], strict=True)
         }  # fmt: skip
-        found["anchors"] = anchors[row], np.zeros((layout.n_anchors, count))
-        if row == 0:
-            found["anchors"] = anchors[row], start.anchors
+        found["anchors"] = rows.anchors[row], start.anchors if row == 0 else np.zeros((layout.n_anchors, count))
         return _motion(charted, found, start.p)
 
     if visit is not None:
@@ -147,10 +147,9 @@ def tangent_run(
             visit(row, motion, rows.mode(row), rates)
     if not located:
         return Passed(end[0], last, end[1])
-    known = {row: at_row(row) for row in {0, *rows.events, *(each - 1 for each in rows.events)}}
-    fired = refuse_turning_points(rows, programs, known, end)
+    fired = refuse_turning_points(rows, programs, at_row, end)
     instants = [
-        Instant(row, trigger, known[row - 1][0], known[row - 1][0])
+        Instant(row, trigger, at_row(row - 1)[0], at_row(row - 1)[0])
         for row, trigger in zip(sorted(rows.events), fired, strict=True)
     ]  # fmt: skip
     return Passed(end[0], last, end[1], instants)

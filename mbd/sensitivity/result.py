@@ -17,7 +17,7 @@ from mbd.results.trajectory import Trajectory
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["Sensitivities", "read"]
+__all__ = ["Sensitivities", "read", "words_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +46,9 @@ class Sensitivities:
     event_changes: tuple[str, ...] = ()
     written: tuple[str, ...] = ()
 
-    def as_words(self) -> dict[str, Any]:
-        """All of it but the run, as numbers and words."""
-        return {
-            "of": list(self.of), "wrt": list(self.wrt), "matrix": self.matrix.tolist(), "values": self.values.tolist(),
-            "of_units": list(self.of_units), "wrt_units": list(self.wrt_units), "written": list(self.written),
-        }  # fmt: skip
-
     @classmethod
     def read(cls, words: Mapping[str, Any], run: Trajectory) -> Sensitivities:
-        """What `as_words` gave, of this run; a `TrajectoryError` for anything else."""
+        """What `words_of` gave, of this run; a `TrajectoryError` for anything else."""
         try:
             of, wrt, *units = (tuple(map(str, words[name])) for name in ("of", "wrt", "of_units", "wrt_units"))
             matrix = np.array(words["matrix"], dtype=float).reshape(len(of), len(wrt))
@@ -145,6 +138,11 @@ def _place(name: str, names: tuple[str, ...], kind: str) -> int | list[int]:
             return parts
         raise UnknownNameError(nearest(name, names, kind, "There are"))
     return names.index(name)
+
+
+def words_of(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of `Sensitivities` but for the run, as numbers and words in lists."""
+    return {name: each.tolist() if isinstance(each, np.ndarray) else list(each) for name, each in fields.items()}
 
 
 def read(words: Mapping[str, Any], run: Trajectory) -> Sensitivities:

@@ -13,7 +13,7 @@ from mbd import integrators
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.manager import manager_of
 from mbd.compile.mechanism import Mechanism
-from mbd.dataclass import dataclass
+from mbd.dataclass import dataclass, makes_late
 from mbd.errors import CapabilityError, OneSidedError
 from mbd.integrators.base import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
@@ -68,9 +68,7 @@ class RunRows:
             raise refused(f"it failed: {record.message}")
         if settings.get("locate") == "linear":
             raise refused("its events were located by linear interpolation", "take locate='root'")
-        memory = getattr(record.final, "memory", None)
-        sampled = memory is not None and memory.controllers.get("samples")
-        if not self.controllers and (record.parameter_changes or sampled):
+        if not self.controllers and (record.parameter_changes or _is_sampled(record.final)):
             raise refused("controllers decide in it, whose feedback is not differentiated", ADVICE)
 
     @cached_property
@@ -171,10 +169,12 @@ class RunRows:
             return np.array(start.anchors, dtype=float)
         return np.zeros(size)
 
-    def places(self, names: Sequence[str]) -> list[int]:
-        """Numbers of parameters by name."""
-        known = {name: k for k, name in enumerate(self.record.parameter_names)}
-        return [known[name] for name in names]
+
+def _is_sampled(final: Any) -> bool:
+    """Whether controllers took samples in the run that ended so."""
+    unseen = None if final is None else makes_late(final, "memory")
+    memory = getattr(final, "memory", None) if unseen is None else unseen.memory
+    return memory is not None and bool(memory.controllers.get("samples"))
 
 
 @lru_cache(maxsize=64)

@@ -50,13 +50,13 @@ def changed_sequences(
     again : makes the run from another start, with other parameters
     """
     rows, found = RunRows(run), list[str]()
-    wanted_ways, compose = directions(rows, ways), rows.mechanism.equations.configuration.compose
+    wanted_ways, compose = directions(rows.mechanism, ways), rows.mechanism.equations.configuration.compose
     for way in wanted_ways:
         if way.restitutions and way.name in amounts:
             raise refused(
                 f"runs take no other restitution as a parameter: {way.name!r}", "leave it out of check_events"
             )
-    programs = programs_of(rows, wanted_ways)
+    programs = programs_of(rows.mechanism, wanted_ways, rows.record.parameters)
     start, state = start_tangent(rows, programs, wanted_ways, held), rows.record.start
     values = dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
     wanted = [(event.kind, event.name) for event in run.events]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
@@ -67,10 +68,11 @@ def unknown_name(equations: Equations, name: str, known: Collection[str], what: 
     return nearest(name, known, what, "There are")
 
 
-def programs_of(rows: RunRows, wanted: Sequence[Direction]) -> Programs:
-    """The programs for the parameters that some directions change."""
+def programs_of(mechanism: Mechanism, wanted: Sequence[Direction], values: Vector) -> Programs:
+    """The programs for the parameters that some directions change, at these values of all parameters."""
+    known = {parameter.name: k for k, parameter in enumerate(mechanism.equations.parameters)}
     names = dict.fromkeys(name for each in wanted for name in each.parameters or {})
-    return Programs(rows.mechanism, rows.places(list(names)), rows.record.parameters)
+    return Programs(mechanism, [known[name] for name in names], values)
 
 
 def restitutions_of(wanted: Sequence[Direction]) -> dict[str, Vector]:
@@ -82,18 +84,27 @@ def restitutions_of(wanted: Sequence[Direction]) -> dict[str, Vector]:
     return found
 
 
-def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]] | Direction]) -> list[Direction]:
+def directions(
+    mechanism: Mechanism, wrt: Sequence[str | tuple[str, Mapping[str, float]] | Direction]
+) -> Sequence[Direction]:
     """Names, and pairs of a name and the rates of parameters by it, as directions; three of 'hip.orientation'.
 
-    What is a direction already stays.
+    What is a direction already stays. Those of names alone are kept with the mechanism.
 
     Raises
     ------
     UnknownNameError
         for a name that is neither a coordinate or rate of the start nor a run-time parameter.
     """
-    equations = rows.mechanism.equations
-    start, known = start_names(equations), set(rows.record.parameter_names)
+    if all(isinstance(each, str) for each in wrt):
+        return mechanism.kept((directions, *wrt), lambda: _directions(mechanism.equations, wrt))
+    return _directions(mechanism.equations, wrt)
+
+
+def _directions(
+    equations: Equations, wrt: Sequence[str | tuple[str, Mapping[str, float]] | Direction]
+) -> Sequence[Direction]:
+    start, known = start_names(equations), {parameter.name for parameter in equations.parameters}
     bounces = set(restitution_names(equations)) - known
     found = []
     for each in expanded(equations, wrt):
@@ -118,7 +129,7 @@ def directions(rows: RunRows, wrt: Sequence[str | tuple[str, Mapping[str, float]
             found.append(
                 Direction(name, parameters={k: v for k, v in rates.items() if k not in bounces}, restitutions=impacts)
             )
-    return found
+    return tuple(found)
 
 
 def start_tangent(
@@ -134,7 +145,7 @@ def start_tangent(
     c, count = programs.columns, len(wanted)
     q, y, p = np.zeros((c.n_v, count)), np.zeros((c.n, count)), np.zeros((c.parameters, count))
     anchors = np.zeros((c.anchors, count))
-    names = list(rows.record.parameter_names)
+    names = rows.record.parameter_names
     for k, each in enumerate(wanted):
         if each.q >= 0:
             q[each.q, k] = 1.0
@@ -149,7 +160,7 @@ def start_tangent(
         return tangent
     record = rows.record
     motion = Motion(float(rows.ends[0]), np.array(record.q[0]), rows.y(0), rows.start_anchors(), tangent)
-    fixed = directions(rows, list(held))
+    fixed = directions(rows.mechanism, tuple(held))
     free_q, free_v = np.ones(c.n_v, dtype=bool), np.ones(c.n_v, dtype=bool)
     free_q[[each.q for each in fixed if each.q >= 0]] = False
     free_v[[each.y for each in fixed if 0 <= each.y < c.n_v]] = False
@@ -169,34 +180,47 @@ def _completed(rows: RunRows, programs: Programs, motion: Motion, mode: Mode, fr
         k for k in mode.held
         if not equations.rows[k].is_velocity and (equations.rows[k].contact < 0 or k in normals)
     ]  # fmt: skip
-    off = of_h[places] @ motion.tangent.stacked(c)
-    motion = motion.with_tangent(q=motion.tangent.q + _least(M, of_h[places][:, c.x], off, free[0]))
+    completion = _Completion(M, of_h[places][:, c.x], free[0])
+    motion = motion.with_tangent(q=motion.tangent.q + completion.change(of_h[places] @ motion.tangent.stacked(c)))
     closed = [k for k in range(len(equations.contacts)) if mode.closed[k]]
     motion = captured(programs, motion, mode, closed)
     rates = of_rate[list(mode.held)]
-    change = _least(M, rates[:, c.y][:, : c.n_v], rates @ motion.tangent.stacked(c), free[1])
+    B = rates[:, c.y][:, : c.n_v]
+    if not completion.is_of(B, free[1]):
+        completion = _Completion(M, B, free[1])
     y = motion.tangent.y.copy()
-    y[: c.n_v] += change
+    y[: c.n_v] += completion.change(rates @ motion.tangent.stacked(c))
     return stored_at_start(programs, motion.with_tangent(y=y), mode)
 
 
-def _least(M: Matrix, B: Matrix, off: Matrix, free: Flags) -> Matrix:
-    """The change of free coordinates that removes what rows are off, least in the metric of M of those they act on.
+class _Completion:
+    """Changes of free coordinates that make rows hold, least in the metric of M of those that the rows act on.
 
     B may have dependent rows; M is made definite as an assembly does.
     """
-    found = np.zeros((len(M), off.shape[1]))
-    size = float(np.max(np.abs(B), initial=0.0))
-    places = np.flatnonzero((np.max(np.abs(B), axis=0, initial=0.0) > 1e-12 * size) & free)
-    if len(places):
-        part = M[np.ix_(places, places)]
-        part = part + 1e-9 * (float(np.max(np.abs(np.diag(part)))) or 1.0) * np.eye(len(places))
-        flow = np.linalg.solve(part, B[:, places].T)
-        found[places] = -flow @ np.linalg.lstsq(B[:, places] @ flow, off, rcond=1e-12)[0]
-    left = float(np.max(np.abs(off + B @ found), initial=0.0))
-    if left > 1e-8 * float(np.max(np.abs(off), initial=0.0)) and left > 1e-12:
-        raise ModelError(
-            "the start cannot be changed so: besides the coordinates and rates that hold= or wrt= keep, none are left "
-            "that make the rows of closed contacts and constraints hold; hold fewer"
-        )
-    return found
+
+    def __init__(self, M: Matrix, B: Matrix, free: Flags) -> None:
+        self.B, self.free = B, free
+        self._by_row = np.zeros((len(M), len(B)))  # change by what a row is off
+        sizes = np.abs(B).max(axis=0, initial=0.0)
+        places = np.flatnonzero((sizes > 1e-12 * sizes.max(initial=0.0)) & free)
+        if len(places):
+            part = M[places[:, None], places]
+            part.flat[:: len(places) + 1] += 1e-9 * (float(np.abs(part.diagonal()).max()) or 1.0)
+            flow = np.linalg.solve(part, B[:, places].T)
+            self._by_row[places] = -flow @ np.linalg.lstsq(B[:, places] @ flow, np.eye(len(B)), rcond=1e-12)[0]
+
+    def is_of(self, B: Matrix, free: Flags) -> bool:
+        """Whether it is that of these rows too."""
+        return np.array_equal(self.B, B) and np.array_equal(self.free, free)
+
+    def change(self, off: Matrix) -> Matrix:
+        """The change (n_v, D) that removes what rows are off (R, D)."""
+        found = self._by_row @ off
+        left = float(np.abs(off + self.B @ found).max(initial=0.0))
+        if left > 1e-12 and left > 1e-8 * float(np.abs(off).max(initial=0.0)):
+            raise ModelError(
+                "the start cannot be changed so: besides the coordinates and rates that hold= or wrt= keep, none are "
+                "left that make the rows of closed contacts and constraints hold; hold fewer"
+            )
+        return found

@@ -30,6 +30,8 @@ __all__ = ["TangentRun", "TangentStepper"]
 
 DIRECTIONS = LANES - 1
 """Directions of one run: the last derivative is that by the size of a step."""
+WITH_DERIVATIVES = frozenset(TABLE.real_arrays) - {"shift1"}
+"""Arrays that have derivatives of their own: `shift1` is a part of another."""
 Lanes = NDArray[np.float64]
 
 
@@ -79,8 +81,10 @@ class TangentStepper(Stepper):
         self._shelved = {name: (K_array, room) for name, K_array, room in self._on_shelves()}
         self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._programs: list[Any] = []
+        self._code = np.zeros(0, dtype=np.int64)  # their addresses
+        self._code_settled = False
         self._of_modes: dict[Hashable, list[Derivative]] = {}
-        self.plain, self.scheme = self.scheme, Kept(self)
+        self.scheme = Kept(self)
         self._begin()
 
     def _begin(self) -> None:
@@ -137,6 +141,7 @@ class TangentStepper(Stepper):
             self.places, self._of_modes = tuple(places), {}
             self._programs = derivatives_of_programs(self.mechanism, self.places)
         del self._programs[common:]
+        self._code = self._code[:0]
         assert len(self._programs) == common  # in the same order
 
     def follow_rows(self) -> None:
@@ -156,14 +161,15 @@ class TangentStepper(Stepper):
         self._n_of_modes += 1
 
     def _advance_compiled(self) -> int:
-        arrays = vars(self.kernel)
-        for name in TABLE.real_arrays:
-            if name != "shift1" and (name not in self._of or arrays[name] is not self._of[name][0]):
-                self.tangent(name)
+        known = self._table is not None and not self._provisional
+        for name in self.kernel.renewed & WITH_DERIVATIVES if known else WITH_DERIVATIVES:
+            self.tangent(name)
         shift = 8 * LANES * self.mechanism.layout.shift
         self._words[PLACES["shift1"]] = self._words[PLACES["block"]] + shift
-        code = np.array([each.address for each in self._programs], dtype=np.int64)
-        self._words[PLACES["code"]] = code.ctypes.data
+        if len(self._code) != len(self._programs) or not self._code_settled:
+            self._code_settled = not any(each.provisional for each in self._programs)  # before the addresses
+            self._code = np.array([each.address for each in self._programs], dtype=np.int64)
+            self._words[PLACES["code"]] = self._code.ctypes.data
         return super()._advance_compiled()
 
     def _advance_plain(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,13 +17,14 @@ __all__ = ["refuse_turning_points"]
 
 
 def refuse_turning_points(
-    rows: RunRows, programs: Programs, known: Mapping[int, tuple[Motion, Rates]], end: tuple[Motion, Rates]
+    rows: RunRows, programs: Programs, at_row: Callable[[int], tuple[Motion, Rates]], end: tuple[Motion, Rates]
 ) -> list[Trigger]:
     """What ended the step before each event.
 
     Parameters
     ----------
-    known : motions and rates with their derivatives at the first row, and at those before and after events
+    at_row : gives the motion and rates of a row with their derivatives; asked for the first one, and those before and
+        after events
     end : the same at the end
 
     Raises
@@ -33,10 +34,10 @@ def refuse_turning_points(
     """
     found = list[Trigger]()
     instants = list[tuple[str, Motion]]()
-    refuse_sided_start(rows, programs, known[0][0], rows.mode(0), known[0][1])
+    refuse_sided_start(rows, programs, at_row)
     time = rows.record.time
     for row in (0, *(row for row in sorted(rows.events) if row < len(time) - 1)):
-        refuse_sided_grip(programs, known[row][0], rows.mode(row), known[row][1])
+        refuse_sided_grip(rows, programs, row, at_row)
     for row in sorted(rows.events):
         before = row - 1
         prior = before - 1
@@ -45,16 +46,16 @@ def refuse_turning_points(
         )
         if again and (own := _of_own_gap(rows, programs, row)) is not None:
             found.append(own)
-            instants.append((own.name, known[before][0]))
+            instants.append((own.name, at_row(before)[0]))
             continue
         if again:
             raise sided(
                 f"{rows.events[row][0].name!r} happens at t = {time[before]:.9g} s right after another event or the "
                 "start, with no time between"
             )
-        fired = _fired(rows, programs, row, *known[before])
+        fired = _fired(rows, programs, row, *at_row(before))
         found.append(fired)
-        instants.append((fired.name, known[before][0]))
+        instants.append((fired.name, at_row(before)[0]))
     last = len(time) - 1
     refuse_sided_end(rows, programs, end[0], rows.mode(last), end[1], instants)
     return found

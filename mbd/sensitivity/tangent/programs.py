@@ -75,6 +75,11 @@ class Derivative:
             self._words[0] = self._known.function.address
         return self._address
 
+    @property
+    def provisional(self) -> bool:
+        """Whether better code is being made."""
+        return self._known.function is not None and self._known.function.provisional
+
     def product(self, block: Pair, parameters: Pair) -> Matrix:
         """The derivatives of its outputs, in Python."""
         out = np.zeros((self._size, LANES))

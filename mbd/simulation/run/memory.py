@@ -45,7 +45,7 @@ def memory_of(run: RunData, time: float) -> Unseen:
     for array in (parameters, reals, integers, place):
         array.flags.writeable = False
     memory = Memory(
-        belongs(run), "", time, parameters, reals, integers, stepper.scheme.memory,
+        belongs(run), "", time, parameters, reals, integers, stepper.plain.memory,
         run.boundaries.remembered(), tuple((event.kind, event.name) for event in run.pending), place,
         run.manager.mode(run.kernel.closed[: run.kernel.n_contacts]),
         run.kernel.anchors[: run.kernel.n_anchors].copy(),
@@ -124,7 +124,7 @@ def take_up(run: RunData, start: State) -> bool:
     if not (same and (known or memory.digest == _digest(run.mechanism, _block(run), run.kernel.params))):
         stepper.reals[:], stepper.integers[:] = fresh
         return False
-    stepper.scheme.memory = memory.scheme
+    stepper.plain.memory = memory.scheme
     run.boundaries.take_up(memory.controllers, run.now)
     run.pending = tuple(EventRecord(run.now, kind, name) for kind, name in memory.pending)
     v.n_stored = v.n_logged = 0

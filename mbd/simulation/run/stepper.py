@@ -118,6 +118,7 @@ class Stepper:
         )  # fmt: skip
         interpreted = self.own is not NO_SCHEME
         self.scheme: Any = InterpretedScheme(self.own) if interpreted else PlainScheme(integrator, self.system, manager)
+        self.plain = self.scheme  # whose memory a final state takes along; that of `scheme` goes into savepoints
         self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
