@@ -95,7 +95,7 @@ def along(run: Trajectory, wrt: Sequence[Any], names: Sequence[str], held: Colle
         shifts.append(motion.tangent.t)
         slopes.append(_slopes(programs, motion, mode, rates, names))
 
-    start, restitutions = start_tangent(rows, programs, wanted, held), restitutions_of(wanted)
+    start, restitutions = start_tangent(rows.first, programs, wanted, held), restitutions_of(wanted)
     walked = tangent_run(rows, programs, start, restitutions, visit)
     values = np.array([run[name][seen] for name in names]).reshape(len(names), len(seen)).T
     shape = (len(seen), len(names), len(wanted))

@@ -62,13 +62,16 @@ class Asked:
         return self._ways(dict(zip(run.record.parameter_names, run.record.parameters, strict=False)))
 
     def _ways(self, known: Mapping[str, float]) -> tuple[list[Any], Sequence[str]]:
-        found: list[Any] = []
-        for each in self.wrt:
-            if isinstance(each, str):
-                found.append(each)
-            else:
-                found += [(name, rates_of_parameters(name, given, self.at, known)) for name, given in each.items()]
-        of_start = [name for name in names_in(self.wrt)[0] if name not in known]
+        single, grouped = names_in(self.wrt)
+        found: list[Any] = list(single)
+        if grouped:
+            found = []
+            for each in self.wrt:
+                if isinstance(each, str):
+                    found.append(each)
+                else:
+                    found += [(name, rates_of_parameters(name, given, self.at, known)) for name, given in each.items()]
+        of_start = [name for name in single if name not in known]
         return found, of_start if self.hold is None else self.hold
 
     def conclude(self, run: Trajectory, made: Run, model: Any, scheme: Integrator) -> None:
@@ -186,6 +189,8 @@ def names_in(wrt: Any) -> tuple[list[str], list[str]]:
     """Names of single quantities, and of the parameters that functions give."""
     if isinstance(wrt, str | bytes) or not isinstance(wrt, Sequence) or not len(wrt):
         raise ModelError(f"wrt must be a list of names such as ['hip.angle', 'hip.mass'], not {shown(wrt)}")
+    if set(map(type, wrt)) == {str}:
+        return list(wrt), []
     single, grouped = list[str](), list[str]()
     for each in wrt:
         if isinstance(each, str):

@@ -88,5 +88,5 @@ def passed(
         return Differentiated(rows, programs, walked), wanted
     wanted = directions(rows.mechanism, wrt)
     programs = programs_of(rows.mechanism, wanted, rows.record.parameters)
-    start, restitutions = start_tangent(rows, programs, wanted, held), restitutions_of(wanted)
+    start, restitutions = start_tangent(rows.first, programs, wanted, held), restitutions_of(wanted)
     return Differentiated(rows, programs, tangent_run(rows, programs, start, restitutions)), wanted

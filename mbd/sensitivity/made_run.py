@@ -12,17 +12,16 @@ from mbd.equations.switching_times import switches_of
 from mbd.integrators.stepping import own_scheme
 from mbd.kernel import codes
 from mbd.kernel.schemes.contract import NO_SCHEME
-from mbd.results.trajectory import Trajectory
-from mbd.sensitivity.motion import Tangent
+from mbd.sensitivity.motion import First, Tangent
 from mbd.sensitivity.passing import Charted, seed
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows
+from mbd.sensitivity.run_data import held_at, mode_of
 from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
 from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
 from mbd.simulation.marching import Run
 from mbd.simulation.run.ends import call
 from mbd.simulation.run.savepoints import restore, save
-from mbd.simulation.run.stored import record_of
+from mbd.simulation.run.stored import columns_of
 
 __all__ = ["MadeRun", "Ready", "made_with"]
 
@@ -60,18 +59,26 @@ class MadeRun(TangentRun):
         self.moved_with_jump = lambda: None
         self.begin_tangents(programs.places)
         super().at_start()
-        point = save(self)
-        if call(self, self.now, np.inf) == codes.DONE and self.kernel.n_stored:
+        point, self.stepper.follows = save(self), False
+        status, self.stepper.follows = call(self, self.now, np.inf), True
+        if status == codes.DONE and self.kernel.n_stored:
             self.collect()
-            rows = RunRows(Trajectory(record_of(self, self.table[:1])))
-            self.ready = Ready(wanted, programs, start_tangent(rows, programs, wanted, held))
+            first = self.first
+            self.ready = Ready(wanted, programs, start_tangent(first, programs, wanted, held))
         restore(self, point)
         self.history, self.of_times, self.of_rows = [], [], {}
         if self.ready is not None:
             some = slice(0, min(len(wanted), DIRECTIONS))
-            seed(self, Charted(programs), self.table[0, 1 : 1 + self.kernel.n_q], self.ready.start,
-                 restitutions_of(wanted), some)  # fmt: skip
+            seed(self, Charted(programs), first.q, self.ready.start, restitutions_of(wanted), some)
         return self
+
+    @property
+    def first(self) -> First:
+        """The first row, which is there."""
+        row = {name: part[0] for name, part in columns_of(self, self.table[:1]).items()}
+        mode = mode_of(self.manager, row["closed"].astype(np.uint8), row["phase"].astype(np.int8))
+        y = np.concatenate([row["v"], row["z"]])
+        return First(float(row["time"]), row["q"].copy(), y, held_at(self.start, self.mechanism), mode)
 
 
 def made_with(ways: Ways, *given: Any) -> Run:

@@ -14,7 +14,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.sensitivity.programs import Columns, State
 
-__all__ = ["Mode", "Motion", "Rates", "Tangent", "solved"]
+__all__ = ["First", "Mode", "Motion", "Rates", "Tangent", "solved"]
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,17 @@ class Mode:
     closed: Vector
     switch: Vector
     slip: Vector
+
+
+@dataclass(frozen=True)
+class First:
+    """The first row: t, q, y = (v, z), what contacts hold there, and what acts."""
+
+    t: float
+    q: Vector
+    y: Vector
+    anchors: Vector
+    mode: Mode
 
 
 @dataclass(frozen=True)

@@ -199,7 +199,7 @@ def with_both_sides(
     """
     rows = RunRows(run)
     wanted = directions(rows.mechanism, ways)
-    tangent = start_tangent(rows, programs_of(rows.mechanism, wanted, rows.record.parameters), wanted, held)
+    tangent = start_tangent(rows.first, programs_of(rows.mechanism, wanted, rows.record.parameters), wanted, held)
     found: dict[tuple[str, str], tuple[float, float]] = {}
     shown: list[str] = []
     for k, way in enumerate(wanted):

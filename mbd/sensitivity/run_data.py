@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd import integrators
 from mbd.arrays import Matrix, Vector
@@ -20,9 +21,10 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
 from mbd.results.trajectory import Trajectory
-from mbd.sensitivity.motion import Mode
+from mbd.sensitivity.motion import First, Mode
+from mbd.state import State
 
-__all__ = ["ADVICE", "RunRows", "Source", "refused", "sided"]
+__all__ = ["ADVICE", "RunRows", "Source", "held_at", "mode_of", "refused", "sided"]
 
 ADVICE = "mbd.sensitivities(…, controllers='held') leaves that out: what they wrote is then held as it was"
 """What may be asked for where controllers are refused."""
@@ -157,17 +159,28 @@ class RunRows:
         return {}
 
     def _mode(self, row: int) -> Mode:
-        flags, phase = self.record.closed[row], self.record.phase[row]
-        held = self.manager.active_rows(np.asarray(flags, dtype=np.int64), (phase == 2).astype(np.int64))
-        slip = np.where(np.abs(phase) == 1, phase, 0).astype(float)
-        return Mode(held, held, np.asarray(flags), np.asarray(flags, dtype=float), slip)
+        return mode_of(self.manager, self.record.closed[row], self.record.phase[row])
 
-    def start_anchors(self) -> Vector:
-        """What contacts hold at the start."""
-        start, size = self.record.start, self.mechanism.layout.n_anchors
-        if start is not None and len(start.anchors) == size:
-            return np.array(start.anchors, dtype=float)
-        return np.zeros(size)
+    @property
+    def first(self) -> First:
+        """The first row."""
+        anchors = held_at(self.record.start, self.mechanism)
+        return First(float(self.ends[0]), np.array(self.record.q[0]), self.y(0), anchors, self.mode(0))
+
+
+def mode_of(manager: ActiveSetManager, closed: NDArray[Any], phase: NDArray[Any]) -> Mode:
+    """What acts by the flags of contacts and the phases of frictions."""
+    held = manager.active_rows(np.asarray(closed, dtype=np.int64), (phase == 2).astype(np.int64))
+    slip = np.where(np.abs(phase) == 1, phase, 0).astype(float)
+    return Mode(held, held, np.asarray(closed), np.asarray(closed, dtype=float), slip)
+
+
+def held_at(start: State | None, mechanism: Mechanism) -> Vector:
+    """What contacts hold at a start."""
+    size = mechanism.layout.n_anchors
+    if start is not None and len(start.anchors) == size:
+        return np.array(start.anchors, dtype=float)
+    return np.zeros(size)
 
 
 def _is_sampled(final: Any) -> bool:

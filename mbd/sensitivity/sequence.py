@@ -57,7 +57,7 @@ def changed_sequences(
                 f"runs take no other restitution as a parameter: {way.name!r}", "leave it out of check_events"
             )
     programs = programs_of(rows.mechanism, wanted_ways, rows.record.parameters)
-    start, state = start_tangent(rows, programs, wanted_ways, held), rows.record.start
+    start, state = start_tangent(rows.first, programs, wanted_ways, held), rows.record.start
     values = dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
     wanted = [(event.kind, event.name) for event in run.events]
     for k, way in enumerate(wanted_ways):

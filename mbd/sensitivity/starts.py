@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
-from mbd.sensitivity.motion import Mode, Motion, Tangent
+from mbd.sensitivity.motion import First, Mode, Motion, Tangent
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows
 from mbd.sensitivity.strikes import captured
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names
 from mbd.sensitivity.transitions import stored_at_start
@@ -70,9 +70,16 @@ def unknown_name(equations: Equations, name: str, known: Collection[str], what: 
 
 def programs_of(mechanism: Mechanism, wanted: Sequence[Direction], values: Vector) -> Programs:
     """The programs for the parameters that some directions change, at these values of all parameters."""
-    known = {parameter.name: k for k, parameter in enumerate(mechanism.equations.parameters)}
+    known = _numbers(mechanism)
     names = dict.fromkeys(name for each in wanted for name in each.parameters or {})
     return Programs(mechanism, [known[name] for name in names], values)
+
+
+def _numbers(mechanism: Mechanism) -> dict[str, int]:
+    """Numbers of parameters by name."""
+    return mechanism.kept(
+        _numbers, lambda: {parameter.name: k for k, parameter in enumerate(mechanism.equations.parameters)}
+    )
 
 
 def restitutions_of(wanted: Sequence[Direction]) -> dict[str, Vector]:
@@ -96,7 +103,7 @@ def directions(
     UnknownNameError
         for a name that is neither a coordinate or rate of the start nor a run-time parameter.
     """
-    if all(isinstance(each, str) for each in wrt):
+    if set(map(type, wrt)) <= {str}:
         return mechanism.kept((directions, *wrt), lambda: _directions(mechanism.equations, wrt))
     return _directions(mechanism.equations, wrt)
 
@@ -132,9 +139,7 @@ def _directions(
     return tuple(found)
 
 
-def start_tangent(
-    rows: RunRows, programs: Programs, wanted: Sequence[Direction], held: Collection[str] = ()
-) -> Tangent:
+def start_tangent(first: First, programs: Programs, wanted: Sequence[Direction], held: Collection[str] = ()) -> Tangent:
     """Derivatives of the consistent start by these directions; coordinates and rates that are `held` stay.
 
     Raises
@@ -145,29 +150,28 @@ def start_tangent(
     c, count = programs.columns, len(wanted)
     q, y, p = np.zeros((c.n_v, count)), np.zeros((c.n, count)), np.zeros((c.parameters, count))
     anchors = np.zeros((c.anchors, count))
-    names = rows.record.parameter_names
+    numbers, columns = _numbers(programs.mechanism), {place: k for k, place in enumerate(programs.places)}
     for k, each in enumerate(wanted):
         if each.q >= 0:
             q[each.q, k] = 1.0
         elif each.y >= 0:
             y[each.y, k] = 1.0
         for name, rate in (each.parameters or {}).items():
-            p[programs.places.index(names.index(name)), k] = rate
+            p[columns[numbers[name]], k] = rate
         if each.along is not None:
             q[:, k], y[:, k], anchors[:, k] = np.split(each.along, [c.n_v, c.n_v + c.n])
     tangent = Tangent(np.zeros(count), q, y, anchors, p)
     if all(each.along is not None for each in wanted):
         return tangent
-    record = rows.record
-    motion = Motion(float(rows.ends[0]), np.array(record.q[0]), rows.y(0), rows.start_anchors(), tangent)
-    fixed = directions(rows.mechanism, tuple(held))
+    motion = Motion(first.t, first.q, first.y, first.anchors, tangent)
+    fixed = directions(programs.mechanism, tuple(held))
     free_q, free_v = np.ones(c.n_v, dtype=bool), np.ones(c.n_v, dtype=bool)
     free_q[[each.q for each in fixed if each.q >= 0]] = False
     free_v[[each.y for each in fixed if 0 <= each.y < c.n_v]] = False
-    return _completed(rows, programs, motion, rows.mode(0), (free_q, free_v)).tangent
+    return _completed(programs, motion, first.mode, (free_q, free_v)).tangent
 
 
-def _completed(rows: RunRows, programs: Programs, motion: Motion, mode: Mode, free: tuple[Flags, Flags]) -> Motion:
+def _completed(programs: Programs, motion: Motion, mode: Mode, free: tuple[Flags, Flags]) -> Motion:
     """The motion with positions and velocities on the rows, and contacts and machines that hold what is now."""
     if not mode.held:
         return stored_at_start(programs, motion, mode)
@@ -205,10 +209,9 @@ class _Completion:
         sizes = np.abs(B).max(axis=0, initial=0.0)
         places = np.flatnonzero((sizes > 1e-12 * sizes.max(initial=0.0)) & free)
         if len(places):
-            part = M[places[:, None], places]
+            part, rows = M[places[:, None], places], B[:, places]
             part.flat[:: len(places) + 1] += 1e-9 * (float(np.abs(part.diagonal()).max()) or 1.0)
-            flow = np.linalg.solve(part, B[:, places].T)
-            self._by_row[places] = -flow @ np.linalg.lstsq(B[:, places] @ flow, np.eye(len(B)), rcond=1e-12)[0]
+            self._by_row[places] = _by_row(part, rows)
 
     def is_of(self, B: Matrix, free: Flags) -> bool:
         """Whether it is that of these rows too."""
@@ -224,3 +227,19 @@ class _Completion:
                 "left that make the rows of closed contacts and constraints hold; hold fewer"
             )
         return found
+
+
+def _by_row(M: Matrix, B: Matrix) -> Matrix:
+    """``−M⁻¹ Bᵀ (B M⁻¹ Bᵀ)⁺``, from one system where rows are independent."""
+    n, m = len(M), len(B)
+    A, b = np.zeros((n + m, n + m)), np.zeros((n + m, m))
+    A[:n, :n], A[:n, n:], A[n:, :n] = M, B.T, B
+    b[n:] = -np.eye(m)
+    try:
+        found = np.linalg.solve(A, b)[:n]
+        if np.abs(B @ found + np.eye(m)).max(initial=0.0) <= ROUND_OFF_RTOL:
+            return np.asarray(found)
+    except np.linalg.LinAlgError:
+        pass
+    flow = np.linalg.solve(M, B.T)
+    return -flow @ np.linalg.lstsq(B @ flow, np.eye(m), rcond=1e-12)[0]

@@ -32,6 +32,8 @@ DIRECTIONS = LANES - 1
 """Directions of one run: the last derivative is that by the size of a step."""
 WITH_DERIVATIVES = frozenset(TABLE.real_arrays) - {"shift1"}
 """Arrays that have derivatives of their own: `shift1` is a part of another."""
+WRITTEN_FIRST = frozenset(("store", "log", "starts", "spare", "out", "kkt", "acc", "rhs", "work"))
+"""Large arrays whose derivatives are written before they are read: rows, events, and what is computed at once."""
 Lanes = NDArray[np.float64]
 
 
@@ -52,12 +54,12 @@ class Kept:
 
 
 def _read(places: Mapping[str, slice]) -> Iterator[slice]:
-    """Parts of a shelf without those arrays that are written before they are read: rows and events."""
+    """Parts of a shelf without those arrays that are written before they are read."""
     last = 0
-    for name in ("store", "log"):
-        if name in places:
-            yield slice(last, places[name].start)
-            last = places[name].stop
+    for name, place in places.items():
+        if name in WRITTEN_FIRST:
+            yield slice(last, place.start)
+            last = place.stop
     yield slice(last, None)
 
 
@@ -68,6 +70,8 @@ class TangentStepper(Stepper):
     """
 
     places: Sequence[int] | None = None
+    follows = True
+    """Whether compiled code carries derivatives; not where values alone are asked for."""
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
@@ -79,6 +83,8 @@ class TangentStepper(Stepper):
         self._cleared = [room[part] for room, own in zip(self.rooms, plan.places, strict=True) for part in _read(own)]
         self.functions.append(balance_function(self.mechanism))  # see `follow_accelerations.BALANCE`
         self._shelved = {name: (K_array, room) for name, K_array, room in self._on_shelves()}
+        bases = np.array([*(room.ctypes.data for room in self.rooms), 0])
+        self._bound = bases[plan.shelf] + LANES * plan.offset
         self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._programs: list[Any] = []
         self._code = np.zeros(0, dtype=np.int64)  # their addresses
@@ -89,10 +95,8 @@ class TangentStepper(Stepper):
 
     def _begin(self) -> None:
         """No derivatives yet, in arrays that are as they were."""
-        plan = self.shelves.plan
         self._of = dict(self._shelved)
-        bases = np.array([*(room.ctypes.data for room in self.rooms), 0])
-        self._words[BOUND] = bases[plan.shelf] + LANES * plan.offset
+        self._words[BOUND] = self._bound
 
     @property
     def size(self) -> int:
@@ -181,7 +185,7 @@ class TangentStepper(Stepper):
         return self.tangent("block")[self.mechanism.layout.shift :] if name == "shift1" else self.tangent(name)
 
     def _enter(self, address: int) -> int:
-        if self.kernel.many:  # a start is judged by its values
+        if self.kernel.many or not self.follows:  # a start is judged by its values
             return super()._enter(address)
         return int(entry()(address, self._words.ctypes.data))
 
@@ -227,7 +231,6 @@ class TangentRun(Run):
         v, stored, known = self.kernel, self.stored, len(self.events)
         count, logged = int(v.n_stored), int(v.n_logged)
         if not count and not logged:
-            super().collect()
             return
         lines = self.stepper.tangent("log").reshape(-1, v.event_width, LANES)[:logged, 0, :DIRECTIONS].copy()
         rows = self.stepper.tangent("store").reshape(-1, v.width, LANES)

@@ -15,7 +15,7 @@ from mbd.results.record import EventRecord, Record
 from mbd.results.stored_states import StoredStates
 from mbd.simulation.run.data import RunData
 
-__all__ = ["ended_record", "inputs_of", "record_of", "whole_record"]
+__all__ = ["columns_of", "ended_record", "inputs_of", "record_of", "whole_record"]
 
 BLOCK = 4096
 """Rows that are read together."""
@@ -23,7 +23,7 @@ BLOCK = 4096
 
 def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -> Record:
     """Rows that the kernel has stored, (R, width), as a record without a verdict."""
-    equations, parts = run.mechanism.equations, _parts(run, table)
+    equations, parts = run.mechanism.equations, columns_of(run, table)
     parts |= {"closed": _bytes(parts["closed"], np.uint8), "phase": _bytes(parts["phase"], np.int8)}
     return Record(
         equations=equations, parameters=run.first_parameters,
@@ -34,7 +34,7 @@ def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -
 
 def inputs_of(run: RunData, table: Matrix, kinds: Collection[str]) -> dict[str, Any]:
     """Rows of the kernel as inputs of some kinds, time among them, of energies, with the anchors of now."""
-    parts = _parts(run, table)
+    parts = columns_of(run, table)
     named = {"t": parts["time"], "switch": parts["closed"]} | parts
     if "anchor" in kinds:
         named["anchor"] = run.kernel.anchors[: run.kernel.n_anchors].reshape(1, -1).repeat(len(table), axis=0)
@@ -43,7 +43,7 @@ def inputs_of(run: RunData, table: Matrix, kinds: Collection[str]) -> dict[str, 
     return {kind: named[kind] for kind in ("t", *kinds) if kind in named}
 
 
-def _parts(run: RunData, table: Matrix) -> dict[str, Any]:
+def columns_of(run: RunData, table: Matrix) -> dict[str, Any]:
     """Columns of the kernel's rows by their letters."""
     return {name: table[:, place] for name, place in run.stepper.columns.items()}
 
