@@ -86,8 +86,8 @@ def follow_matrix(K: Steps, m: int, x: Reals, whole: bool) -> None:
     """A correction x follows its matrix; `whole`: x is all that positions are corrected by, not a change of it."""
 
 
-def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
-    """b ← A⁻¹ b with factors that have no derivatives."""
+def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals, first: int) -> None:
+    """b ← A⁻¹ b with factors that have no derivatives; b are the numbers from `first` on."""
 
 
 def takes_part(value: float) -> bool:

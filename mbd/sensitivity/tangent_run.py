@@ -16,10 +16,10 @@ from mbd.sensitivity.tangent.interpreted import Table
 from mbd.sensitivity.tangent.printer import LANES
 from mbd.sensitivity.tangent.programs import (
     Derivative,
-    balance_function,
     derivatives_of_modes,
     derivatives_of_programs,
     lanes,
+    no_values,
 )
 from mbd.sensitivity.tangent.words import every_row_place
 from mbd.simulation.marching import Run
@@ -81,7 +81,7 @@ class TangentStepper(Stepper):
             for length, own in zip(plan.lengths, plan.places, strict=True)
         ]
         self._cleared = [room[part] for room, own in zip(self.rooms, plan.places, strict=True) for part in _read(own)]
-        self.functions.append(balance_function(self.mechanism))  # see `follow_accelerations.BALANCE`
+        self.functions.append(no_values(self.mechanism))  # see `follow_accelerations.BALANCE`
         self._shelved = {name: (K_array, room) for name, K_array, room in self._on_shelves()}
         bases = np.array([*(room.ctypes.data for room in self.rooms), 0])
         self._bound = bases[plan.shelf] + LANES * plan.offset
@@ -160,9 +160,10 @@ class TangentStepper(Stepper):
         if key not in self._of_modes:
             self._of_modes[key] = derivatives_of_modes(self.mechanism, key, self.places or ())
         tangent, residual, turned = self._of_modes[key]
-        self._programs += [tangent, residual, *others * [turned], turned]  # others run without derivatives only
-        self.functions.append(code.residual)  # see `follow_newmark.turned_program`
-        self._n_of_modes += 1
+        # others run without derivatives only; behind them see `follow_newmark.turned_program`, `derivative_program`
+        self._programs += [tangent, residual, *others * [turned], turned, residual]
+        self.functions += 2 * [no_values(self.mechanism)]
+        self._n_of_modes += 2
 
     def _advance_compiled(self) -> int:
         known = self._table is not None and not self._provisional

@@ -164,6 +164,6 @@ def solve_kkt(K: Equations, size: int, b: Reals) -> None:
 def solve_held(K: Equations, size: int, b: Reals) -> None:
     """The same with a matrix that is held: one of Newton's method, whose corrections vanish at the solution."""
     if is_differentiated() and K.order_start == 0:
-        solve_plain(K.kkt, size, K.pivots, b)
+        solve_plain(K.kkt, size, K.pivots, b, 0)
     else:
         solve_kkt(K, size, b)

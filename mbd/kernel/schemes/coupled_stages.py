@@ -44,7 +44,7 @@ def correct_coupled_rates(K: Steps, m: int, h: float) -> float:
             r = K.stages[o_r + i * size + j]
             K.coupled_rhs[i * size + j] = -r if j < K.n else -r / h
     if is_differentiated():
-        solve_plain(K.coupled, 3 * size, K.coupled_pivots, K.coupled_rhs)
+        solve_plain(K.coupled, 3 * size, K.coupled_pivots, K.coupled_rhs, 0)
     else:
         solve(K.coupled, 3 * size, K.coupled_pivots, K.coupled_rhs)
     K.stages[o_D : o_D + 3 * size] = K.coupled_rhs[: 3 * size]

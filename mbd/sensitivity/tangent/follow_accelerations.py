@@ -11,7 +11,7 @@ from mbd.sensitivity.tangent.words import derivative_of, is_differentiated, solv
 __all__ = ["follow_factors", "follow_move", "follow_rates", "follow_solution"]
 
 BALANCE = 9
-"""The function behind those of `mbd.kernel.codes`: M v̇ + f + R λ and B v̇ + γ of all rows."""
+"""The function behind those of `mbd.kernel.codes`: M v̇ + f + R λ and B v̇ + γ of all rows, of derivatives alone."""
 
 
 def prepare_rates(K: Kernel, t: float, m: int) -> int:
@@ -25,7 +25,7 @@ def prepare_rates(K: Kernel, t: float, m: int) -> int:
         K.rhs[i] = -K.acc[K.acc_f + i]
     for k in range(m):
         K.rhs[n + k] = -K.acc[K.acc_bias + K.rows[k]]
-    solve(K.kkt, size, K.pivots, K.rhs)
+    solve_plain(K.kkt, size, K.pivots, K.rhs, 0)
     return 0
 
 
@@ -54,7 +54,7 @@ def follow_rates(K: Kernel, t: float) -> int:
         K.rhs[i] = -derivative_of(K.out[i])
     for k in range(m):
         K.rhs[n + k] = -derivative_of(K.out[n + K.rows[k]])
-    solve_plain(K.kkt, n + m, K.pivots, K.rhs)
+    solve_plain(K.kkt, n + m, K.pivots, K.rhs, 0)
     for i in range(n):
         K.jump[i] += K.rhs[i]
     for k in range(m):
@@ -119,6 +119,6 @@ def follow_solution(K: Kernel, m: int) -> None:
         for j in range(n):
             total -= derivative_of(K.acc[K.acc_B + K.rows[k] * n + j]) * without_tangent(K.work[j])
         K.rhs[n + k] = total
-    solve_plain(K.kkt, size, K.pivots, K.rhs)
+    solve_plain(K.kkt, size, K.pivots, K.rhs, 0)
     for i in range(size):
         K.rhs[i] += without_tangent(K.work[i])

@@ -6,7 +6,7 @@ from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import clear_tangent, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.hooks import call, call_on
-from mbd.kernel.records import Integers, Kernel, Reals
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.schemes.iteration import finish
 from mbd.kernel.tangent_rules import NOT_FOLLOWED
 from mbd.sensitivity.tangent.words import (
@@ -42,6 +42,11 @@ def note_solution(K: Kernel) -> None:
 def turned_program(K: Kernel) -> int:
     """The number of the program whose derivative is that of Newton's matrix times a given W (see `programs`)."""
     return int(K.residual_program + (3 if K.correction_program > 0 else 1))
+
+
+def derivative_program(K: Kernel) -> int:
+    """The number of the program that has the derivatives of the residual, and no values."""
+    return turned_program(K) + 1
 
 
 def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int:
@@ -89,14 +94,14 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
     exact = K.vector == 1 and K.n_cones == 0  # is the matrix the derivative itself?
     before = 1e300
     for _ in range(MAX_CORRECTIONS):
-        call(K, K.residual_program, K.out)
+        call(K, derivative_program(K), K.out)
         for i in range(n):
             K.rhs[i] = -derivative_of(K.out[i])
         for k in range(m):
             K.rhs[n + k] = right_hand_side(K, k, m, by_v, by_x)
         for k in range(size - n - m):
             K.rhs[n + m + k] = 0.0 if K.row_level[K.rows[k]] == 1 else -derivative_of(K.out[n + k])
-        solve_plain(K.kkt, size, K.pivots, K.rhs)
+        solve_plain(K.kkt, size, K.pivots, K.rhs, 0)
         for i in range(K.n_v if corrects else 0):
             total = 0.0
             for k in range(m):
@@ -204,39 +209,17 @@ def prepare_metric(K: Kernel, m: int) -> int:
     o_Z = metric_place(K)
     K.spare[: size * m] = 0.0
     for k in range(m):
-        K.spare[(n + k) * m + k] = 1.0
-    solve_columns(K.kkt, size, K.pivots, K.spare, m)
-    for k in range(m):
+        K.spare[k * size + n + k] = 1.0
+        solve_plain(K.kkt, size, K.pivots, K.spare, k * size)
         g = 0.0
         for j in range(K.n_v):
             g += K.out[(n + k) * size + j] * K.starts[shift + j]
         for i in range(size):
-            K.starts[at + i] += K.spare[i * m + k] * g
-            K.starts[o_Z + k * size + i] = K.spare[i * m + k]
+            K.starts[at + i] += K.spare[k * size + i] * g
+            K.starts[o_Z + k * size + i] = K.spare[k * size + i]
         if K.row_level[K.rows[k]] == 1:  # those on velocities correct no positions
             K.starts[o_Z + k * size : o_Z + k * size + size] = 0.0
     return 0
-
-
-def solve_columns(A: Reals, n: int, pivots: Integers, b: Reals, m: int) -> None:
-    """The row-major n×m matrix b ← A⁻¹ b with the factors of `mbd.kernel.algebra.linear.factor`."""
-    for k in range(n):
-        if pivots[k] != k:
-            for c in range(m):
-                swap = b[k * m + c]
-                b[k * m + c] = b[pivots[k] * m + c]
-                b[pivots[k] * m + c] = swap
-    for i in range(1, n):
-        for k in range(i):
-            for c in range(m):
-                b[i * m + c] -= A[i * n + k] * b[k * m + c]
-    for r in range(n):
-        i = n - 1 - r
-        for k in range(i + 1, n):
-            for c in range(m):
-                b[i * m + c] -= A[i * n + k] * b[k * m + c]
-        for c in range(m):
-            b[i * m + c] *= A[i * n + i]
 
 
 def begin_corrections(K: Kernel, m: int) -> bool:
@@ -251,7 +234,7 @@ def begin_corrections(K: Kernel, m: int) -> bool:
     call(K, turned_program(K), K.spare)
     for i in range(size):
         K.work[i] = -derivative_of(K.spare[i])
-    solve_plain(K.kkt, size, K.pivots, K.work)
+    solve_plain(K.kkt, size, K.pivots, K.work, 0)
     for i in range(K.n_v):
         found = without_tangent(K.starts[shift + i]) + derivative_of(K.work[i])
         K.block[K.o_x + i] += found - K.shift1[i]
@@ -282,7 +265,7 @@ def follow_matrix(K: Kernel, m: int, x: Reals, whole: bool) -> None:
             K.starts[o + size + i] -= without_tangent(K.shift1[i])
     call_on(K, turned_program(K), K.starts, K.spare)
     for i in range(size):
-        K.spare[i] -= without_tangent(K.spare[i])
+        K.spare[i] = derivative_of(K.spare[i])
     solve_kkt(K, size, K.spare)
     for i in range(size):
         x[i] -= K.spare[i]

@@ -104,6 +104,11 @@ def of(x: Any) -> Any:
     return x.of if isinstance(x, Dual) else 0.0
 
 
+def derivative_of(x: Any) -> Any:
+    """0 with the derivatives."""
+    return Dual(0.0, x.of) if isinstance(x, Dual) else 0.0
+
+
 def as_real(x: Any) -> Any:
     """A number as a real, whose division by zero is ±∞ or NaN."""
     return x if isinstance(x, Dual) else np.float64(x)
@@ -192,7 +197,7 @@ def interpreted(functions: Sequence[tree.Function], held: Collection[str]) -> Ca
     """The last of some functions, with derivatives."""
     known: dict[str, Any] = {
         "Dual": Dual, "value_of": value_of, "as_real": as_real, "power": power, "root": root, "at_root": at_root,
-        "seeded": seeded, "takes_part": takes_part, "np": np,
+        "seeded": seeded, "takes_part": takes_part, "derivative_of": derivative_of, "np": np,
         "seed_rate": lambda x: float(of(x)[-1]) if isinstance(x, Dual) else 0.0,
         "largest": lambda x: float(np.max(np.abs(of(x)))) if isinstance(x, Dual) else 0.0,
     }  # fmt: skip
@@ -327,7 +332,7 @@ class _Printed:
         given = [self.value(argument) for argument in node.arguments]
         word = node.function.symbol.split(".")[1] if node.function.symbol.startswith("rules.") else ""
         if not self.plain:
-            if word in ("seeded", "at_root", "seed_rate", "takes_part"):
+            if word in ("seeded", "at_root", "seed_rate", "takes_part", "derivative_of"):
                 return f"{word}({', '.join(given)})"
             own = {"without_tangent": "value_of({})", "is_differentiated": "True", "largest_derivative": "largest({})"}
             if word in own:

@@ -20,9 +20,9 @@ from mbd.simulation.run.shelves import CACHE_LINE_BYTES, NUMBER_BYTES
 from mbd.tape.derivatives import jvps, live
 from mbd.tape.node import Node
 
-__all__ = ["Derivative", "balance_function", "derivatives_of_modes", "derivatives_of_programs", "lanes"]
+__all__ = ["Derivative", "derivatives_of_modes", "derivatives_of_programs", "lanes", "no_values"]
 
-BALANCE = "tangent_balance"
+BALANCE, NO_VALUES = "tangent_balance", "tangent_without_values"
 WITHOUT = ("switch",)
 """Inputs that never have derivatives: whether penalties act."""
 
@@ -179,14 +179,14 @@ def balance(mechanism: Mechanism) -> list[Node]:
     return [_dot(line, rates[: len(line)]) for line in lines]
 
 
-def balance_function(mechanism: Mechanism) -> Any:
-    """The code of `balance`."""
+def no_values(mechanism: Mechanism) -> Any:
+    """The code of a program that is asked for its derivatives alone."""
 
     def made() -> Any:
-        mechanism.common.add({BALANCE: balance(mechanism)}, soon=True)
-        return mechanism.common[BALANCE]
+        mechanism.common.add({NO_VALUES: []}, soon=True)
+        return mechanism.common[NO_VALUES]
 
-    return mechanism.kept(balance_function, made)
+    return mechanism.kept(no_values, made)
 
 
 def derivatives_of_modes(mechanism: Mechanism, active: programs.ActiveSet, places: Sequence[int]) -> list[Derivative]:

@@ -74,21 +74,23 @@ def moved(value: float, goal: float) -> float:
 
 
 def derivative_of(value: float) -> float:
-    """0 with the derivatives of a value."""
+    """0 with the derivatives of a value, whatever that is (see `printer`)."""
     return value - without_tangent(value)
 
 
-def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
+def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals, first: int) -> None:
     """b ← A⁻¹ b with the factors of `mbd.kernel.algebra.linear.factor`, which have no derivatives here.
+
+    b are the n numbers from `first` on.
 
     By rows, so that sums of vectors stay in registers, and two at once, which read the same entries of b.
     """
     for k in range(n):
         p = pivots[k]
         if p != k:
-            swap = b[k]
-            b[k] = b[p]
-            b[p] = swap
+            swap = b[first + k]
+            b[first + k] = b[first + p]
+            b[first + p] = swap
     i = 0
     while i < n:
         o = i * n
@@ -96,11 +98,11 @@ def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
         own = 0.0
         following = 0.0
         for k in range(i):
-            own += plain_A[o + k] * b[k]
-            following += plain_A[o_next + k] * b[k]
-        b[i] -= own
+            own += plain_A[o + k] * b[first + k]
+            following += plain_A[o_next + k] * b[first + k]
+        b[first + i] -= own
         if i + 1 < n:
-            b[i + 1] -= following + plain_A[o_next + i] * b[i]
+            b[first + i + 1] -= following + plain_A[o_next + i] * b[first + i]
         i += 2
     i = n - 1
     while i >= 0:
@@ -109,11 +111,13 @@ def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals) -> None:
         own = 0.0
         following = 0.0
         for k in range(i + 1, n):
-            own += plain_A[o + k] * b[k]
-            following += plain_A[o_next + k] * b[k]
-        b[i] = (b[i] - own) * plain_A[o + i]
+            own += plain_A[o + k] * b[first + k]
+            following += plain_A[o_next + k] * b[first + k]
+        b[first + i] = (b[first + i] - own) * plain_A[o + i]
         if i > 0:
-            b[i - 1] = (b[i - 1] - following - plain_A[o_next + i] * b[i]) * plain_A[o_next + i - 1]
+            b[first + i - 1] = (b[first + i - 1] - following - plain_A[o_next + i] * b[first + i]) * plain_A[
+                o_next + i - 1
+            ]
         i -= 2
 
 
