@@ -184,20 +184,20 @@ def _completed(programs: Programs, motion: Motion, mode: Mode, free: tuple[Flags
         k for k in mode.held
         if not equations.rows[k].is_velocity and (equations.rows[k].contact < 0 or k in normals)
     ]  # fmt: skip
-    completion = _Completion(M, of_h[places][:, c.x], free[0])
+    completion = Completion(M, of_h[places][:, c.x], free[0])
     motion = motion.with_tangent(q=motion.tangent.q + completion.change(of_h[places] @ motion.tangent.stacked(c)))
     closed = [k for k in range(len(equations.contacts)) if mode.closed[k]]
     motion = captured(programs, motion, mode, closed)
     rates = of_rate[list(mode.held)]
     B = rates[:, c.y][:, : c.n_v]
     if not completion.is_of(B, free[1]):
-        completion = _Completion(M, B, free[1])
+        completion = Completion(M, B, free[1])
     y = motion.tangent.y.copy()
     y[: c.n_v] += completion.change(rates @ motion.tangent.stacked(c))
     return stored_at_start(programs, motion.with_tangent(y=y), mode)
 
 
-class _Completion:
+class Completion:
     """Changes of free coordinates that make rows hold, least in the metric of M of those that the rows act on.
 
     B may have dependent rows; M is made definite as an assembly does.

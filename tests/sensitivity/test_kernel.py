@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import mbd
+from benchmarks.walkers import kneed_walker
+from mbd.dataclass import makes_late
 from mbd.sensitivity.derivative import final_state_derivative
+from mbd.sensitivity.starts import Completion
+from mbd.sensitivity.tangent_run import WRITTEN_FIRST, TangentStepper
 from mbd.testing.mechanisms import random_loop, random_scene
 from tests.simulation.mechanisms import pendulum
 
@@ -70,3 +74,55 @@ def test_derivatives_of_a_run_that_separates_exponentially_are_those_of_this_run
     state, time = final_state_derivative(run, start.names)
     assert np.isfinite(state).all() and not time.any()
     assert np.max(np.abs(state)) > 1e3  # how far neighbouring runs are apart
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_no_run_reads_what_an_earlier_one_left_in_large_arrays(scheme, monkeypatch):
+    """NaN in the place of their derivatives changes no bit, neither of a closed loop nor of feet that strike."""
+    begin_again, poisoned = TangentStepper.begin_again, []
+
+    def poison(self, *given):
+        begin_again(self, *given)
+        poisoned.append(self)
+        for name in WRITTEN_FIRST:
+            self.tangent(name)[:] = np.nan
+
+    loop, place = random_loop(2)
+    for model, start, until in (
+        (loop, mbd.assemble(loop, place, project=True), 0.05),
+        (*kneed_walker(), "right foot"),
+    ):
+        names = [start.names[-1], *mbd.simulate(model, start, scheme, dt=0.01, until=0.02).parameters][:5]
+        found = []
+        for begin in (begin_again, begin_again, poison):
+            monkeypatch.setattr(TangentStepper, "begin_again", begin)
+            found.append(mbd.simulate(model, start, scheme, dt=0.01, until=until, wrt=names).sensitivities.matrix)
+        monkeypatch.setattr(TangentStepper, "begin_again", begin_again)
+        np.testing.assert_array_equal(found[2], found[1])
+        assert np.isfinite(found[2]).all()
+    assert len(poisoned) == 2
+
+
+def test_a_run_with_derivatives_finds_notes_and_memory_when_somebody_asks():
+    model = pendulum()
+    run = mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 1.0}), dt=0.01, until=0.1, wrt=["hinge.angle"])
+    assert makes_late(run.record, "stats") is not None and makes_late(run.final, "memory") is not None
+    assert run.sensitivities["hinge.angle", "hinge.angle"] == run.stats["sensitivities"]["matrix"][0][0]
+    assert run.stats["notes"] == [] and run.sensitivities.of_units == ("rad", "rad/s", "s")
+    again = mbd.simulate(model, run.final, dt=0.01, until=0.2, wrt=["hinge.angle.rate"])
+    assert again.time[0] == run.time[-1]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_start_is_completed_by_the_least_change_whichever_rows_depend_on_others(seed):
+    """In the metric of M: M-orthogonal to all changes that the rows allow; with rows twice it is the same."""
+    rng = np.random.default_rng(seed)
+    A, B, off = rng.normal(size=(6, 6)), rng.normal(size=(3, 6)), rng.normal(size=(3, 4))
+    M, free = A @ A.T + np.eye(6), np.arange(6) != seed
+    change = Completion(M, B, free).change(off)
+    np.testing.assert_allclose(B @ change, -off, atol=1e-13)
+    twice = Completion(M, np.vstack([B, B[1] - B[2]]), free).change(np.vstack([off, off[1] - off[2]]))
+    np.testing.assert_allclose(twice, change, atol=1e-9)
+    allowed = np.linalg.svd(B[:, free])[2][3:].T
+    np.testing.assert_allclose(allowed.T @ M[np.ix_(free, free)] @ change[free], 0.0, atol=1e-6 * np.abs(M).max())
+    assert not change[~free].any()
