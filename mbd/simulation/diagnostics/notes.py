@@ -20,6 +20,7 @@ from mbd.simulation.diagnostics.fastest import fastest, resolving_dt, sane_rows
 from mbd.simulation.diagnostics.half_turns import half_turns
 from mbd.simulation.diagnostics.idle_modes import idle_modes
 from mbd.simulation.diagnostics.impact_step import dt_of_impacts
+from mbd.simulation.diagnostics.position_level import position_level_multipliers
 from mbd.simulation.diagnostics.redundant import readers_of, redundancy
 from mbd.simulation.diagnostics.singular import singular_start
 from mbd.simulation.diagnostics.stiff import bounded_by_stability
@@ -130,6 +131,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     notes += _uncounted(run, record)
     columns = ModelColumns(record, equations)
     notes += idle_modes(run, record, columns)
+    notes += position_level_multipliers(run, record, columns)
     turned = half_turns(columns)
     notes, doubts = [*notes, *turned], doubts + turned
     for number, contact in enumerate(run.manager.contacts):
