@@ -111,6 +111,13 @@ def older_objects_left_alone():
     gc.freeze()
 
 
+@pytest.fixture(autouse=True)
+def _no_mechanisms_of_other_tests():
+    """Tests replace parts of the library itself, which a mechanism that another test has derived would not show."""
+    if known := sys.modules.get("mbd.compile.mechanisms"):
+        known._BY_WORDS.clear()
+
+
 @pytest.fixture
 def made_afresh(monkeypatch):
     """Programs are made from their equations, whatever is remembered: for tests that change how they are made."""

@@ -33,13 +33,6 @@ def end(model: mbd.Model) -> float:
     return float(mbd.simulate(model, mbd.assemble(model), dt=0.01, until=0.2)["hinge.angle"][-1])
 
 
-@pytest.fixture
-def _forgotten() -> Iterator[None]:
-    mechanisms._BY_WORDS.clear()
-    yield
-    mechanisms._BY_WORDS.clear()
-
-
 def test_random_mechanisms_described_twice_are_derived_once_and_move_alike_to_the_bit(monkeypatch):
     shared = 0
     for number in NUMBERS[::3]:
@@ -105,7 +98,6 @@ def scaled(t: Any) -> Any:
     return SIZE * mbd.sin(t)
 
 
-@pytest.mark.usefixtures("_forgotten")
 def test_functions_are_the_same_if_all_that_they_refer_to_is(monkeypatch):
     def captured(size: Any) -> mbd.Model:
         return rod(lambda t: size * mbd.sin(t))
@@ -132,7 +124,6 @@ def test_functions_are_the_same_if_all_that_they_refer_to_is(monkeypatch):
     assert mechanism_of(rod(lambda t: mbd.sin(t))) is not mechanism_of(rod(lambda t: mbd.cos(t)))
 
 
-@pytest.mark.usefixtures("_forgotten")
 def test_a_function_that_holds_what_can_be_changed_belongs_to_its_own_model():
     def counted(log: list[float]) -> mbd.Model:
         model = rod(0.0)
@@ -147,7 +138,6 @@ def test_a_function_that_holds_what_can_be_changed_belongs_to_its_own_model():
     assert len(logs[0]) == len(logs[1]) > 0
 
 
-@pytest.mark.usefixtures("_forgotten")
 def test_named_points_gravity_and_names_of_inputs_count():
     first = mechanism_of(rod(1.0))
     pointed = rod(1.0)
@@ -159,7 +149,6 @@ def test_named_points_gravity_and_names_of_inputs_count():
     assert mechanism_of(rod(1.0)) is first
 
 
-@pytest.mark.usefixtures("_forgotten")
 def test_only_the_last_few_are_kept():
     for k in range(3 * mechanisms.MOST_BY_WORDS):
         mechanism_of(rod(1.0 + 0.1 * k))

@@ -14,7 +14,7 @@ __all__ = ["position_level_multipliers"]
 FIRST_ROWS = 16
 """Rows after the start whose multipliers are compared with the balance of forces."""
 MAX_SHARE = 0.02
-"""Difference from the balance, over the largest multiplier of the run, that is told [-]."""
+"""Difference from the balance, over the largest multiplier of the run, above which a run says so [-]."""
 
 
 def position_level_multipliers(run: RunData, record: Record, columns: ModelColumns) -> list[str]:
