@@ -12,6 +12,7 @@ from operator import is_
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from mbd.compile import remembered
 from mbd.compile.forking import free_in_child
 from mbd.compile.identity import identity_of_words
 from mbd.compile.mechanism import Mechanism
@@ -153,7 +154,8 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
 
 def _words(model: Any) -> str | None:
     """What the equations of a model follow from, as a digest; None where they may depend on more."""
-    if not isinstance(model, Description) or type(model).__module__ != "mbd.model" or model.controllers:
+    ordinary = isinstance(model, Description) and type(model).__module__ == "mbd.model" and not model.controllers
+    if not ordinary or not remembered.ENABLED:
         return None
     kinds = (model.joints, Joint), (model.forces, Force), (model.constraints, Constraint)
     if not all(isinstance(word, kind) for words, kind in kinds for word in words):

@@ -192,3 +192,18 @@ def test_a_cause_asks_for_nothing_that_words_do_not_tell():
     told = set(dir(Words)) | set(Words.__init__.__code__.co_names) | {"v", "stepper"}
     asked = {name for cause in CAUSES for name in re.findall(r"{x\.(\w+)", cause.sentence + cause.cure)}
     assert asked and asked <= told
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.Newmark(), mbd.RadauIIA(), mbd.GeneralizedAlpha(0.5)])
+@pytest.mark.parametrize("steepness", [300.0, 1000.0])
+def test_steps_that_fail_without_any_constraint_are_not_blamed_on_a_singular_configuration(scheme, steepness):
+    model = mbd.Model("steep wall", gravity=(0.0, 0.0, 0.0))
+    ball = mbd.PointMass("ball", mass=1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, ball.origin)
+    model.connect(rail)
+    push = mbd.Motor("wall", rail, force=lambda x: -mbd.exp(steepness * x), arguments=["rail.displacement"])
+    model.apply(push)
+    start = mbd.assemble(model, velocity={"rail.displacement": 5.0})
+    with pytest.raises(mbd.SimulationError, match="try a smaller dt|is not finite") as raised:
+        mbd.simulate(model, start, scheme, dt=1.0, until=3.0)
+    assert "singular" not in str(raised.value) and "rows" not in str(raised.value)

@@ -141,12 +141,6 @@ def test_the_rows_of_a_run_that_ends_at_a_contact_without_a_force_keep_the_laws(
     assert told["kind"] == "error", told
 
 
-def test_steps_that_fail_without_any_constraint_are_not_blamed_on_a_singular_configuration():
-    told = verdict(35880)
-    assert told["kind"] == "error" and "too much within dt; try a smaller dt" in told["message"], told
-    assert "rows" not in told["message"]
-
-
 def test_a_scene_is_made_again_from_its_number():
     one, two = scene(25), scene(25)
     assert str(one) == str(two) and one.start == two.start and one.model is two.model

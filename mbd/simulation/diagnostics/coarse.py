@@ -31,11 +31,12 @@ def coarse_steps(run: RunData, record: Record) -> list[str]:
     worst, when = float(run.kernel.coarsest_change), float(run.kernel.coarsest_end)
     row = int(np.clip(np.searchsorted(record.time, when - 1e-9 * run.dt), 1, len(record.time) - 1))
     resolving = _resolving_step(run, record, row)
+    smaller = f"dt <= {resolving:.1g} s, or " if resolving > 1e-6 * run.dt else ""  # than which no run would end
     steps = "a step was" if count == 1 else f"{count} steps were"
     return [
         f"{steps} not resolved by dt = {run.dt:g} s: forces changed within one so that rates are uncertain by "
         f"{percent(worst)} % (the most, at t = {when:.6g} s), and times and places after it as well; try "
-        f"dt <= {resolving:.1g} s, or tol="
+        f"{smaller}tol="
     ]
 
 
