@@ -50,6 +50,9 @@ class _Placeholder:
                 delattr(owner, name)
         for name, value in self.fields.items():
             setattr(owner, name, value)
+        for name in ("__setattr__", "__delattr__"):  # of an attempt that an interrupt has cut off
+            if getattr(owner.__dict__.get(name), "__module__", "") == __name__:
+                delattr(owner, name)
         frozen, first = self.options.get("frozen", False), not any(map(dataclasses.is_dataclass, owner.__mro__[1:]))
         own = first and not {"__setattr__", "__delattr__"} & owner.__dict__.keys()
         dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen and not own)(owner)

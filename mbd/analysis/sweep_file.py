@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mbd.analysis.sweep_runs import Row, Runs
-from mbd.compile.identity import identity, identity_of_model
 from mbd.compile.mechanism import Mechanism
+from mbd.results.identity import identity, identity_of_model
 from mbd.results.study_file import StudyFile
 
 __all__ = ["SweepFile"]

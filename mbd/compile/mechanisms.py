@@ -14,8 +14,8 @@ from weakref import WeakKeyDictionary
 
 from mbd.compile import remembered
 from mbd.compile.forking import free_in_child
-from mbd.compile.identity import identity_of_words
 from mbd.compile.mechanism import Mechanism
+from mbd.compile.same_words import digest_of_words
 from mbd.constraints.base import Constraint
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
@@ -31,7 +31,7 @@ _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept]] = WeakKe
 _TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept]] = WeakKeyDictionary()
 _BY_WORDS: OrderedDict[Hashable, Mechanism] = OrderedDict()
 """The mechanisms that were asked for last, by what their models say."""
-MOST_BY_WORDS = 8
+MOST_BY_WORDS = 4
 _LOCK = threading.Lock()
 free_in_child(_LOCK)
 
@@ -160,8 +160,10 @@ def _words(model: Any) -> str | None:
     kinds = (model.joints, Joint), (model.forces, Force), (model.constraints, Constraint)
     if not all(isinstance(word, kind) for words, kind in kinds for word in words):
         return None
+    if any(getattr(word, "reset", None) is not None for word in model.constraints):
+        return None  # a run calls it, or reads it, as it is then
     points = [[*body.points.items()] for body in bodies_of(model)]
-    return identity_of_words(model.name, *_description(model), model.markers, points)
+    return digest_of_words(model.name, *_description(model), model.markers, points)
 
 
 def _derived(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:

@@ -303,10 +303,6 @@ class Trajectory:
         """
         return later("Trajectory.animate")(self, height)
 
-    def identifying_numbers(self) -> list[Any]:
-        """What tells it from other runs where a study is recognised again."""
-        return [self.record.time, self.record.q, self.record.v, self.record.z]
-
     def __reduce__(self) -> tuple[Any, ...]:
         """To another process it travels as the file that `save` writes."""
         with TemporaryDirectory() as folder:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mbd
-from mbd.compile.identity import identity
+from mbd.results.identity import identity
 
 STRENGTH = 1.0
 

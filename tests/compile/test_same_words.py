@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 import mbd
+import tests.comparisons
 from mbd.compile import mechanisms
 from mbd.compile.mechanisms import mechanism_of
 from mbd.hardcases.shakers import table
@@ -47,7 +50,7 @@ def test_random_mechanisms_described_twice_are_derived_once_and_move_alike_to_th
         monkeypatch.undo()
         assert np.array_equal(runs[0].q, runs[1].q, equal_nan=True), number
         assert np.array_equal(runs[0].v, runs[1].v, equal_nan=True), number
-    assert shared >= 0.8 * len(NUMBERS[::3])
+    assert shared >= 0.7 * len(NUMBERS[::3])
 
 
 def _numbers(words: Any, met: dict[int, Any]) -> Iterator[tuple[Any, str, float]]:
@@ -111,7 +114,7 @@ def test_functions_are_the_same_if_all_that_they_refer_to_is(monkeypatch):
 
     for make in (captured, default, of_gains):
         mechanisms._BY_WORDS.clear()
-        assert mechanism_of(make(2.0)) is mechanism_of(make(2.0))
+        assert (mechanism_of(make(2.0)) is mechanism_of(make(2.0))) == (make is not of_gains)
         assert end(make(3.0)) == pytest.approx(1.5 * end(make(2.0)), rel=0.01)
     first = mechanism_of(rod(scaled))
     assert mechanism_of(rod(scaled)) is first
@@ -136,6 +139,46 @@ def test_a_function_that_holds_what_can_be_changed_belongs_to_its_own_model():
         model = counted(log)
         mbd.simulate(model, mbd.assemble(model, position={"hinge.angle": 0.4}), dt=0.01, until=0.5)
     assert len(logs[0]) == len(logs[1]) > 0
+
+
+class Law:
+    size = np.int64(2)
+
+    def __call__(self, t: Any) -> Any:
+        return self.size * mbd.sin(t)
+
+
+def imported(t: Any) -> Any:
+    import tests.compile.test_same_words as own
+
+    return own.SIZE * mbd.sin(t)
+
+
+@dataclass(frozen=True, slots=True)
+class Slotted:
+    size: float
+
+    def __call__(self, t: Any) -> Any:
+        return self.size * mbd.sin(t)
+
+
+def test_what_may_mean_something_else_later_has_no_digest():
+    held = [2.0]
+    laws = (
+        Law(), imported, Slotted(2.0), partial(lambda size, t: size * mbd.sin(t), 2.0), Law().__call__,
+        lambda t: held[0] * mbd.sin(t), lambda t: globals()["SIZE"] * mbd.sin(t), lambda t: Law.size * mbd.sin(t),
+        lambda t: getattr(np, "pi") * mbd.sin(t),  # noqa: B009
+        lambda t: tests.comparisons.__name__ and mbd.sin(t),
+    )  # fmt: skip
+    for law in laws:
+        model = rod(law)
+        assert mechanisms._words(model) is None, law
+        assert end(model) != 0.0
+    assert all(
+        mechanisms._words(rod(law)) for law in (1.0, scaled, lambda t: math.pi * mbd.sin(t), lambda t: np.sin(t))
+    )
+    assert mechanisms._words(rod(lambda t: 2 * t)) != mechanisms._words(rod(lambda t: 2.0 * t))
+    assert mechanisms._words(rod(lambda t: np.sin(t))) != mechanisms._words(rod(lambda t: np.cos(t)))
 
 
 def test_named_points_gravity_and_names_of_inputs_count():

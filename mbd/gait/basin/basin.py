@@ -13,7 +13,6 @@ import numpy as np
 from mbd.analysis.column_units import units_of
 from mbd.arrays import Vector
 from mbd.bodies.values import flag, is_finite_number, named_number_faults, shown
-from mbd.compile.identity import identity_of_model
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.gait.basin.axes import Grid, grid_of, study_of
 from mbd.gait.basin.kinds import NUMBER
@@ -23,6 +22,7 @@ from mbd.gait.basin.store import Store, digest_of
 from mbd.gait.basin.walks import Decided, Numbers
 from mbd.gait.cycle import LimitCycle
 from mbd.progress import share_bar
+from mbd.results.identity import identity_of_model
 from mbd.simulation.batch.batch import worker_count
 
 __all__ = ["basin"]

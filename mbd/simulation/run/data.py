@@ -16,7 +16,6 @@ from mbd.dataclass import dataclass
 from mbd.equations.switching_times import jumps_between
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
-from mbd.kernel import entry
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
@@ -123,7 +122,9 @@ class RunData:
         settings: dict[str, Any],
     ) -> None:
         if self.stepper_kind is Stepper and is_compiled(mechanism, integrator):
-            entry.entry()  # the first run on a machine builds the kernel, which is no time of this run
+            from mbd.kernel.entry import entry  # with llvmlite, which runs in Python do without
+
+            entry()  # the first run on a machine builds the kernel, which is no time of this run
         self.began = perf_counter()
         self.model = model
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop

@@ -17,7 +17,7 @@ from mbd.equations.programs import ActiveSet, follows_multipliers
 from mbd.errors import MemoryLimitError, ModelError
 from mbd.integrators.base import Integrator
 from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
-from mbd.kernel import codes, entry
+from mbd.kernel import codes
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.contact.contact_log import room_to_log
 from mbd.kernel.records import PROGRAMS, Kernel
@@ -363,7 +363,9 @@ class Stepper:
 
     def _enter(self, address: int) -> int:
         """Call the compiled kernel with a table."""
-        return int(entry.entry()(address))
+        from mbd.kernel.entry import entry  # with llvmlite, which runs in Python do without
+
+        return int(entry()(address))
 
     def _advance_plain(self) -> int:
         from mbd.kernel.stepping.advance import advance

@@ -16,16 +16,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mbd.compile.mechanism import Mechanism
+from mbd.results.trajectory import Trajectory
 from mbd.tape.node import Node
 
-if TYPE_CHECKING:
-    from mbd.compile.mechanism import Mechanism
-
-__all__ = ["identity", "identity_of_model", "identity_of_words"]
+__all__ = ["identity", "identity_of_model"]
 
 
 _LIBRARY = tuple(
@@ -53,18 +52,6 @@ def identity_of_model(model: Any, mechanism: Mechanism) -> dict[str, str]:
     kinds = ("joints", "forces", "constraints", "controllers", "markers", "observations", "gravity", "cut")
     words = [getattr(model, kind, ()) for kind in kinds] if hasattr(model, "joints") else model
     return {"model": identity(words), "equations": identity(laws)}
-
-
-def identity_of_words(*words: Any) -> str | None:
-    """The digest of words from which the same equations follow whenever it is the same; None where none can tell.
-
-    None can where functions refer to what may change while they are kept, such as a list or an object of the user's,
-    or where something cannot be read.
-    """
-    try:
-        return _StrictReader().of(words)
-    except _CannotTellError:
-        return None
 
 
 class _Reader:
@@ -118,20 +105,21 @@ class _Reader:
             return f"array {item.dtype.str} {item.shape}".encode() + np.ascontiguousarray(item).tobytes(), []
         if isinstance(item, Node):
             return self.of_node(item), []
-        if hasattr(item, "identifying_numbers"):
-            return kind, item.identifying_numbers()
+        if isinstance(item, Trajectory):
+            return kind, [item.record.time, item.record.q, item.record.v, item.record.z]
         if isinstance(item, types.CodeType):
-            return b"code" + item.co_code, self.of_code(item)
+            return b"code" + item.co_code, [item.co_consts, item.co_names]
         if isinstance(item, types.FunctionType | type | types.ModuleType) and _is_library(item):
             return f"{kind} {getattr(item, '__module__', '')}.{getattr(item, '__qualname__', item.__name__)}", []
         if isinstance(item, types.FunctionType):
-            return "function", self.of_function(item)
+            return "function", _of_function(item)
         if isinstance(item, types.MethodType):
             return "method", [item.__func__, item.__self__]
         if isinstance(item, functools.partial):
             return "partial", [item.func, item.args, item.keywords]
         if isinstance(item, type):
-            return f"class {item.__qualname__}", [self.of_class(item), item.__bases__]
+            own = {name: value for name, value in vars(item).items() if isinstance(value, _OF_CLASSES)}
+            return f"class {item.__qualname__}", [own, item.__bases__]
         if isinstance(item, types.ModuleType):
             return f"module {item.__name__}", []
         if hasattr(item, "__wrapped__"):
@@ -139,33 +127,7 @@ class _Reader:
         if is_dataclass(item):
             held = [getattr(item, each.name, None) for each in fields(item) if each.name not in SKIPPED]
             return kind, [type(item), *held]
-        return kind, self.as_pickled(item)
-
-    def of_code(self, code: types.CodeType) -> list[Any]:
-        """What code holds beside its instructions."""
-        return [code.co_consts, code.co_names]
-
-    def of_function(self, function: types.FunctionType) -> list[Any]:
-        """What a function does: its code and all that it refers to."""
-        return _of_function(function)
-
-    def of_class(self, item: type) -> dict[str, Any]:
-        """What a class of the user's defines."""
-        return {name: value for name, value in vars(item).items() if isinstance(value, _OF_CLASSES)}
-
-    def as_pickled(self, item: Any) -> list[Any]:
-        """What a pickle of an object would hold; nothing for what has none."""
-        if isinstance(item, property | classmethod | staticmethod | functools.cached_property):
-            return [getattr(item, name, None) for name in ("fget", "__func__", "func")]
-        try:
-            made = item.__reduce_ex__(4)
-        except Exception:  # locks, files and objects of users' own raise what they like
-            return self.unreadable(item)
-        return [made] if isinstance(made, str) else [type(item), *made[1:3], *(list(each or ()) for each in made[3:5])]
-
-    def unreadable(self, item: Any) -> list[Any]:
-        """An object that no pickle can hold."""
-        return [getattr(item, "__qualname__", "")]
+        return kind, _as_pickled(item)
 
     def of_node(self, root: Node) -> str:
         """An expression by its structure."""
@@ -182,61 +144,6 @@ class _Reader:
                 text = " ".join([node.op, data, *(known[each.index] for each in node.args)])
                 known[node.index] = sha256(text.encode()).hexdigest()
         return known[root.index]
-
-
-class _CannotTellError(Exception):
-    """Whether words stay the same cannot be told."""
-
-
-class _StrictReader(_Reader):
-    """A reader of words whose equations are kept: it refuses what may mean something else later."""
-
-    def of_code(self, code: types.CodeType) -> list[Any]:
-        return [code.co_consts, code.co_names, code.co_varnames, code.co_freevars, code.co_argcount, code.co_flags]
-
-    def of_function(self, function: types.FunctionType) -> list[Any]:
-        code, *referred = _of_function(function)
-        defaults, named_defaults, cells, named = referred
-        held = [*(defaults or ()), *(named_defaults or {}).values(), *cells, *named.values()]
-        if function.__dict__ or not all(map(_is_fixed, held)):
-            raise _CannotTellError
-        return [code, *referred]
-
-    def parts(self, item: Any) -> tuple[str | bytes, list[Any]]:
-        title, parts = super().parts(item)
-        if is_dataclass(item) and not isinstance(item, type) and not _is_library(type(item)):
-            known = {each.name for each in fields(item)}
-            parts = [*parts, sorted((name, value) for name, value in vars(item).items() if name not in known)]
-        return title, parts
-
-    def of_class(self, item: type) -> dict[str, Any]:
-        own = super().of_class(item)
-        if any(name not in own and not name.startswith("__") and not _is_fixed(value)
-               for name, value in vars(item).items()):  # fmt: skip
-            raise _CannotTellError
-        return {name: value for name, value in own.items() if not _is_generated(value)}
-
-    def unreadable(self, item: Any) -> list[Any]:
-        raise _CannotTellError
-
-
-def _is_fixed(value: Any) -> bool:
-    """Whether what a function refers to can only be replaced, not changed."""
-    if isinstance(value, tuple):
-        return all(map(_is_fixed, value))
-    if isinstance(value, types.FunctionType | types.BuiltinFunctionType | types.ModuleType | type):
-        return True
-    if isinstance(value, bool | int | float | complex | str | bytes | np.generic | np.ufunc) or value is None:
-        return True
-    parameters = getattr(type(value), "__dataclass_params__", None)
-    if parameters is None or not parameters.frozen:
-        return False
-    return _is_library(type(value)) or all(_is_fixed(getattr(value, each.name)) for each in fields(value))
-
-
-def _is_generated(value: Any) -> bool:
-    """Whether a method is one that `dataclass` has written."""
-    return isinstance(value, types.FunctionType) and value.__code__.co_filename == "<string>"
 
 
 _OF_CLASSES = (
@@ -258,6 +165,17 @@ def _data(node: Node) -> Any:
         table, order = node.data
         return [list(table.flat), order]
     return node.data
+
+
+def _as_pickled(item: Any) -> list[Any]:
+    """What a pickle of an object would hold; nothing for what has none."""
+    if isinstance(item, property | classmethod | staticmethod | functools.cached_property):
+        return [getattr(item, name, None) for name in ("fget", "__func__", "func")]
+    try:
+        made = item.__reduce_ex__(4)
+    except Exception:  # locks, files and objects of users' own raise what they like
+        return [getattr(item, "__qualname__", "")]
+    return [made] if isinstance(made, str) else [type(item), *made[1:3], *(list(each or ()) for each in made[3:5])]
 
 
 def _of_function(function: types.FunctionType) -> list[Any]:
@@ -301,9 +219,5 @@ def _is_library(item: Any) -> bool:
         path = getattr(module, "__file__", None) or ""
         if not path:
             return getattr(module, "__name__", "") != "__main__"
-    return _is_in_library(path)
-
-
-@functools.lru_cache(maxsize=1024)
-def _is_in_library(path: str) -> bool:
-    return bool(path) and str(Path(path).resolve()).startswith(_LIBRARY)
+    where = str(Path(path).resolve()) if path else ""
+    return where.startswith(_LIBRARY)
