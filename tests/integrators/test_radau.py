@@ -164,7 +164,7 @@ def test_a_force_that_is_no_number_ends_the_run_with_its_name(backend):
 def test_a_motion_too_fast_to_be_resolved_is_refused():
     model, _ = started("double pendulum")
     wild = mbd.assemble(model, {"u.angle": 1.0}, {"u.angle": 300.0, "w.angle": -700.0})
-    with pytest.raises(mbd.SimulationError, match="Newton stalled|half a radian|does not resolve the motion"):
+    with pytest.raises(mbd.SimulationError, match="Newton stalled|half a radian"):
         mbd.simulate(model, wild, mbd.RadauIIA(), dt=0.1, until=1.0)
 
 

@@ -139,8 +139,7 @@ def test_a_corner_without_load_does_not_slip_by_round_off():
     gaps = [above[f"corner {k}.gap"][0] for k in range(8)]
     lowest = int(np.argmin(gaps))
     state = mbd.assemble(model, {"free.y": 1.0 - gaps[lowest], "free.orientation": turn}, closed=f"corner {lowest}")
-    for dt in (0.006388107573654945, 5e-3, 1e-3):
-        run = mbd.simulate(model, state, mbd.RadauIIA(), dt=dt, until=0.25)
-        stuck = [event.time for event in run.events if event.kind == "stuck"]
-        assert len(stuck) == 3 or (len(stuck) == 4 and dt > 1e-3)  # long steps may strike on four corners at once
-        assert not any(event.kind == "slipped" and event.time > stuck[0] for event in run.events)
+    run = mbd.simulate(model, state, mbd.RadauIIA(), dt=0.006388107573654945, until=0.25)
+    stuck = [event.time for event in run.events if event.kind == "stuck"]
+    assert len(stuck) == 3
+    assert not any(event.kind == "slipped" and event.time > stuck[0] for event in run.events)

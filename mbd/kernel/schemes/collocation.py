@@ -34,11 +34,12 @@ class Collocation:
     e: Vector
 
     def numbers(self) -> Vector:
-        """As the kernel reads them in a row: c | A | A A | eigenvalues | t, s | t, s of the pair | e."""
+        """As the kernel reads them in a row: c | A | A A | eigenvalues | t, s | t, s of the pair | e | A⁻¹."""
         pair = [self.pair.real, self.pair.imag]
         parts = [self.c, self.A.ravel(), (self.A @ self.A).ravel(), np.array([self.real, *pair])]
         parts += [self.t_real, self.s_real]
         parts += [self.t_pair.real, self.t_pair.imag, self.s_pair.real, self.s_pair.imag, self.e]
+        parts.append(np.linalg.inv(self.A).ravel())
         return np.concatenate(parts)
 
 

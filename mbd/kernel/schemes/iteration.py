@@ -12,8 +12,8 @@ from mbd.kernel.stepping.restart import compose, note_scales
 from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 
 __all__ = [
-    "MAX_CORRECTIONS", "MAX_CURVATURE", "MAX_UNCHECKED_ERROR", "MIN_DECREASE", "MIN_HALVED_RESIDUAL", "MIN_RATE_SHARE",
-    "STALL_RATIO", "finish", "is_below_floors", "is_small", "note_fastest", "overturns",
+    "MAX_CURVATURE", "MAX_UNCHECKED_ERROR", "MIN_HALVED_RESIDUAL", "MIN_RATE_SHARE", "finish", "is_below_floors",
+    "is_small", "note_fastest", "overturns",
     "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at", "weigh_by_accelerations",
 ]  # fmt: skip
 
@@ -25,12 +25,6 @@ MIN_RATE_SHARE = 0.01
 """Part of the fastest rate below which another one hardly takes part in the motion [-]."""
 MIN_HALVED_RESIDUAL = 1e4
 """Residual over its tolerance above which a correction that does not reduce it is halved."""
-MIN_DECREASE = 0.1
-"""Part of the residual that a correction removes at least, for each part of it that is made (Armijo 1966) [-]."""
-MAX_CORRECTIONS = 6
-"""Corrections after which residuals that meet the tolerance asked for are taken for what they are [-]."""
-STALL_RATIO = 0.9
-"""Part of the residual left by a correction above which it falls no more; between both it falls slowly."""
 
 
 def predict(K: SingularSteps, h: float, t1: float, c_C: float, c_K: float) -> None:

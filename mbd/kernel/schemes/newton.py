@@ -14,10 +14,7 @@ from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, SingularSteps
 from mbd.kernel.schemes.iteration import (
-    MAX_CORRECTIONS,
-    MIN_DECREASE,
     MIN_HALVED_RESIDUAL,
-    STALL_RATIO,
     finish,
     is_below_floors,
     overturns,
@@ -89,8 +86,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     moved = 1e300
     last = 0.0
     further = 0
-    iteration = 0
-    while iteration < K.max_iterations + further_corrections():
+    for iteration in range(K.max_iterations + further_corrections()):
         tangent = not fresh
         if together:
             share_loads(K, m)
@@ -104,14 +100,12 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
         o_r = (K.n + m) * (K.n + m) if tangent and not straight else 0
         error = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
         # shares that follow loads change it as well
-        enough = 1.0 - MIN_DECREASE * 0.5**halvings
-        low = MIN_HALVED_RESIDUAL if iteration < MAX_CORRECTIONS else 1.0
-        grown = error > low and error > enough * left and not together
+        grown = error > MIN_HALVED_RESIDUAL and error > 0.9 * left and not together
         if grown and m > 0:
             vanishing = weigh_by_accelerations(K)
             if vanishing or K.stabilized == 0:  # of index 3 the rows alone ask for accelerations
                 size = residual_size(K, o_r, m, c_C, c_K, tolerance, K.stabilized)
-                grown = size > low and size > enough * size_before(K, m, c_C, c_K, tolerance)
+                grown = size > MIN_HALVED_RESIDUAL and size > 0.9 * size_before(K, m, c_C, c_K, tolerance)
             restore_scales(K)
         if halvings < 10 and iteration > 0 and (error < 0.0 or grown):
             if fixed:
@@ -124,8 +118,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             return no_candidate(K, h, t1, NOT_FINITE)
         K.failure_size = error
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
-            stuck = iteration >= MAX_CORRECTIONS and error > STALL_RATIO * before
-            error = second_look(K, o_r, m, c_C, c_K, tolerance, stuck)
+            error = second_look(K, o_r, m, c_C, c_K, tolerance, iteration)
             if error < 0.0:
                 return no_candidate(K, h, t1, int(-error))
         whole = last if halvings == 0 else 0.0  # what is left of a correction by half is no round-off
@@ -136,7 +129,6 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
         if not tangent and error > max(1.0, 0.3 * before):
             fresh = False  # the old tangent has done its work: renew it at the same iterate
             before = 1e300
-            iteration += 1
             continue
         before = K.failure_size  # as measured: one that passes as round-off is no bound for the next
         left = K.failure_size
@@ -162,7 +154,6 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             if K.exact == 0:  # the predictor's error measures that of the step: stay far below it
                 tolerance = min(K.tolerance, max(1e-4 * moved, tolerance))
         fresh = tangent or error > 1.0 or moved <= 0.3 * last or further > 0
-        iteration += 1
         last = last if tangent else 0.0  # an old tangent leaves much of an error too: only a new one tells round-off
     return no_candidate(K, h, t1, NOT_CONVERGED)
 
@@ -185,7 +176,7 @@ def conclude_step(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, stuck: bool) -> float:
+def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, iteration: int) -> float:
     """A residual that falls no more, over its tolerance with sizes of forces as they are here; 1 if it is round-off.
 
     −status where the iteration is to end, and K.failure_size is what is left over what was asked for.
@@ -205,7 +196,7 @@ def second_look(K: Equations, o_r: int, m: int, c_C: float, c_K: float, toleranc
             else:
                 K.n_stagnations += 1
                 error = 1.0
-        elif stuck and K.exact == 0:
+        elif iteration >= 6 and K.exact == 0:
             if residual_size(K, o_r, m, 0.0, 0.0, 1e5 * EPS, K.stabilized) <= 1e3:
                 left = residual_size(K, o_r, m, c_C, c_K, K.tolerance, K.stabilized)
                 error = -float(STAGNATED)

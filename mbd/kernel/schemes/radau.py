@@ -1,8 +1,7 @@
 """One step of the three-stage Radau IIA method of order 5 (Hairer & Wanner 1996, Solving ODEs II, IV.8 and VII.4).
 
 Rows are held in the stabilized form at every stage (`stages`), the last of which is the end of the step.
-Newton's method has one pair of matrices a step, or where that leaves much of the error those of each stage
-(`coupled_stages`); next to a singular configuration stages are held to rows of their own
+Newton's method has one pair of matrices a step; next to a singular configuration stages are held to rows of their own
 (`mbd.kernel.singular.stages`). Accelerations and multipliers of the end come from the balance and the rows at
 acceleration level, which makes them as accurate as positions and velocities.
 """
@@ -16,22 +15,13 @@ from mbd.kernel.contact.cones import HOLD_DIRECTION
 from mbd.kernel.records import Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
-from mbd.kernel.schemes.coupled_stages import correct_coupled_stages
 from mbd.kernel.schemes.direction_continuation import (
     NO_HOLD,
     begin_continuation,
     continue_directions,
     wants_continuation,
 )
-from mbd.kernel.schemes.iteration import (
-    MAX_CORRECTIONS,
-    MIN_DECREASE,
-    MIN_HALVED_RESIDUAL,
-    STALL_RATIO,
-    roughly,
-    runs_away,
-    weigh_by_accelerations,
-)
+from mbd.kernel.schemes.iteration import MIN_HALVED_RESIDUAL, roughly, runs_away, weigh_by_accelerations
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import (
@@ -75,8 +65,10 @@ __all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
 MAX_CONTRACTION = 0.5
 """Part of the residual left by a correction above which the matrices are made again."""
 
-MIN_CORRECTION_PART = 1e-3
-"""Part of a correction that is made at least, however the residual grows [-]."""
+MAX_CORRECTIONS = 6
+"""Corrections after which residuals that meet the tolerance asked for are taken for what they are [-]."""
+STALL_RATIO = 0.9
+"""Part of the residual left by a correction above which it falls no more; between both it falls slowly."""
 MAX_CORRECTION_RATIO = 2.0
 """Size of a correction over the largest rate above which it is made with the masses of each stage instead [-]."""
 
@@ -122,9 +114,7 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
     K.near_singular = 0
     hold = NO_HOLD
     while True:
-        # directions that turn fast have several solutions: the one that continuation leads to is wanted
-        couples = hold != NO_HOLD or not wants_continuation(K, NOT_CONVERGED)
-        status = plain_step(K, h, t1, m, hold == NO_HOLD or hold == HOLD_DIRECTION, couples)
+        status = plain_step(K, h, t1, m, hold == NO_HOLD or hold == HOLD_DIRECTION)
         if hold == NO_HOLD and wants_continuation(K, status):
             hold = begin_continuation(K)
         elif hold > 0.0:
@@ -142,11 +132,8 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
     return status
 
 
-def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool, couples: bool) -> int:
-    """The same with one pair of matrices for all stages, or where it `couples` and these do not do, those of each.
-
-    It begins with a prediction or with the stages that are there.
-    """
+def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
+    """The same with one pair of matrices for all stages, from a prediction or from the stages that are there."""
     if is_differentiated():
         status = follow_stages(K, h, t1, m)
         if status != NOT_FOLLOWED:
@@ -158,9 +145,9 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool, couples: 
     tolerance = 1e-3 * K.tolerance
     before = 1e300
     left = 1e300  # the error where the last correction started
+    retreats = 0
     renew = True
-    slow = False  # whether matrices of one stage leave much of the error, and even those made again
-    coupled = False
+    slow = False  # whether matrices of one stage leave much of the error
     status = NOT_CONVERGED
     K.failure_time = t1
     K.failure_step = h
@@ -169,29 +156,37 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool, couples: 
     further = 0
     for iteration in range(K.max_iterations):
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
-        # a full Newton step jumped over a steep place
-        part = 1.0 if iteration > 0 else 0.0
-        while part > MIN_CORRECTION_PART and jumps(K, h, t1, m, tolerance, error, left, part, coupled):
-            part *= 0.5
+        # shares that follow loads change it as well
+        grown = error > MIN_HALVED_RESIDUAL and error > 0.9 * left and not sharing(K)
+        if grown and m > 0:
+            if weigh_by_accelerations(K):
+                retreat_stages(K, m, 1.0)
+                size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
+                retreat_stages(K, m, -1.0)
+                size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) / (size + 1e-300)
+                grown = size > 0.9
+            restore_scales(K)
+        if retreats < 10 and iteration > 0 and (error < 0.0 or grown):
+            retreat_stages(K, m, 0.5)  # a full Newton step jumped over a steep place
+            retreats += 1
             slow = True
-            retreat_stages(K, m, 0.5)
-            error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
+            continue
         if error < 0.0:
             status = NOT_FINITE
             break
         K.failure_size = error
         if error > 1.0 and iteration >= 2 and error > 0.5 * before:
-            stuck = iteration >= MAX_CORRECTIONS and error > STALL_RATIO * before
-            status = judge_stagnation(K, h, t1, m, tolerance, stuck)
+            status = judge_stagnation(
+                K, h, t1, m, tolerance, iteration >= MAX_CORRECTIONS and error > STALL_RATIO * before
+            )
             if status == 0:
                 error = 1.0
             elif status != NOT_CONVERGED or K.failure_size < 0.0:
                 break
         if error > 1.0 and was_enough(K, h, t1, m, iteration, error, left):
             return complete(K, h, t1, m, renew, True)
-        if error > 1.0 and not renew and not coupled and error > MAX_CONTRACTION * before:
+        if error > 1.0 and not renew and error > MAX_CONTRACTION * before:
             renew = True  # the old matrices have done their work: make them again at the same iterate
-            coupled = slow and couples
             slow = True
             before = 1e300
             continue
@@ -202,64 +197,36 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool, couples: 
                 K.failure_size = error
         before = K.failure_size  # as measured: one that passes as round-off is no bound for the next
         left = K.failure_size
+        retreats = 0
         if renew and not factor_stages(K, K.n + m):
             status = SINGULAR
             break
         if error <= 1.0:  # the residuals are there: what they still correct costs two solutions
             last = moved
-            moved = correct(K, m, h, t1, renew, coupled)
+            moved = correct_by_own_masses(K, m, h, t1, renew, slow)
             renew = False
             if has_converged(moved, last, first):
                 if further == further_corrections():
                     return complete(K, h, t1, m, False, iteration >= MAX_CORRECTIONS)
                 further += 1
             continue
-        moved = correct(K, m, h, t1, renew, coupled)
+        moved = correct_by_own_masses(K, m, h, t1, renew, slow)
         if moved > MAX_CORRECTION_RATIO and m > 0 and K.vector == 0 and not slow:
             retreat_stages(K, m, 1.0)
             slow = True
-            coupled = couples
             renew = True
             before = 1e300
             left = 1e300
             continue
-        # the predictor is of order 3, the step of order 5: stay far below its error
-        if iteration == 0 or (slow and first == 0.0):
+        if iteration == 0 or (
+            slow and first == 0.0
+        ):  # the predictor is of order 3, the step of order 5: stay far below its error
             first = moved
             tolerance = min(K.tolerance, max(1e-3 * first * first, tolerance))
         renew = False
     if K.failure_size < 0.0:
         K.failure_size = 1e300
     return status
-
-
-def jumps(
-    K: Kernel, h: float, t1: float, m: int, tolerance: float, error: float, left: float, part: float, coupled: bool
-) -> bool:
-    """Whether residuals after this part of a correction are not finite, or are no smaller than before it."""
-    if error < 0.0:
-        return True
-    # shares that follow loads change it as well
-    grown = error > (1.0 if coupled else MIN_HALVED_RESIDUAL) and error > (1.0 - MIN_DECREASE * part) * left
-    if not grown or sharing(K):
-        return False
-    if m > 0:
-        c = K.stages[MU_REAL] * h
-        if weigh_by_accelerations(K):
-            retreat_stages(K, m, 1.0)
-            size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False)
-            retreat_stages(K, m, -1.0)
-            size = evaluate_stages(K, h, t1, m, tolerance, c, c * c, False) / (size + 1e-300)
-            grown = size > 1.0 - MIN_DECREASE * part
-        restore_scales(K)
-    return bool(grown)
-
-
-def correct(K: Kernel, m: int, h: float, t1: float, renew: bool, coupled: bool) -> float:
-    """A correction of all stages, with matrices of the middle one or each with its own; its size over the rates."""
-    if coupled:
-        return float(correct_coupled_stages(K, m, h, t1, renew))
-    return float(correct_by_own_masses(K, m, h, t1, renew))
 
 
 def has_converged(moved: float, last: float, first: float) -> bool:
@@ -390,11 +357,7 @@ def was_enough(K: Kernel, h: float, t1: float, m: int, iteration: int, error: fl
 
 def radau_memory(K: Settings) -> dict[str, int]:
     """Lengths of what stages take, and of those of the last step."""
-    size = 3 * (K.n + K.n_rows)
-    return {
-        "stages": stage_place(K, STAGES_END), "past_stages": size + 3 * K.n_v,
-        "coupled": size * size, "coupled_rhs": size, "coupled_pivots": size,
-    }  # fmt: skip
+    return {"stages": stage_place(K, STAGES_END), "past_stages": 3 * (K.n + K.n_rows + K.n_v)}
 
 
 SCHEME = Scheme(
