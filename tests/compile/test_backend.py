@@ -90,3 +90,19 @@ print(out[0])
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=300)
     assert done.stdout.strip() == "6.0"
+
+
+def test_a_run_needs_no_llvmlite():
+    program = """
+import sys, warnings
+warnings.simplefilter("ignore")
+sys.modules["llvmlite"] = sys.modules["llvmlite.binding"] = None
+import mbd
+model = mbd.Model("rod")
+rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
+model.connect(mbd.Revolute("hinge", model.ground.origin, rod.start))
+run = mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 0.3}), dt=0.01, until=0.05)
+print(round(float(run["hinge.angle"][-1]), 3))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=300)
+    assert done.stdout.strip() == "0.293"

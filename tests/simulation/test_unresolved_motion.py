@@ -313,3 +313,42 @@ def test_friction_that_turns_within_a_step_of_a_swing_is_not_doubted(force):
     exact = mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-8, until=3.0)
     assert not coarse_notes(found)
     assert abs(found.final["slide.rate"] - exact.final["slide.rate"]) < 0.02
+
+
+@pytest.mark.parametrize("before", [1.0, 20.0, 200.0])
+def test_a_body_that_was_fast_long_before_hides_no_wall(before):
+    def force(v, t):
+        return mbd.where(t < 1.0, -8.0 * (v - 1.0), 0.0)
+
+    model = mbd.Model("braked", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("body", mass=1.0)
+    slide = mbd.Prismatic("slide", model.ground.origin, body.origin)
+    model.connect(slide)
+    model.apply(mbd.Motor("brake", slide, force, arguments=["slide.rate", "t"]))
+    wall = 1.5 + before / 8.0
+    push = mbd.Motor(
+        "wall", slide, lambda x: mbd.where(x > wall, -4e4 * (x - wall), 0.0), arguments=["slide.displacement"]
+    )
+    model.apply(push)
+    start = mbd.assemble(model, velocity={"slide.displacement": before})
+    run = mbd.simulate(model, start, mbd.RungeKutta4(), dt=0.01, until=4.0, on_failure="return")
+    right = abs(run["slide.rate"][-1] + 1.0) < 0.2
+    assert right or not run.success or coarse_notes(run)
+
+
+@pytest.mark.parametrize("b", [1e-3, 3e-2])
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RungeKutta4()])
+def test_a_pole_that_a_step_passes_is_refused_beside_a_body_that_is_shaken(scheme, b):
+    def end(beside):
+        model = mbd.Model("pole", gravity=(0.0, 0.0, 0.0))
+        planet, weight = mbd.PointMass("planet", mass=1.0), mbd.PointMass("weight", mass=1.0)
+        model.connect(mbd.Translation("place", model.ground.origin, planet.origin))
+        model.apply(mbd.Potential("pull", lambda x, y: -1.0 / mbd.sqrt(x * x + y * y), ("place.x", "place.y")))
+        if beside:
+            slide = mbd.Prismatic("slide", model.ground.origin, weight.origin)
+            model.connect(slide)
+            model.apply(mbd.Motor("push", slide, lambda t: 1e4 * mbd.sin(25.0 * t), arguments=["t"]))
+        start = mbd.assemble(model, {"place.x": -1.0, "place.y": b}, {"place.x": 1.0, "place.y": 0.0})
+        return mbd.simulate(model, start, scheme, dt=0.1, until=3.0, on_failure="return").success
+
+    assert end(False) or not end(True)

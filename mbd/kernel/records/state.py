@@ -72,7 +72,7 @@ class State(SchemeAbilities):
     rate: Reals = reals(lambda s: s.n, kept=True)
     lam: Reals = reals(lambda s: s.n_rows, kept=True)
     anchors: Reals = reals(lambda s: s.n_anchors, kept=True)
-    peak: Reals = reals(lambda s: s.n, kept=True)  # largest of each rate so far, forgotten slowly
+    peak: Reals = reals(lambda s: s.n, kept=True)  # largest of each rate in the steps just before
     fastest: Reals = reals(lambda s: s.n)  # the largest of the candidate in each cluster
     damping: Reals = reals(lambda s: s.n)  # of what a step has not predicted, in each cluster
     largest: Reals = reals(lambda s: s.n - s.n_v, kept=True)  # size of each first-order state so far, adaptive only

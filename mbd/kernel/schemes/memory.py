@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from mbd.kernel.records import SingularSteps, State, Steps
 from mbd.kernel.stepping.restart import note_scales, raise_scales, retain_scales
-from mbd.kernel.stepping.scales import HORIZON_STEPS
 
 __all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step"]
+
+PEAK_KEPT = 0.9
+"""Part of the largest rate so far that counts a step later: what was fast some tens of steps ago hides nothing [-]."""
 
 
 def start_step(K: State) -> float:
@@ -33,7 +35,7 @@ def accept_step(K: Steps, h: float) -> None:
     K.q[: K.n_q] = K.q1[: K.n_q]
     for i in range(K.n):
         K.y[i] = K.y1[i]
-        K.peak[i] = max(abs(K.y1[i]), (1.0 - 1.0 / HORIZON_STEPS) * K.peak[i])
+        K.peak[i] = max(abs(K.y1[i]), PEAK_KEPT * K.peak[i])
         K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
         K.rate[i] = K.rate1[i]
         K.aux[i] = K.aux1[i]

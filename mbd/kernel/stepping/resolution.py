@@ -120,10 +120,16 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
         status = OUTGROWN
     elif stiff and known and is_unstable(K, h, t1, at_y, at_D):
         status = UNSTABLE
-    elif coarse and gains(K, h, t1, at_y, at_D, K.cluster[blocked]):
-        status = GAINED
-    elif peaks_within(K, h, at_y, K.cluster[blocked]):
-        status = LEAPT
+    for c in range(K.n_clusters if status == 0 else 0):  # one that is worse may hide another
+        if status != 0:
+            continue
+        if coarse and gains(K, h, t1, at_y, at_D, c):
+            status = GAINED
+        elif peaks_within(K, h, at_y, c):
+            status = LEAPT
+        for i in range(K.n_v if status != 0 else 0):
+            if K.cluster[i] == c and K.cluster[blocked] != c:
+                blocked = i
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
     if status == 0 and rough_enough and K.strategy == 0:

@@ -44,6 +44,7 @@ def keep_idle(stepper: Stepper) -> None:
     idle = stepper.mechanism.idle
     if len(idle) >= stepper.max_idle:
         idle.clear()
+    stepper.let_go()
     idle[stepper.key] = stepper
 
 

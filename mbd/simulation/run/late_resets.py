@@ -49,7 +49,10 @@ def reset_ends(run: RunData, guard: Guard, q: Matrix, y: Matrix, parameters: Mat
     -------
     (N,) whether each was given finite numbers; one that was not stays as it is
     """
-    plan = run.mechanism.kept((reset_ends, id(guard)), lambda: _plan(run, guard))
+    known: list[Any] = run.mechanism.kept((reset_ends, id(guard)), list)
+    if not known or known[0].keys() != guard.reset.keys() or any(known[0][k] is not v for k, v in guard.reset.items()):
+        known[:] = dict(guard.reset), _plan(run, guard)
+    plan = known[1]
     whole = np.hstack([q, y, np.broadcast_to(parameters, (len(q), parameters.shape[1]))])
     wanted = [(place, _column(function, [whole[:, k] for k in read], len(q))) for place, function, read in plan]
     sound = np.all([np.isfinite(column) for _, column in wanted], axis=0)

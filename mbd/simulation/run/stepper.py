@@ -69,11 +69,15 @@ class InitialArrays:
             self._places = [np.flatnonzero(room) for room in rooms]
             self._numbers = [room[places] for room, places in zip(rooms, self._places, strict=True)]
 
-    def restore(self, kernel: Kernel, rooms: list[Any]) -> None:
-        """Put everything back."""
+    def let_go(self, kernel: Kernel) -> None:
+        """Put the record back, without whatever arrays a run has put into it."""
         values = vars(kernel)
         values.clear()
         values.update(self._values)
+
+    def restore(self, kernel: Kernel, rooms: list[Any]) -> None:
+        """Put everything back."""
+        self.let_go(kernel)
         for room, places, numbers in zip(rooms, self._places, self._numbers, strict=True):
             room[:] = 0
             room[places] = numbers
@@ -146,6 +150,11 @@ class Stepper:
     def size(self) -> int:
         """How many numbers its arrays have."""
         return sum(map(len, self.shelves.rooms))
+
+    def let_go(self) -> None:
+        """Keep no arrays but those of its own while nobody runs."""
+        assert self._fresh is not None
+        self._fresh.let_go(self.kernel)
 
     def begin_again(self, parameters: Vector, end: float) -> None:
         """Make everything as it was before the run that is over, but for parameters and the end of the next one."""
