@@ -90,6 +90,7 @@ def without_fma(monkeypatch):
     monkeypatch.setattr(llvm, "host", lambda: plain)
 
 
+@pytest.mark.usefixtures("made_afresh")
 @pytest.mark.parametrize("scene", ["walker", "lagging servo"])
 def test_a_model_in_c_takes_the_same_steps(scene, tmp_path, monkeypatch, without_fma):
     scheme = mbd.HHT(0.05)
@@ -102,6 +103,7 @@ def test_a_model_in_c_takes_the_same_steps(scene, tmp_path, monkeypatch, without
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("made_afresh")
 def test_kernel_and_model_in_c_take_the_same_steps(tmp_path_factory, monkeypatch, without_fma):
     entry = entry_of(library(build.kernel_c_source(), tmp_path_factory.mktemp("kernel"), "-O1"))
     for scheme in (mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta853()):
