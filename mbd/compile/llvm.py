@@ -44,6 +44,7 @@ from mbd.compile.cache import ObjectCache, default_cache, key_of
 from mbd.compile.forking import COMPILING
 from mbd.compile.functions import ByName
 from mbd.compile.host import host
+from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
@@ -284,8 +285,6 @@ class Library(ByName[MachineFunction]):
                 raise ModelError(f"this library already has a function {name!r}; give every function its own name")
         begin = time.perf_counter()
         final = 0 if rarely else self.level
-        from mbd.compile.ir import Module  # not where all code is in the cache
-
         module = Module(programs, self.layout, host().fused, **CUTS.get(final, {}))
         text = module.text()
         written = time.perf_counter()

@@ -144,7 +144,7 @@ class Sweeps:
             dots.update(new)
             _push_forward(tape, order, dots)
             results.append([dots.get(node.index, tape.zero) for node in outputs])
-        pushed.update(node.index for node in order)
+        pushed |= reached - given  # those without a derivative too, on whose having none others rely
         return results
 
 

@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 
 from mbd.tape.derivatives import Sweeps, gradient, jvp, jvps, vjp
 from mbd.tape.evaluate import evaluate
-from mbd.tape.functions import atan2, log, maximum, minimum, sqrt, where
+from mbd.tape.functions import atan2, log, maximum, minimum, sign, sqrt, where
 from mbd.tape.node import Tape
 from tests.tape.counts import total
 from tests.tape.graphs import FUNCTIONS, build, exact, mp, programs
@@ -83,6 +83,15 @@ def test_derivatives_of_more_and_more_outputs_are_those_of_all_at_once(program, 
     more = [{**seeds[0], **dict.fromkeys(named, 0.5)}, seeds[1]]
     for found, known in zip(sweeps(graph.nodes[-8:], more), jvps(graph.nodes[-8:], more), strict=True):
         assert all(one is other for one, other in zip(found, known, strict=True))
+
+
+def test_a_node_without_a_derivative_that_is_named_later_counts():
+    tape = Tape()
+    x, y = tape.input("q", 0), tape.input("q", 1)
+    for named in (sign(y), y):
+        sweeps = Sweeps()
+        assert sweeps([x + named], [{x: 1.0}])[0] == [tape.lift(1.0)]
+        assert sweeps([x + named], [{x: 1.0, named: 0.5}])[0] == jvps([x + named], [{x: 1.0, named: 0.5}])[0]
 
 
 def test_a_seeded_node_is_independent_of_the_others():

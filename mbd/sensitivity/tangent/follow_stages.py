@@ -29,9 +29,6 @@ from mbd.sensitivity.tangent.words import (
 
 __all__ = ["follow_stages"]
 
-NOISE = 1e-9
-"""Correction of derivatives of rates, over the largest of them, below which it may be round-off [-]."""
-
 
 def n_stage_numbers(K: Kernel) -> int:
     """How many numbers the unknowns of all stages are."""
@@ -129,9 +126,6 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
             for j in range(n):
                 change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
                 largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
-        if change > before and change > NOISE * largest:  # the matrices of the middle stage do not lead there
-            restore_stages(K)
-            return NOT_FOLLOWED
         if are_corrected(change, before, largest):
             break
         before = change
