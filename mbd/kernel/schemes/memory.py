@@ -35,10 +35,11 @@ def accept_step(K: Steps, h: float) -> None:
     K.q[: K.n_q] = K.q1[: K.n_q]
     for i in range(K.n):
         K.y[i] = K.y1[i]
-        K.peak[i] = max(abs(K.y1[i]), PEAK_KEPT * K.peak[i])
         K.slope[i] = (K.rate1[i] - K.rate[i]) * inverse
         K.rate[i] = K.rate1[i]
         K.aux[i] = K.aux1[i]
+    for i in range(K.n_v if K.second_look > 0 else 0):
+        K.peak[i] = max(abs(K.y1[i]), PEAK_KEPT * K.peak[i])
     for k in range(K.n_rows):
         K.lam_slope[k] = (K.lam1[k] - K.lam[k]) * inverse
         K.lam[k] = K.lam1[k]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -131,7 +132,8 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     notes += _uncounted(run, record)
     columns = ModelColumns(record, equations)
     notes += idle_modes(run, record, columns)
-    notes += position_level_multipliers(run, record, columns)
+    if getattr(run.integrator, "formulation", "") == "index3":
+        notes.append(partial(position_level_multipliers, record, columns))  # which takes longer than a short run
     turned = half_turns(columns)
     notes, doubts = [*notes, *turned], doubts + turned
     for number, contact in enumerate(run.manager.contacts):
