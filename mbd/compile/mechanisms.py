@@ -31,7 +31,8 @@ _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept]] = WeakKe
 _TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept]] = WeakKeyDictionary()
 _BY_WORDS: OrderedDict[Hashable, Mechanism] = OrderedDict()
 """The mechanisms that were asked for last, by what their models say."""
-MOST_BY_WORDS = 4
+MAX_KEPT_BY_WORDS = 4
+"""How many of them: each may hold arrays of 32 MB for the runs that follow."""
 _LOCK = threading.Lock()
 free_in_child(_LOCK)
 
@@ -147,7 +148,7 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
         if key[-1]:
             _BY_WORDS[key] = made
             _BY_WORDS.move_to_end(key)
-            while len(_BY_WORDS) > MOST_BY_WORDS:
+            while len(_BY_WORDS) > MAX_KEPT_BY_WORDS:
                 _BY_WORDS.popitem(last=False)
     return made
 

@@ -193,6 +193,6 @@ def test_named_points_gravity_and_names_of_inputs_count():
 
 
 def test_only_the_last_few_are_kept():
-    for k in range(3 * mechanisms.MOST_BY_WORDS):
+    for k in range(3 * mechanisms.MAX_KEPT_BY_WORDS):
         mechanism_of(rod(1.0 + 0.1 * k))
-    assert len(mechanisms._BY_WORDS) == mechanisms.MOST_BY_WORDS
+    assert len(mechanisms._BY_WORDS) == mechanisms.MAX_KEPT_BY_WORDS

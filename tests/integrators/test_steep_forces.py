@@ -1,4 +1,4 @@
-"""Forces far steeper than a step resolves: runs are right or end by name, and none goes on along another solution."""
+"""Forces far steeper than a step resolves: a run is right, or fails with an error, or says that dt is large."""
 
 from __future__ import annotations
 
