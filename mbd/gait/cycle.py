@@ -13,7 +13,7 @@ from mbd.arrays import ComplexArray, Vector
 from mbd.bodies.values import named_number_faults
 from mbd.dataclass import dataclass
 from mbd.errors import GaitError, ModelError
-from mbd.gait.derivatives import Derivatives, require_member
+from mbd.gait.derivatives import Derivatives, require_member, step_spans
 from mbd.gait.energies import cost_of_transport, energy_by_cause
 from mbd.gait.family import energy_of
 from mbd.gait.floquet import Multipliers
@@ -111,8 +111,8 @@ class LimitCycle:
 
     @property
     def step_times(self) -> dict[str, float]:
-        """Mean time of the steps that each foot ends, from the touchdown before [s]."""
-        return self._by_foot(list(np.diff([0.0, *(time for _, time, _ in self.steps)])))
+        """Mean time of the steps that each foot ends, from the touchdown before, whatever the section [s]."""
+        return self._by_foot(list(step_spans(np.array([time for _, time, _ in self.steps]), self.period)))
 
     def _by_foot(self, values: Sequence[float]) -> dict[str, float]:
         feet = dict.fromkeys(foot for foot, _, _ in self.steps)

@@ -23,7 +23,7 @@ from mbd.gait.map_derivative import MapDerivative, Measured, extrapolated, map_d
 from mbd.gait.return_map import Arrival
 from mbd.sensitivity.starts import unknown_name
 
-__all__ = ["Derivatives", "parameter_value"]
+__all__ = ["Derivatives", "parameter_value", "require_member", "step_spans"]
 
 BESIDE, LEVELS = 1e-3, 3
 """Change of the numbers of the map [m, rad, s, …] to where it is differentiated again, and how many, each twice the one
@@ -164,12 +164,20 @@ def _implicit(gait: Any, name: str) -> dict[str, float]:
     distance = float(way @ travel / np.linalg.norm(way)) if np.any(way) else float("nan")
     found = {"period": period, "distance": distance, "speed": (distance - gait.speed * period) / gait.period}
     feet = [foot for foot, _, _ in gait.steps]
-    spans = np.diff(np.concatenate([[0.0], times]))
+    spans = step_spans(times, period)
     for foot in dict.fromkeys(feet):
         own = [k for k, other in enumerate(feet) if other == foot]
         found[f"step length of {foot}"] = float(np.mean(lengths[own]))
         found[f"step time of {foot}"] = float(np.mean(spans[own]))
     return found
+
+
+def step_spans(times: Vector, period: float) -> Vector:
+    """Times of the steps that the touchdowns of a cycle end; the first began with the last touchdown of the one before.
+
+    Linear in both, so that derivatives of touchdowns and period give those of the steps.
+    """
+    return np.diff(np.concatenate([times[-1:] - period, times]))
 
 
 def _of_largest_multiplier(gait: Any, name: str) -> float:

@@ -141,6 +141,21 @@ def test_gaits_of_unequal_sides_are_those_of_the_cases(name):
         assert abs(by - expected[4]) < 1e-8 * max(1.0, abs(expected[4]))
 
 
+def test_step_times_and_their_derivatives_are_the_same_whatever_the_section():
+    struck, model = limping("k2-asymmetric-compass"), limping("k2-asymmetric-compass").map.model.without()
+    passing = mbd.measure(lambda mine, its: mine - its - 0.05, "left hip.angle", "right hip.angle")
+    model.constrain(mbd.Event("legs pass", passing, direction=+1))
+    how = {"parameters": struck.parameters, "functions": struck.map.functions}
+    run = mbd.simulate(model, struck.state, dt=struck.dt, until=("legs pass", 5.0))
+    passed = mbd.limit_cycle(model, run.final, section="legs pass", **how)
+    assert {name for name, *_ in passed.steps} == {name for name, *_ in struck.steps}
+    assert 0.1 < passed.steps[0][1] / passed.step_times[passed.steps[0][0]] < 0.9  # the section lies within a step
+    for foot, value in struck.step_times.items():
+        assert passed.step_times[foot] == pytest.approx(value, rel=1e-9)
+        by = [gait.derivatives[f"step time of {foot}", "slope"] for gait in (struck, passed)]
+        assert by[1] == pytest.approx(by[0], rel=1e-7)
+
+
 def symmetry(gait: mbd.LimitCycle, what: str, parameter: str = "") -> float:
     """2 (b − a)/(b + a) of the steps that foot B ends and those of A, or its derivative by a parameter."""
     values = gait.step_lengths if what == "length" else gait.step_times
