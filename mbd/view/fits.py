@@ -51,7 +51,8 @@ def _column(left: Any, right: Any, fit: Fit, name: str) -> None:
     left.legend(loc="best")
     right.axhline(0.0, color=tone(NEUTRAL), linewidth=0.8)
     band = 2.0 * factor * fit.scales[name] * fit.noise
-    right.axhspan(-band, band, color=tone(NEUTRAL), alpha=0.15)
+    if fit.degrees:
+        right.axhspan(-band, band, color=tone(NEUTRAL), alpha=0.15)
     right.plot(times, off, ".", color=tone(CYCLE[1]))
     right.set_ylabel(f"residual [{kind or '-'}]")
 

@@ -187,6 +187,38 @@ def test_fewer_values_than_parameters_determine_none():
     assert set(*one.alike) == {"rod.center", "pin loss.coefficient"} and np.isinf(list(one.errors.values())).all()
 
 
+def test_as_many_values_as_parameters_tell_nothing_of_errors(tmp_path):
+    """They are met exactly, whatever their errors: Student's distribution has no degree of freedom left."""
+    model, start = pendulum()
+    two = {"time": TIMES[[9, 29]], "pin.angle": seen()[[9, 29]] + [0.003, -0.002]}
+    fitted = mbd.fit(model, start, two, {"rod.center": 1.2, "pin loss.coefficient": 0.3}, mbd.Newmark(), 0.02)
+    assert np.max(np.abs(fitted.residuals["pin.angle"])) < 1e-6 and fitted.degrees == 0
+    assert fitted.interval("rod.center") == (-np.inf, np.inf) and np.isinf(list(fitted.errors.values())).all()
+    assert np.isfinite(list(fitted.predicted.values())).all()  # by the errors of the data, which sigma tells
+    assert "tell nothing of the errors" in repr(fitted) and fitted.alike == ()
+    fitted.plot(tmp_path / "fit.svg")
+
+
+def test_errors_are_infinite_of_all_that_may_move_together():
+    """Of a + c and b + c/20 no stiffness is known, though c moves b but little; a pair and a lone one stand apart."""
+    a, b, c, d, e, f = sympy.symbols("a:f")
+    x, y, z, w = (mbd.Coordinate(name) for name in "xyzw")
+    terms = ((a + c) * x.q**2, (b + c / 20) * y.q**2, d * e * z.q**2, f * w.q**2)
+    model = mbd.Lagrangian(
+        "oscillators", [x, y, z, w], kinetic=sum(each.v**2 for each in (x, y, z, w)) / 2, potential=sum(terms) / 2,
+        parameters=dict(zip((a, b, c, d, e, f), (2.0, 3.0, 1.5, 2.5, 1.3, 4.0), strict=True)),
+    )  # fmt: skip
+    start = mbd.assemble(model, position=dict.fromkeys("xyzw", 0.3))
+    run = mbd.simulate(model, start, mbd.Newmark(), dt=0.02, until=2.0)
+    noise = 1e-3 * np.random.default_rng(3).standard_normal((4, len(TIMES)))
+    data = {"time": TIMES} | {name: run.at(TIMES)[name] + own for name, own in zip("xyzw", noise, strict=True)}
+    guess = {"a": 2.1, "b": 2.9, "c": 1.4, "d": 2.4, "e": 1.4, "f": 3.8}
+    fitted = mbd.fit(model, start, data, guess, mbd.Newmark(), 0.02)
+    assert sorted(map(sorted, fitted.alike)) == [["a", "b", "c"], ["d", "e"]]
+    assert [name for name, error in fitted.errors.items() if np.isfinite(error)] == ["f"]
+    assert fitted.degrees == 4 * len(TIMES) - 4
+
+
 def test_bounds_hold_and_values_may_be_missing():
     values = seen()
     values[::3] = np.nan

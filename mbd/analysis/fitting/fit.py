@@ -8,6 +8,7 @@ from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.analysis.fitting.data import Data
 from mbd.arrays import Matrix, Vector
@@ -15,7 +16,7 @@ from mbd.assembly.changed_start import changed_start, start_names
 from mbd.bodies.values import is_number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
-from mbd.equal import HALF_PRECISION_RTOL
+from mbd.equal import DIRECT_PIVOT_RTOL, HALF_PRECISION_RTOL
 from mbd.errors import MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.later import later
@@ -48,12 +49,14 @@ class Fit:
     ----------
     values : estimates by name
     errors : their standard errors, s √((JᵀJ)⁻¹)ᵢᵢ with s² the sum of squares over its degrees of freedom; infinite for
-        those that the data cannot tell apart
+        those that the data cannot tell apart, and for all without degrees of freedom
     predicted : standard errors √((JᵀJ)⁻¹)ᵢᵢ if the scales `sigma` of the data are their true errors
     correlation : of the estimates (P, P)
     alike : groups of names whose effects on the data cannot be told apart
     residuals : measured less computed, over the scale of its column, by name
-    noise : s, the size of the residuals [-]; converged, message : of the search; runs : made for it
+    noise : s, the size of the residuals [-]; infinite, since unknown, without degrees of freedom
+    degrees : of freedom: values less the parameters that they can tell apart [-]
+    converged, message : of the search; runs : made for it
     times : of the residuals, by name [s]; scales : that they are divided by
     run : the run with the estimates
     """
@@ -380,33 +383,32 @@ class _Search:
         """What the search has found."""
         run = self.made(found.x)
         assert run is not None
-        degrees = len(found.fun) - len(found.x)
-        noise = float(np.sqrt(np.sum(found.fun**2) / max(degrees, 1)))
         sizes = np.linalg.norm(found.jac, axis=0)
         scaled = found.jac / np.where(sizes > 0.0, sizes, 1.0)
         _, strengths, directions = np.linalg.svd(scaled)
         strengths = np.pad(strengths, (0, len(directions) - len(strengths)))
         weak = strengths <= HALF_PRECISION_RTOL * max(strengths[0], 1e-300)
-        groups, unknown = [], np.zeros(len(found.x), dtype=bool)
-        for line in directions[weak]:
-            members = np.abs(line) > 0.1
-            groups.append(tuple(name for name, is_in in zip(self.names, members, strict=True) if is_in))
-            unknown |= members
+        degrees = len(found.fun) - int(np.count_nonzero(~weak))
+        noise = math.sqrt(float(np.sum(found.fun**2)) / degrees) if degrees else math.inf
+        free, groups = _told_apart(directions[weak])
         covariance = (directions.T * np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, strengths) ** 2)) @ directions
         deviation = np.sqrt(np.diag(covariance))
-        errors = np.where(unknown | (sizes == 0.0), np.inf, deviation / np.where(sizes > 0.0, sizes, 1.0))
+        errors = np.where(free, np.inf, deviation / np.where(sizes > 0.0, sizes, 1.0))
         times = {name: seen[0] for name, seen in self.data.columns.items()}
         times |= {name: np.array([instant]) for name, instant in self.data.events.items()}
         return Fit(
             dict(zip(self.names, map(float, found.x), strict=True)),
             dict(zip(self.names, map(float, np.where(np.isinf(errors), np.inf, noise * errors)), strict=True)),
             dict(zip(self.names, map(float, errors), strict=True)),
-            covariance / np.maximum(np.outer(deviation, deviation), 1e-300), tuple(groups), self._by_name(found.fun),
-            times, self.data.scales, noise, found.status > 0, self._said(found.message), self.runs, degrees, run,
+            covariance / np.maximum(np.outer(deviation, deviation), 1e-300),
+            tuple(tuple(self.names[k] for k in group) for group in groups), self._by_name(found.fun), times,
+            self.data.scales, noise, found.status > 0, self._said(found.message, degrees), self.runs, degrees, run,
         )  # fmt: skip
 
-    def _said(self, message: str) -> str:
-        """Why the search ended; how exact its runs are where their steps differ."""
+    def _said(self, message: str, degrees: int) -> str:
+        """Why the search ended; that nothing is left over to tell errors; how exact runs are whose steps differ."""
+        if not degrees:
+            message += f" As few as {self.data.count} values tell nothing of the errors of estimates."
         return message if self.tol is None else f"{message} Steps follow tol={self.tol:g} and are held in derivatives."
 
     def _by_name(self, residuals: Vector) -> dict[str, Vector]:
@@ -414,6 +416,21 @@ class _Search:
         lengths = [len(seen) for _, seen in self.data.columns.values()] + [1] * len(self.data.events)
         parts = np.split(-residuals, np.cumsum(lengths)[:-1])
         return dict(zip([*self.data.columns, *self.data.events], parts, strict=True))
+
+
+def _told_apart(nothing: Matrix) -> tuple[NDArray[np.bool_], list[list[int]]]:
+    """Which parameters move along directions that leave the data as they are (k, P), and those that do so together.
+
+    Any basis of these directions will do: what counts is the projection on them.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    share = np.linalg.norm(nothing, axis=0)
+    free = share > DIRECT_PIVOT_RTOL
+    beside = np.abs(nothing.T @ nothing) > DIRECT_PIVOT_RTOL * np.outer(share, share)
+    number, group = connected_components(beside & np.outer(free, free))
+    groups = [np.flatnonzero(free & (group == k)).tolist() for k in range(number)]
+    return free, [members for members in groups if members]
 
 
 def order_of(run: Trajectory | None) -> list[tuple[str, str]]:
