@@ -206,11 +206,12 @@ def _source(
     problem: Any, names: tuple[str, ...], guess: Vector, settings: tuple[Any, ...], functions: Functions, backend: str
 ) -> Source:
     """Where the numbers come from."""
+    scales = {name: abs(float(value)) or 1.0 for name, value in zip(names, guess, strict=True)}
     if isinstance(problem, Model | Lagrangian):
         start, integrator, dt, tol, until = settings
         if until is None:
             raise ModelError("a run needs until=: a time [s], or the name of an event; a gait needs none")
-        return RunSource(problem, start, integrator, dt, tol, until, functions, names, backend)
+        return RunSource(problem, start, integrator, dt, tol, until, functions, scales, backend)
     if not isinstance(problem, LimitCycle) and (not callable(problem) or isinstance(problem, type)):
         raise ModelError(
             "problem must be a model, a gait of mbd.limit_cycle, or a function of the unknowns by name, not "
@@ -221,8 +222,7 @@ def _source(
     if mine:
         raise ModelError(f"{', '.join(mine)}: for the runs of a model, which the problem is not, but {shown(problem)}")
     if isinstance(problem, LimitCycle):
-        return GaitSource(problem, names)
-    scales = {name: abs(float(value)) or 1.0 for name, value in zip(names, guess, strict=True)}
+        return GaitSource(problem, scales)
     return FunctionSource(problem, scales)
 
 

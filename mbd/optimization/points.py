@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,18 +13,23 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
 from mbd.dataclass import dataclass
+from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import GaitError, MbdError, ModelError, SimulationError, UnknownNameError, nearest
 from mbd.gait.cycle import LimitCycle
 from mbd.gait.derivatives import parameter_value
 from mbd.sensitivity.result import Sensitivities
 from mbd.simulation.interrupted import stopped
 
-__all__ = ["FunctionSource", "GaitSource", "Point", "Source", "gait_numbers"]
+__all__ = ["FunctionSource", "GaitSource", "Point", "Source", "gait_numbers", "slope_by_differences"]
 
 DIFFERENCE_STEP = 1e-3
-"""Difference of an unknown, over its value or 1, at which numbers without derivatives are found again [-]."""
+"""Difference of an unknown, over its value or its scale, at which numbers without derivatives are found again [-]."""
 SMOOTH_DIFFERENCE_STEP = 1e-5
 """The same for a user's function of numbers alone."""
+CENTRAL = {2: (1.0,), 4: (4.0 / 3.0, -1.0 / 3.0), 6: (1.5, -0.6, 0.1)}
+"""Weights of the slopes of central differences h, 2h, 3h, by their order [-]."""
+WIDER = 100.0
+"""Factor by which a difference grows that changes a number by its round-off alone [-]."""
 
 
 @dataclass(eq=False)
@@ -72,6 +78,29 @@ def failed(values: Mapping[str, float], error: Exception) -> Point:
     return Point(values, outcome=text, made=run if gait is None else gait, error=error)
 
 
+def slope_by_differences(
+    number: Callable[[float], float], value: float, scale: float, share: float, order: int
+) -> float:
+    """The derivative of a number by an unknown: central differences h, 2h, 3h, of order 2, 4 or 6.
+
+    h is that share of the value. Where the value is far below the scale of the unknown, the number may change by no
+    more than its round-off: there h grows, up to the same share of the scale.
+    """
+    known: dict[float, tuple[float, float]] = {}
+
+    def ends(h: float) -> tuple[float, float]:
+        if h not in known:
+            known[h] = number(value + h), number(value - h)
+        return known[h]
+
+    most = share * max(abs(value), scale)
+    h = share * abs(value) or most
+    while h < most and abs(np.subtract(*ends(h))) <= HALF_PRECISION_RTOL * max(map(abs, ends(h))):
+        h = min(WIDER * h, most)
+    slopes = [(ends(k * h)[0] - ends(k * h)[1]) / (2.0 * k * h) for k in range(1, order // 2 + 1)]
+    return float(np.dot(CENTRAL[order], slopes))
+
+
 # gaits --------------------------------------------------------------------------------------------------------------
 def gait_numbers(gait: LimitCycle) -> dict[str, float]:
     """Numbers of a gait by name: its `scalars`, and the cost of transport."""
@@ -87,12 +116,11 @@ class GaitSource(Source):
 
     kind = "number of the gait"
 
-    def __init__(self, gait: LimitCycle, unknowns: Sequence[str]) -> None:
+    def __init__(self, gait: LimitCycle, scales: Mapping[str, float]) -> None:
         if not gait.success:
             raise GaitError(f"there is no gait to begin with: {gait.outcome}", gait)
-        first = {name: parameter_value(gait, name) for name in unknowns}
-        self.known = [(first, gait)]
-        self.scales = {name: abs(value) or 1.0 for name, value in first.items()}
+        self.known = [({name: parameter_value(gait, name) for name in scales}, gait)]
+        self.scales = scales
 
     def check(self, name: str) -> None:
         """Its numbers are those of the gait to begin with."""
@@ -107,7 +135,7 @@ class GaitSource(Source):
         except (GaitError, SimulationError) as error:
             return failed(values, error)
         self.known.append((dict(values), gait))
-        return gait_point(gait, values)
+        return gait_point(gait, values, self.scales)
 
     def _reached(self, values: Mapping[str, float]) -> LimitCycle:
         """The gait, with its way there cut into halves, quarters, … as long as that helps."""
@@ -142,7 +170,7 @@ def _index(gait: LimitCycle) -> float:
     return float(np.sign(np.prod(1.0 - np.asarray(gait.multipliers)).real))
 
 
-def gait_point(gait: LimitCycle, values: Mapping[str, float]) -> Point:
+def gait_point(gait: LimitCycle, values: Mapping[str, float], scales: Mapping[str, float]) -> Point:
     """The numbers of a gait; their derivatives are those of the gait, differences where it has none."""
     names, known = list(values), dict[str, Vector]()
 
@@ -150,21 +178,20 @@ def gait_point(gait: LimitCycle, values: Mapping[str, float]) -> Point:
         if number not in known:
             own = number in gait.scalars
             known[number] = np.array([
-                gait.derivatives[number, name] if own else _difference(gait, number, name) for name in names
+                gait.derivatives[number, name] if own else _difference(gait, number, name, scales[name])
+                for name in names
             ])  # fmt: skip
         return known[number]
 
     return Point(values, gait_numbers(gait), "", slope_of, gait)
 
 
-def _difference(gait: LimitCycle, number: str, name: str) -> float:
+def _difference(gait: LimitCycle, number: str, name: str, scale: float) -> float:
     """Of gaits found again beside this one, to the fourth order."""
-    value, slopes = parameter_value(gait, name), []
-    for factor in (1.0, 2.0):
-        h = factor * DIFFERENCE_STEP * (abs(value) or 1.0)
-        ends = [gait_numbers(gait.at({name: value + sign * h}))[number] for sign in (1.0, -1.0)]
-        slopes.append((ends[0] - ends[1]) / (2.0 * h))
-    return float((4.0 * slopes[0] - slopes[1]) / 3.0)
+    return slope_by_differences(
+        lambda value: gait_numbers(gait.at({name: value}))[number], parameter_value(gait, name), scale,
+        DIFFERENCE_STEP, 4,
+    )  # fmt: skip
 
 
 # functions ----------------------------------------------------------------------------------------------------------
@@ -192,7 +219,7 @@ class FunctionSource(Source):
         except MbdError as error:
             return failed(values, error)
         if isinstance(found, LimitCycle):
-            point = gait_point(found, values) if found.success else failed(values, GaitError("", found))
+            point = gait_point(found, values, self.scales) if found.success else failed(values, GaitError("", found))
         elif isinstance(found, Sensitivities):
             point = table_point(found, values)
         elif isinstance(found, Mapping) and all(isinstance(k, str) and is_number(v) for k, v in found.items()):
@@ -207,12 +234,13 @@ class FunctionSource(Source):
         return point
 
     def _slopes(self, point: Point, name: str) -> Vector:
-        slopes = []
-        for unknown, value in point.values.items():
-            h = SMOOTH_DIFFERENCE_STEP * (abs(value) or self.scales[unknown])
-            ends = [float(self.function({**point.values, unknown: value + sign * h})[name]) for sign in (1.0, -1.0)]
-            slopes.append((ends[0] - ends[1]) / (2.0 * h))
-        return np.array(slopes)
+        def number(unknown: str, value: float) -> float:
+            return float(self.function({**point.values, unknown: value})[name])
+
+        return np.array([
+            slope_by_differences(partial(number, unknown), value, self.scales[unknown], SMOOTH_DIFFERENCE_STEP, 2)
+            for unknown, value in point.values.items()
+        ])  # fmt: skip
 
 
 def table_point(found: Sensitivities, values: Mapping[str, float]) -> Point:

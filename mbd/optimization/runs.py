@@ -12,7 +12,7 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError, ModelError, TraceError, UnknownNameError
 from mbd.integrators import Integrator
-from mbd.optimization.points import DIFFERENCE_STEP, Point, Source, failed, table_point
+from mbd.optimization.points import DIFFERENCE_STEP, Point, Source, failed, slope_by_differences, table_point
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.sensitivities import sensitivities
 from mbd.sensitivity.starts import unknown_name
@@ -37,7 +37,7 @@ class RunSource(Source):
     tol: float | None
     until: Any
     functions: Functions
-    unknowns: tuple[str, ...]
+    scales: Mapping[str, float]
     backend: str
     kind = "result"
 
@@ -56,10 +56,10 @@ class RunSource(Source):
         begins = start_names(mechanism)
         known = {*declared, *begins, *self.functions}
         what = "parameter, function of parameters, coordinate or rate of the start"
-        wrong = [unknown_name(mechanism.equations, name, known, what) for name in self.unknowns if name not in known]
+        wrong = [unknown_name(mechanism.equations, name, known, what) for name in self.scales if name not in known]
         if wrong:
             raise UnknownNameError(wrong)
-        self.of_start = [name for name in self.unknowns if name in begins and name not in {*declared, *self.functions}]
+        self.of_start = [name for name in self.scales if name in begins and name not in {*declared, *self.functions}]
 
     def check(self, name: str) -> None:
         """Results are known when a run has been made: events happen or not."""
@@ -108,15 +108,13 @@ class RunSource(Source):
         try:
             given = {key: tape.lift(each) for key, each in function(node).items()}
         except TraceError:  # of math instead of mbd
-            return {key: _numerical(function, key, value) for key in function(value)}
+            return {key: (float(function(value)[key]), self._slope(name, key, value)) for key in function(value)}
         at: dict[Any, float] = {("p", 0): value}
         return {
             key: (evaluate([each], at)[0], evaluate(jvp([each], {node: 1.0}), at)[0]) for key, each in given.items()
         }
 
-
-def _numerical(function: Callable[[Any], Mapping[str, Any]], key: str, value: float) -> tuple[float, float]:
-    """Value and rate of a function of plain numbers, by central differences of the sixth order."""
-    h = DIFFERENCE_STEP * (abs(value) or 1.0)
-    slopes = [(function(value + k * h)[key] - function(value - k * h)[key]) / (2.0 * k * h) for k in (1, 2, 3)]
-    return float(function(value)[key]), float(1.5 * slopes[0] - 0.6 * slopes[1] + 0.1 * slopes[2])
+    def _slope(self, name: str, key: str, value: float) -> float:
+        """The rate of a function of plain numbers."""
+        function = self.functions[name]
+        return slope_by_differences(lambda at: float(function(at)[key]), value, self.scales[name], DIFFERENCE_STEP, 6)

@@ -10,7 +10,7 @@ import pytest
 
 import mbd
 from mbd.optimization.formula import formula
-from mbd.optimization.points import GaitSource
+from mbd.optimization.points import FunctionSource, GaitSource, slope_by_differences
 from mbd.optimization.runs import RunSource
 from tests.gait.walkers import simplest
 
@@ -131,7 +131,7 @@ def test_the_gradient_is_that_of_differences_also_of_starts_and_functions():
     own = dict(zip(values, np.eye(3), strict=True))
     points = []
     for given in (functions, plain):
-        source = RunSource(model, start, mbd.RungeKutta853(), 0.05, None, "lands", given, tuple(values), "auto")
+        source = RunSource(model, start, mbd.RungeKutta853(), 0.05, None, "lands", given, values, "auto")
         points.append(source.at(values, ["place.x", "time"]))
         reach = formula(lambda n: n["place.x"] ** 2 / n["time"] + n["slope"], "objective", lambda name: None)
         assert reach.names == ("place.x", "time", "slope")
@@ -146,6 +146,19 @@ def test_the_gradient_is_that_of_differences_also_of_starts_and_functions():
     assert points[0].slope_of("place.x") == pytest.approx(points[1].slope_of("place.x"), rel=1e-9)
 
 
+@pytest.mark.parametrize("value", [0.0, 1e-30, 1e-15, -1e-12, 1e-9, -1e-6, 1e-3, 1.0, 1e3])
+def test_differences_beside_zero_are_no_round_off(value):
+    """A thousandth of a value of 1e-12 changes 9.81 + x by nothing; x alone and its logarithm need no more."""
+    numbers = [(lambda x: 9.81 + x, 1.0), (lambda x: 3.0 * x, 3.0), (lambda x: 5.0, 0.0)]
+    numbers += [(lambda x: 2.0 + math.sin(x), math.cos(value))] * (abs(value) <= 1.0)
+    numbers += [(math.log, 1.0 / (value or 1.0))] * (value > 0.0)
+    for number, slope in numbers:
+        for share, order in ((1e-5, 2), (1e-3, 4), (1e-3, 6)):
+            assert slope_by_differences(number, value, 1.0, share, order) == pytest.approx(slope, rel=3e-7, abs=1e-12)
+    source = FunctionSource(lambda u: {"y": 9.81 + u["x"]}, {"x": 1.0})
+    assert source.at({"x": value}, ["y"]).slope_of("y") == pytest.approx([1.0], rel=3e-7)
+
+
 @cache
 def long_gait():
     model, start = simplest()
@@ -156,8 +169,8 @@ def test_a_gait_of_a_given_period_is_found_on_its_own_branch():
     """The short gait of the simplest walker is near at every slope, and of another period."""
     found = mbd.optimize(long_gait(), {"gamma": (0.009, 0.002, 0.03)}, minimize=[lambda n: n["period"] - 3.85])
     assert found.success and found["period"] == pytest.approx(3.85, abs=1e-7) and found.gait.stability == "stable"
-    point = GaitSource(long_gait(), ["gamma"]).at({"gamma": 0.008}, ["period"])
-    source = GaitSource(long_gait(), ["gamma"])
+    point = GaitSource(long_gait(), {"gamma": 0.009}).at({"gamma": 0.008}, ["period"])
+    source = GaitSource(long_gait(), {"gamma": 0.009})
     ends = [source.at({"gamma": 0.008 + h}, ["period"]).numbers["period"] for h in (1e-5, -1e-5)]
     assert point.slope_of("period") == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-5)
 
