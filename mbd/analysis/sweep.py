@@ -217,7 +217,8 @@ def sweep(
     columns = {title: tuple(row.results[k] for row in rows) for k, title in enumerate(titles)}
     success, messages = tuple(row.success for row in rows), tuple(row.message for row in rows)
     sizes = tuple((together, len(several)) for together, several in dimensions)
-    units = units_of(model, (*names, *titles), settings.get("backend", "auto"))
+    known_titles = names if isinstance(results, Mapping) else (*names, *titles)  # of a function nobody knows the unit
+    units = units_of(model, known_titles, settings.get("backend", "auto"))
     return Sweep(names, cases, columns, success, messages, complete, sizes, units)
 
 

@@ -43,6 +43,13 @@ def test_schemes_are_text_in_a_dataset():
     assert data["success"].all()
 
 
+def test_what_a_function_gives_has_no_unit_by_its_title():
+    """It may be an angle in degrees, a speed in km/h."""
+    functions = {name: lambda run: 3.6 for name in ("angle", "speed", "x", "force", "time of flight.time")}
+    assert swept({"ball.mass": [1.0]}, functions).units == {"ball.mass": "kg"}
+    assert swept({"dt": [0.05]}, ["fall.rate"]).units == {"dt": "s", "fall.rate": "m/s"}
+
+
 @given(ranges=st.dictionaries(st.sampled_from(["a", "b", "c.d"]), RANGE, min_size=1), count=st.integers(1, 33))
 def test_a_latin_hypercube_has_a_point_in_every_slice_of_every_range(ranges, count):
     [(names, values)] = mbd.latin_hypercube(ranges, count, seed=3).items()

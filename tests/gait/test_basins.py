@@ -98,6 +98,36 @@ def test_a_study_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
         study(10, file=path, workers=2)
 
 
+def test_a_file_is_of_one_start_and_one_function_of_parameters(tmp_path):
+    """Functions that agree at the gait are others all the same, and so is a start that names other coordinates."""
+
+    def steeper(by):
+        return {"slope": lambda s: {"gamma": 0.009 + by * (s - 0.009)}}
+
+    def turned(axes):
+        found = start_of(axes)
+        return {"phi.rate": found["theta.rate"], "theta.rate": found["phi.rate"], "theta": found["theta"],
+                "phi": found["phi"]}  # fmt: skip
+
+    (model, known), path = walker(), tmp_path / "basin.jsonl"
+    gaits = [
+        mbd.limit_cycle(model, known.state, section="heel strike", dt=0.1, longest=60.0, parameters={"slope": 0.009},
+                        functions=steeper(by)) for by in (1.0, 1.5)
+    ]  # fmt: skip
+    how = {"axes": {"theta": [0.2], "s": [0.0], "slope": [0.0092]}, "steps": 2, "file": path}
+
+    def slanting(axes, start=start_of):
+        return {**start(axes), "slope": axes["slope"]}
+
+    mbd.basin(model, gaits[0], start=slanting, **how)
+    before = path.read_bytes()
+    mbd.basin(model, gaits[0], start=slanting, **how)
+    assert path.read_bytes() == before
+    for gait, start in ((gaits[1], slanting), (gaits[0], lambda axes: slanting(axes, turned))):
+        with pytest.raises(mbd.ModelError, match="another basin, with other .*functions"):
+            mbd.basin(model, gait, start=start, **how)
+
+
 def test_an_interrupted_study_keeps_what_is_decided_in_its_file_too(monkeypatch, tmp_path):
     """Ctrl-C in the third return of all starts: those that the first two decided keep their outcomes."""
     from mbd.gait.basin.walks import Walks
@@ -179,6 +209,14 @@ def test_parameters_may_be_axes():
     assert found.outcome[2].startswith("falls")
     assert len(found.balls) == 3
     assert found.balls[2] == [None]
+
+
+def test_axes_that_a_start_alone_knows_have_no_unit():
+    def tilted(axes):
+        return start_of({"theta": np.radians(axes["angle"]), "s": axes["s"]})
+
+    found = mbd.basin(*walker(), {"angle": [11.0], "s": [0.0]}, start=tilted, steps=1, dt=0.2)
+    assert found.units == {} and found.to_xarray()["angle"].attrs["units"] == ""
 
 
 def test_tables_and_pictures_show_what_was_found(tmp_path):

@@ -22,11 +22,13 @@ from mbd.gait.basin.store import Store, digest_of
 from mbd.gait.basin.walks import Decided, Numbers
 from mbd.gait.cycle import LimitCycle
 from mbd.progress import share_bar
-from mbd.results.identity import identity_of_model
+from mbd.results.identity import identity, identity_of_model
 from mbd.simulation.batch.batch import worker_count
 
 __all__ = ["basin"]
 
+STATE = ("q", "v", "z", "anchors")
+"""What a state of a gait is made of, which starts have where axes do not name it."""
 BLOCK_SIZE = 8192
 """Starts that are decided together, and written to a file together."""
 
@@ -98,7 +100,8 @@ def basin(
     store = None if file is None else Store(file, _head(made, grid, steps))
     with share_bar() if bar_wanted else nullcontext() as bar:
         decided, complete = _decided(made, steps, store, bar)
-    units = units_of(model, grid.names, map_.backend)
+    own = (name for name in grid.names if name in study.places or name in study.parameters)  # others start= alone knows
+    units = units_of(model, own, map_.backend)
     return Basin(getattr(model, "name", ""), grid, tuple(gaits), decided, made.all_balls, steps, complete, units, made)
 
 
@@ -157,7 +160,8 @@ def _head(made: Made, grid: Grid, steps: int) -> dict[str, Any]:
         "steps": steps, "axes": [list(names) for names in grid.dimensions], "shape": list(grid.shape),
         "parameters": {name: float(value) for name, value in made.base.items()}, "attractors": list(made.gaits),
         "starts": digest_of(*grid.values.values(), *state.values(), *columns.values()),
-        "gaits": digest_of(*(part for each in made.gaits.values() for part in (each.state.q, each.state.v))),
+        "functions": identity(map_.functions, made.study.start),
+        "gaits": digest_of(*(getattr(each.state, part) for each in made.gaits.values() for part in STATE)),
         "values": digest_of([float(v) for v in getattr(map_.model, "parameters", {}).values()]),
     }  # fmt: skip
 
