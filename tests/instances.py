@@ -109,6 +109,12 @@ LOSSES: list[tuple[str, Callable[[], Loss]]] = [
         "valves with compressible oil",
         lambda: mbd.Valves(mbd.CompressibleDamper(3.0, 0.8, 400.0), mbd.CompressibleDamper(1.0, 0.1, 400.0)),
     ),
+    (
+        "valves with slow oil in one direction",
+        lambda: mbd.Valves(mbd.CompressibleDamper(10.0, 0.0, 400.0), mbd.CompressibleDamper(1000.0, 0.1, 400.0)),
+    ),
+    ("valves of dahl", lambda: mbd.Valves(mbd.Dahl(1.0, 400.0), mbd.Dahl(5.0, 200.0))),
+    ("valves of lugre", lambda: mbd.Valves(mbd.LuGre(3.0, 2.0, 0.5, 4e2, 0.01), mbd.LuGre(6.0, 5.0, 0.5, 4e2, 0.01))),
     ("viscous and quadratic", lambda: mbd.Viscous(0.7) + mbd.Quadratic(0.4)),
 ]
 

@@ -8,11 +8,11 @@ from typing import Any
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.errors import ModelError
-from mbd.joints.losses.base import Loss, LossSum, without_states
+from mbd.joints.losses.base import Loss, without_states
 from mbd.joints.losses.isotropic import isotropic
 from mbd.tape.node import Scalar
 
-__all__ = ["friction_of", "has_dry_part", "resistance"]
+__all__ = ["friction_of", "resistance"]
 
 
 def friction_of(value: Any, name: str) -> float | Loss | None:
@@ -36,15 +36,6 @@ def friction_of(value: Any, name: str) -> float | Loss | None:
     return number(value, f"friction of '{name}'")
 
 
-def has_dry_part(loss: Loss) -> bool:
-    """Whether a part of it truly sticks."""
-    parts = loss.losses if isinstance(loss, LossSum) else (loss,)
-    return any(part.smooth is not part for part in parts)
-
-
 def resistance(loss: Loss, push: Scalar, speeds: Sequence[Scalar], scope: Scope, owner: str) -> list[Scalar]:
     """Forces on the mechanism along one slip, or two that are perpendicular: −p F(‖γ‖) γ/‖γ‖, F of the smooth part."""
-    smooth = loss.smooth
-    if smooth is None:
-        return [0.0 for _ in speeds]
-    return [-push * part for part in isotropic(smooth, speeds, scope, owner)]
+    return [-push * part for part in isotropic(loss, speeds, scope, owner)]

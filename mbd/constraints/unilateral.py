@@ -11,7 +11,7 @@ from mbd.bodies.domains import Domain
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
-from mbd.constraints.contact_friction import friction_of, has_dry_part, resistance
+from mbd.constraints.contact_friction import friction_of, resistance
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.law import Closing, Equation, Hold, Law, Rubbing
 from mbd.constraints.measure import Measure, gap_of
@@ -119,7 +119,7 @@ class Unilateral(Constraint):
                 for part, slip in self.measure.slip_velocities(scope)
             ]
             loss = self.friction
-            rows += slips if not isinstance(loss, Loss) or has_dry_part(loss) else []
+            rows += slips if not isinstance(loss, Loss) or loss.sticks else []
             if isinstance(loss, Loss) and loss.smooth is not None:
                 rubbing = Rubbing(slips, partial(self._resistance, scope, loss))
         if self.spins:

@@ -10,6 +10,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import is_number, name_of
 from mbd.dataclass import dataclass
+from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import Loss, loss_of, rates_of
@@ -28,7 +29,12 @@ class Damper(Force):
     ----------
     name : its name
     a, b : its end frames
-    loss : a number c [N s/m], which is Viscous(c), or any loss (an orifice, a table)
+    loss : a number c [N s/m], which is Viscous(c), or any loss that does not truly stick (an orifice, a table)
+
+    Raises
+    ------
+    ModelError
+        for a loss that truly sticks, which only a joint or a contact can hold.
     """
 
     name: str
@@ -45,6 +51,11 @@ class Damper(Force):
         given: Any = self.loss
         loss = Viscous(given) if is_number(given) else loss_of(given, self.name)
         object.__setattr__(self, "loss", loss if loss is not None else loss_of("None", self.name))
+        if self.law.sticks:
+            raise ModelError(
+                f"loss of Damper '{self.name}' truly sticks, {self.law!r}, which takes a joint or a contact: give it a "
+                "smoothing, as mbd.Coulomb(T, smoothing=0.01), or connect a mbd.Prismatic along the line with this loss"
+            )
 
     @property
     def law(self) -> Loss:

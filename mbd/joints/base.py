@@ -179,7 +179,7 @@ class Joint(Parameterized, ABC):
         alone = len(self.freedoms) == 1 or self.is_isotropic
         each = {self.freedoms[place].name: loss for place, _, loss in self.losses()}
         for label, loss in each.items():
-            if loss.smooth is loss or loss.smooth == loss:
+            if not loss.sticks:
                 continue
             rest = {**each, label: loss.smooth}
             kept = {name: value for name, value in rest.items() if value is not None} or None

@@ -163,6 +163,17 @@ def test_forces_between_one_body_are_faults():
     assert "does nothing" in mbd.Damper("d", ROD.start, ROD.end, 1.0).faults()[0]
 
 
+@pytest.mark.parametrize(
+    "loss",
+    [mbd.Coulomb(2.0), mbd.Stribeck(3.0, 2.0, 0.1), mbd.PinFriction(0.3, 0.02), mbd.Viscous(1.0) + mbd.Coulomb(2.0)],
+)
+def test_a_damper_of_a_loss_that_truly_sticks_is_refused(loss):
+    """A force has no row that could hold it: the loss would take nothing."""
+    with pytest.raises(ModelError, match="truly sticks.*smoothing"):
+        mbd.Damper("d", GROUND.origin, BALL.origin, loss)
+    mbd.Damper("d", GROUND.origin, BALL.origin, mbd.Coulomb(2.0, smoothing=0.1) + mbd.Viscous(1.0))
+
+
 def test_forces_are_values():
     spring = mbd.Spring("spring", GROUND.origin, BALL.origin, stiffness=10.0, length=1.0)
     assert pickle.loads(pickle.dumps(spring)) == spring

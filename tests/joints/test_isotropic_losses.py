@@ -56,3 +56,19 @@ def test_at_rest_it_is_none_and_losses_by_label_keep_their_axis():
     run = mbd.simulate(model, start, mbd.HHT(), dt=1e-3, until=0.05)
     rate = run["hip.angular_velocity.y"]
     np.testing.assert_allclose(run["hip loss.angular_velocity.y.torque"], -0.3 * np.abs(rate) * rate, rtol=1e-12)
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_friction_of_one_kind_that_sticks_and_that_is_smooth_keep_their_numbers(space):
+    """In a sum for a contact, in any order, and where a run changes the second of them."""
+    ends = []
+    dry, smooth = mbd.Coulomb(0.1), mbd.Coulomb(0.2, smoothing=1e-3)
+    for loss, name in (dry + smooth, "coulomb 2"), (smooth + dry, "coulomb"):
+        model, body = mbd.Model("slide"), mbd.PointMass("body", 1.0)
+        model.connect(mbd.Translation("at", model.ground.origin, body.origin, **({"axes": "xyz"} if space else {})))
+        model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin), friction=loss))
+        start = mbd.assemble(model, closed=["foot"], velocity={"at.x": 2.0})
+        changed = {f"foot friction.{name}.torque": 0.4}
+        run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-2, until=0.2, parameters=changed)
+        ends.append(run.final["at.x.rate"])
+    np.testing.assert_allclose(ends, 2.0 - 0.5 * 9.81 * 0.2, rtol=1e-5)

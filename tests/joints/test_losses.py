@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 import sympy
 
@@ -81,3 +82,33 @@ def test_negative_coefficients_are_faults():
 def test_a_number_is_no_loss_to_add():
     with pytest.raises(TypeError):
         mbd.Viscous(0.1) + 0.1
+
+
+def test_equal_valves_with_memory_are_one_loss():
+    """Oil, hysteresis and bristles give the same force through one valve or through two equal ones."""
+
+    def stroke(loss):
+        model, body = mbd.Model("stroke"), mbd.PointMass("body", 1.0)
+        rail = mbd.Prismatic("rail", model.ground.origin, body.origin, loss=loss)
+        model.connect(rail)
+        model.constrain(mbd.Bilateral("drive", rail, lambda t: 0.05 * mbd.sin(7.0 * t)))
+        run = mbd.simulate(model, mbd.assemble(model, velocity={"rail.rate": 0.35}), mbd.RadauIIA(), dt=2e-3, until=2.0)
+        return run["rail loss.force"][-1], run["rail loss.deflection"][-1], run.energy["rail loss"][-1]
+
+    for loss in mbd.CompressibleDamper(3.0, 0.8, 40.0), mbd.Dahl(3.0, 400.0), mbd.LuGre(3.0, 2.0, 0.5, 400.0, 0.8):
+        alone, twice = stroke(loss), stroke(mbd.Valves(loss, loss))
+        np.testing.assert_allclose(twice, alone, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("backward", "forward"),
+    [
+        (mbd.Dahl(1.0, 400.0), mbd.Viscous(1.0)),
+        (mbd.Dahl(1.0, 400.0), mbd.CompressibleDamper(1.0, 0.0, 400.0)),
+        (mbd.Dahl(1.0, 400.0) + mbd.Viscous(1.0), mbd.Dahl(1.0, 400.0) + mbd.Viscous(1.0)),
+        (mbd.Valves(mbd.Dahl(1.0, 4e2), mbd.Dahl(1.0, 4e2)), mbd.Valves(mbd.Dahl(1.0, 4e2), mbd.Dahl(1.0, 4e2))),
+    ],
+)
+def test_valves_of_unlike_memories_are_refused(backward, forward):
+    with pytest.raises(ModelError, match="share one deflection"):
+        mbd.Valves(backward, forward)

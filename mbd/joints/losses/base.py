@@ -84,6 +84,11 @@ class Loss(ABC):
         """What is left of it without friction that truly sticks; None where that is all of it."""
         return self if type(self).dry is Loss.dry else None
 
+    @property
+    def sticks(self) -> bool:
+        """Whether a part of it truly sticks."""
+        return self.smooth is not self
+
     def domains(self) -> dict[str, Domain]:
         """Domains of its fields: all of them ≥ 0, unless a loss says otherwise."""
         return dict.fromkeys(self.fields(), DISSIPATES)
@@ -183,6 +188,11 @@ class LossSum(Loss):
         """Those of its parts that are smooth, with the names of their parameters."""
         parts = tuple(part for loss in self.losses if (part := loss.smooth) is not None)
         return LossSum(parts) if parts else None
+
+    @property
+    def sticks(self) -> bool:
+        """Whether one of its parts does."""
+        return any(loss.sticks for loss in self.losses)
 
     def fields(self) -> dict[str, float]:
         """The fields of its parts: 'viscous.coefficient', …"""
