@@ -119,7 +119,7 @@ def roughly(K: Model) -> float:
     return 16.0 if K.blur <= 256.0 * EPS else 1.0
 
 
-def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
+def is_below_floors(K: Equations, o_r: int, m: int, both: int) -> bool:
     """Whether a residual that falls no more is round-off beside what `stepping.scales` tells of forces that vanish.
 
     Scales, which were raised to terms at the iterate, are those with their floors then.
@@ -130,7 +130,7 @@ def is_below_floors(K: Motion, o_r: int, m: int, both: int) -> bool:
     return residual_size(K, o_r, 0, 0.0, 0.0, K.tolerance, both) <= 1.0
 
 
-def weigh_by_accelerations(K: Motion) -> bool:
+def weigh_by_accelerations(K: Equations) -> bool:
     """Weigh residuals by forces as large as the accelerations at the iterate ask for, until `restore_scales`.
 
     Returns whether the scales that were noted are round-off beside them.

@@ -22,7 +22,7 @@ from mbd.kernel.records import (
     Reals,
 )
 from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
-from mbd.kernel.stepping.scales import note_extent
+from mbd.kernel.stepping.scales import load_accepted, note_extent, restore_iterate
 
 __all__ = [
     "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
@@ -140,11 +140,13 @@ def weigh(K: Model) -> None:
 def raise_scales(K: Equations, rows: bool) -> None:
     """Magnitudes at the state now in the block where they exceed those known; where a force passes zero it has none.
 
-    Those of rows, by which gaps are judged too, only on demand and as far as coordinates may grow in a step: a state
-    far ahead says nothing of the round-off here.
+    Those of rows, by which gaps are judged too, only on demand and as far as coordinates may grow in a step from the
+    accepted state: a state far ahead says nothing of the round-off here, nor does one from which the motion began.
     """
     known = K.n + 2 * K.n_rows
     K.work[:known] = K.scale[:known]
+    if rows and K.n_rows > 0:
+        raise_to_accepted(K)
     refresh_scales(K)
     for i in range(known):
         if i < K.n:
@@ -154,6 +156,15 @@ def raise_scales(K: Equations, rows: bool) -> None:
         else:
             K.scale[i] = K.work[i]
     weigh(K)
+
+
+def raise_to_accepted(K: Equations) -> None:
+    """Magnitudes of rows in K.work up to those of the accepted positions and velocities."""
+    load_accepted(K)
+    refresh_scales(K)
+    restore_iterate(K)
+    for i in range(K.n, K.n + 2 * K.n_rows):
+        K.work[i] = max(K.work[i], K.scale[i])
 
 
 def largest_force(K: Model) -> float:

@@ -25,7 +25,10 @@ from mbd.kernel.codes import ACCELERATIONS, SCALES
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Motion
 
-__all__ = ["FORCE_ULPS", "HORIZON_STEPS", "add_force_floors", "note_extent", "size_of", "still_energy", "still_speed"]
+__all__ = [
+    "FORCE_ULPS", "HORIZON_STEPS", "add_force_floors", "load_accepted", "note_extent", "restore_iterate", "size_of",
+    "still_energy", "still_speed",
+]  # fmt: skip
 
 HORIZON_STEPS = 1000.0
 """Steps in which the least force that counts would move a coordinate by its own size [-]."""
@@ -79,14 +82,32 @@ def still_energy(K: Motion) -> float:
     return energy
 
 
-def add_force_floors(K: Motion, part: float) -> None:
-    """Raise K.scale of forces to a part of their floors; K.acc is overwritten by that at the state in the block.
+def load_accepted(K: Equations) -> None:
+    """The accepted positions and velocities into the block; those of an iterate, there until now, into K.work."""
+    kept = K.n + 2 * K.n_rows  # before it are magnitudes
+    K.work[kept : kept + K.n_v] = K.block[K.o_x : K.o_x + K.n_v]
+    K.work[kept + K.n_v : kept + K.n_v + K.n] = K.block[K.o_v : K.o_v + K.n]
+    K.block[K.o_x : K.o_x + K.n_v] = 0.0
+    K.block[K.o_v : K.o_v + K.n] = K.y[: K.n]
 
-    The block is at an iterate, which may be thrown far away: floors are those of the accepted velocities and of the
-    scales in K.known, as `note_scales` leaves them. With a part of `FORCE_ULPS` ε over a tolerance, a residual of
-    round-off passes at that tolerance.
+
+def restore_iterate(K: Equations) -> None:
+    """Those of `load_accepted` back into the block."""
+    kept = K.n + 2 * K.n_rows
+    K.block[K.o_x : K.o_x + K.n_v] = K.work[kept : kept + K.n_v]
+    K.block[K.o_v : K.o_v + K.n] = K.work[kept + K.n_v : kept + K.n_v + K.n]
+
+
+def add_force_floors(K: Equations, part: float) -> None:
+    """Raise K.scale of forces to a part of their floors; K.acc is overwritten by that at the accepted state.
+
+    The block is at an iterate, which may be thrown far away: floors are those of the accepted state and of the scales
+    in K.known, as `note_scales` leaves them. With a part of `FORCE_ULPS` ε over a tolerance, a residual of round-off
+    passes at that tolerance.
     """
+    load_accepted(K)
     call(K, ACCELERATIONS, K.acc)
+    restore_iterate(K)
     note_way(K)
     n = K.n
     energy = 0.0
