@@ -115,6 +115,7 @@ def _rows(found: Faults, run: mbd.Trajectory, model: mbd.Model, told: Readings, 
         if smooth:
             steps.crossings(found, everywhere)
             steps.impacts(found, everywhere, run, told["kinetic_energy"])
+        steps.openings(found, everywhere, run, 10.0 * laws.HELD * laws.size_of(everywhere))
     chosen = _choice(run, len(told))
     bodies = Bodies(model, told.part(chosen))
     there = found.at(bodies.told.time)
