@@ -109,6 +109,10 @@ def radau_accept(K: SingularSteps, h: float) -> None:
 def radau_step(K: Kernel, h: float, t1: float) -> int:
     """Candidate state (q1, y1, rate1, aux1, lam1) after a step of size h; the accepted state is untouched."""
     m = K.n_active
+    if is_differentiated():
+        status = follow_stages(K, h, t1, m)
+        if status != NOT_FOLLOWED:
+            return status
     if m > 0 and spans_singularity(K, h):
         return singular_stages_step(K, h, t1)
     K.near_singular = 0
@@ -134,10 +138,6 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
 
 def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
     """The same with one pair of matrices for all stages, from a prediction or from the stages that are there."""
-    if is_differentiated():
-        status = follow_stages(K, h, t1, m)
-        if status != NOT_FOLLOWED:
-            return status
     c = K.stages[MU_REAL] * h
     hold_block(K)
     if predicts:

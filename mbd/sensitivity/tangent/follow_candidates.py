@@ -61,6 +61,8 @@ def carry_candidate(K: Kernel, out: bool) -> None:
     o = carry(K.lam1, K.starts, o, K.n_rows, out)
     o = carry(K.shift1, K.starts, o, K.n_v, out)
     o = carry(K.guards1, K.starts, o, K.n_watched, out)
+    o = carry(K.error, K.starts, o, K.n_v + K.n, out)
+    o = carry(K.left1, K.starts, o, K.n_rows + 1, out)
     carry(K.limit, K.starts, o, K.n_frictions, out)
 
 

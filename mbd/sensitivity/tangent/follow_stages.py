@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.records import Kernel
+from mbd.kernel.schemes.radau import singular_stages_step
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import CHANGES, HELD, MU_REAL, STAGE_BEND, STAGE_RATES, STAGE_SHIFT, stage_place
 from mbd.kernel.schemes.stage_masses import exchange_masses
@@ -24,6 +25,7 @@ from mbd.sensitivity.tangent.words import (
     largest_derivative,
     metric_place,
     moved,
+    was_near_singular,
     without_tangent,
 )
 
@@ -86,13 +88,21 @@ def follow_held(K: Kernel, m: int) -> None:
 def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
     """The derivatives of the stages that are there, from those of their prediction.
 
+    Stages on both sides of a singular configuration are found once more, as they were found.
+
     The matrices are those of the middle stage, as in the step itself: corrections are taken until they are round-off.
     """
     if sharing(K):
         return NOT_FOLLOWED
+    status = 0
     n = K.n
     c = without_tangent(K.stages[MU_REAL] * h)
     keep_stages(K)
+    if was_near_singular(K):
+        status = singular_stages_step(K, h, t1)
+        restore_stages(K)
+        return status
+    K.near_singular = 0
     hold_block(K)
     predict_stages(K, h, m)
     # values of the solution, derivatives of the prediction

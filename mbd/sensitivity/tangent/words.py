@@ -7,12 +7,13 @@ Numbers in K.starts: inputs of the last of Newton's matrices | W | the block of 
 from __future__ import annotations
 
 from mbd.equal import ROUND_OFF_RTOL
+from mbd.kernel.codes import PASSING
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
     "MAX_CORRECTIONS", "are_corrected", "at_root", "derivative_of", "every_row_place", "is_differentiated",
     "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
-    "solution_place", "solve_plain", "step_place", "takes_part", "without_tangent",
+    "solution_place", "solve_plain", "step_place", "takes_part", "was_near_singular", "without_tangent",
 ]  # fmt: skip
 
 MAX_CONTRACTION = 0.9
@@ -136,6 +137,11 @@ def step_place(K: Kernel) -> int:
     return int(solution_place(K) + n_inputs(K))
 
 
+def was_near_singular(K: Kernel) -> bool:
+    """Whether the candidate was made with stages on both sides of a singular configuration."""
+    return bool(K.starts[step_place(K) + 1] == PASSING)
+
+
 def every_row_place(K: Kernel) -> int:
     """Where K.starts says whether all rows are stored with their derivatives."""
     return int(step_place(K) + 2)
@@ -143,5 +149,5 @@ def every_row_place(K: Kernel) -> int:
 
 def metric_place(K: Kernel) -> int:
     """Where columns of K₀⁻¹, or stages, begin in K.starts."""
-    kept = K.n_q + 3 * K.n + K.n_rows + K.n_v + K.n_watched + K.n_frictions
+    kept = K.n_q + 4 * K.n + 2 * K.n_rows + 1 + 2 * K.n_v + K.n_watched + K.n_frictions
     return int(every_row_place(K) + 1 + kept)
