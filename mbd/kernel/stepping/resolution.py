@@ -17,6 +17,7 @@ from mbd.kernel.codes import GAINED, LEAPT, NOT_FINITE, OUTGROWN, UNSTABLE
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.records import Equations, Guards, Kernel, Motion, Steps, Switching
 from mbd.kernel.schemes.iteration import MAX_CURVATURE, MAX_UNCHECKED_ERROR, MIN_RATE_SHARE, is_small, note_fastest
+from mbd.kernel.stepping.barriers import crosses_barrier
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.charts import whole_step
 from mbd.kernel.stepping.growth import is_unstable, leave_rows_alone, note_unforeseen, outgrows
@@ -130,6 +131,8 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
         for i in range(K.n_v if status != 0 else 0):
             if K.cluster[i] == c and K.cluster[blocked] != c:
                 blocked = i
+    if status == 0 and K.explicit == 0 and (coarse or K.estimates == 1) and crosses_barrier(K, h, t1, at_y, at_D):
+        status = GAINED
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
     if status == 0 and rough_enough and K.strategy == 0:
