@@ -161,6 +161,7 @@ OWN: dict[tuple[str, str], Any] = {
     ("optimize", "minimize"): "hinge.angle", ("optimize", "parameters"): {"upper.length": 1.2},
     ("batch", "dt"): 0.1, ("effects", "dt"): 0.1,
     ("segment", "name"): "thigh", ("simulate", "dt"): 0.1, ("sweep", "dt"): 0.1,
+    ("mass_matrix", "coordinates"): ("hinge",), ("bias_forces", "coordinates"): ("hinge",),
     ("sensitivities", "dt"): 0.1, ("sensitivities", "wrt"): ["hinge.angle"], ("sweep", "values"): {"upper.mass": [1.0]},
 }  # fmt: skip
 """Where a word means something else by it."""
@@ -203,14 +204,13 @@ RESULTS |= {"Branch", "GaitSearch", "Optimum", "PointCurve"}
 STUDIES = {"accuracy", "criteria", "effects", "fit", "optimize", "sensitivities"}
 """Words whose runs take seconds: what is no number at all is tried."""
 RESULTS |= {"Human"}
-RESULTS |= {"bias_forces", "mass_matrix"}  # they take names alone
 GAITS = {"basin", "find_gait", "limit_cycle"}
 """Words that make so many runs that they take machine code."""
 
 NOTHING = [None, "", [], {}, object(), b"x", 1j, lambda: 0, mbd.PointMass, MODEL, np.array([1.0, math.nan])]
 NUMBERS = [-1.0, 0.0, 90.0, 420.0, 1e300, 10**400, math.nan, math.inf, True]
 TEXTS = ["1.0", "hinge.angel", "two\nlines", ["hinge.angle", "hinge.angle"], {"hinge.angel": 1.0}, (None, None, None)]
-MANY = [(1.0, 2.0, 3.0, 4.0), [[1.0]], {"a": math.nan}]
+MANY = [(1.0, 2.0, 3.0, 4.0), [[1.0]], {"a": math.nan}, ["a"], {1: 2}]
 WRONG = [*NOTHING, *NUMBERS, *TEXTS, *MANY]
 
 WORDS = {
@@ -239,6 +239,16 @@ def right(name: str) -> dict[str, Any]:
     ):  # whose runs are longer
         found["backend"] = "python"
     return found | ({"dt": 0.1} if (name, "dt") in OWN else {})
+
+
+def called(word: Any, given: dict[str, Any]) -> Any:
+    """What a word gives for arguments by their names; those without a name are a tuple."""
+    bound = inspect.signature(word).bind_partial()
+    bound.arguments |= given
+    if any(each.kind is each.VAR_POSITIONAL for each in bound.signature.parameters.values()):
+        bound.apply_defaults()
+        return word(*bound.args, **bound.kwargs)
+    return word(**given)
 
 
 def shown(value: Any) -> str:
@@ -272,17 +282,21 @@ def test_a_wrong_argument_is_taken_or_named(name):
     word, fine = WORDS[name], right(name)
     files = {"load", "read", "read_model", "replay"} & {name}
     if name not in STUDIES and not files:
-        assert word(**fine) is not None
+        assert called(word, fine) is not None
     for parameter in inspect.signature(word).parameters.values():
-        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+        if parameter.kind is parameter.VAR_KEYWORD:
             continue
         if name in STUDIES and parameter.name == "progress":
             continue
         wrong = [value for value in NOTHING[1:] if value is not MODEL] if name in STUDIES else WRONG
         for value in wrong:
             said = ""
+            given = (value,) if parameter.kind is parameter.VAR_POSITIONAL else value
             try:
-                word(**{**fine, parameter.name: value})
+                made = called(word, {**fine, parameter.name: given})
+                if inspect.isclass(word):
+                    assert repr(made)
+                    assert isinstance(made, mbd.Model | mbd.Lagrangian) or isinstance(hash(made), int)
             except mbd.MbdError as error:
                 said = str(error)
             except FileNotFoundError as error:
@@ -339,3 +353,39 @@ def test_a_type_error_from_inside_is_left_alone():
 
     table = mbd.sweep(MODEL, {"upper.mass": [1.0]}, mine, dt=0.1, until=0.0, backend="python")
     assert "TypeError: my own fault" in table.messages[0]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: mbd.HHT(alpha="x"), "alpha between 0 and 1/3, not 'x'; 0.05 is common"),
+        (lambda: mbd.GeneralizedAlpha(rho_inf=None), "rho_inf between 0 and 1, not None; 0.9 is common"),
+        (lambda: mbd.Newmark(gamma="x"), "gamma='x'"),
+        (lambda: mbd.RadauIIA(tolerance="x"), "tolerance must be a number between 0 and 1e-3, not 'x'"),
+        (lambda: mbd.HHT(formulation=""), "formulation is 'ggl' or 'index3', not ''"),
+        (lambda: mbd.Controller("brain", print, reads=5, period=1.0), "reads of Controller 'brain' must be a name"),
+        (lambda: mbd.Event("end", mbd.flexion(HINGE), terminal="no"), "terminal of Event 'end' must be True or False"),
+        (lambda: mbd.Translation("slide", ORIGIN, END, stiffness=1.0), "would act on several coordinates"),
+        (lambda: mbd.Dissipation(5), "needs D"),
+        (lambda: mbd.Motor("m", HINGE, 1.0, arguments=5), "arguments must be a list"),
+        (
+            lambda: mbd.Lagrangian("p", 5, 0.0, parameters={"m": "x"}),
+            "the value of 'm' must be a finite number, not 'x'",
+        ),
+    ],
+)
+def test_the_sentence_names_the_argument_and_what_came(make, said):
+    with pytest.raises(mbd.ModelError, match=said):
+        make()
+
+
+def test_lists_of_names_are_introduced_by_what_has_them():
+    for call, said in (
+        (lambda: mbd.assemble(MODEL, backend="lvm"), "There are 'auto', 'llvm', 'python'"),
+        (lambda: mbd.assemble(MODEL, parameters={"upper.mas": 1.0}), "There are "),
+        (lambda: mbd.assemble(MODEL, position={"zzz": 1.0}), "; the model has 'hinge.angle'"),
+        (lambda: mbd.assemble(MODEL, position={"hinge.rate": 1.0}), "give it in velocity="),
+        (lambda: mbd.assemble(MODEL, velocity={"upper.end.x": 1.0}), "no rate named 'upper.end.x'"),
+    ):
+        with pytest.raises(mbd.ModelError, match=said):
+            call()
