@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
+from typing import Any
 
-from mbd.bodies.algebra import cross, difference, rotate, scaled, transpose
-from mbd.bodies.base import Frame
-from mbd.bodies.domains import Domain
+from mbd.bodies import algebra
+from mbd.bodies.algebra import cross, rotate, scaled, transpose
 from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
-from mbd.joints.base import Joint, JointLoss, Label
+from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
 __all__ = ["Reversed"]
+
+
+def _of_joint(name: str) -> Any:
+    """What the joint itself has under a name: a value, or a method of it."""
+    return property(attrgetter(f"joint.{name}"))
 
 
 @dataclass(frozen=True)
@@ -31,116 +37,16 @@ class Reversed(Joint):
 
     is_reversed = True
 
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        """The name of the joint."""
-        return self.joint.name
-
-    @property
-    def parent(self) -> Frame:  # type: ignore[override]
-        """The joint's child frame."""
-        return self.joint.child
-
-    @property
-    def child(self) -> Frame:  # type: ignore[override]
-        """The joint's parent frame."""
-        return self.joint.parent
-
-    @property
-    def loss(self) -> JointLoss:  # type: ignore[override]
-        """The joint's loss."""
-        return self.joint.loss
-
-    @property
-    def stiffness(self) -> float:  # type: ignore[override]
-        """The joint's stiffness."""
-        return self.joint.stiffness
-
-    @property
-    def rest(self) -> float:  # type: ignore[override]
-        """The joint's rest."""
-        return self.joint.rest
-
-    @property
-    def anatomy(self) -> str:  # type: ignore[override]
-        """As the joint."""
-        return self.joint.anatomy
-
-    @property
-    def labels(self) -> tuple[Label, ...]:
-        """The joint's coordinates."""
-        return self.joint.labels
-
-    @property
-    def is_planar(self) -> bool:
-        """As the joint."""
-        return self.joint.is_planar
-
-    @property
-    def is_vector(self) -> bool:
-        """As the joint."""
-        return self.joint.is_vector
-
-    @property
-    def orientation(self) -> int | None:
-        """As the joint."""
-        return self.joint.orientation
-
-    @property
-    def is_elastic(self) -> bool:
-        """As the joint."""
-        return self.joint.is_elastic
-
-    def elastic_energy(self, q: Sequence[Scalar], scope: Scope) -> Scalar:
-        """As the joint."""
-        return self.joint.elastic_energy(q, scope)
-
-    @property
-    def adding(self) -> int:
-        """As the joint."""
-        return self.joint.adding
-
-    def compose(self, q: Sequence[Scalar], x: Sequence[Scalar]) -> Sequence[Scalar]:
-        """As the joint."""
-        return self.joint.compose(q, x)
-
-    @property
-    def velocity_labels(self) -> tuple[Label, ...]:
-        """The joint's velocities."""
-        return self.joint.velocity_labels
-
-    @property
-    def defaults(self) -> tuple[float, ...]:
-        """As the joint."""
-        return self.joint.defaults
-
-    def difference(self, q: Sequence[Scalar], other: Sequence[Scalar]) -> Sequence[Scalar]:
-        """As the joint."""
-        return self.joint.difference(q, other)
-
-    def normalise(self, q: Sequence[Scalar]) -> Sequence[Scalar]:
-        """As the joint."""
-        return self.joint.normalise(q)
-
-    def coordinate_rates(self, q: Sequence[Scalar], v: Sequence[Scalar]) -> Sequence[Scalar]:
-        """As the joint."""
-        return self.joint.coordinate_rates(q, v)
-
-    def increment_rates(self, x: Sequence[Scalar], v: Sequence[Scalar]) -> Sequence[Scalar]:
-        """As the joint."""
-        return self.joint.increment_rates(x, v)
-
-    def increment_velocities(self, x: Sequence[Scalar], rates: Sequence[Scalar]) -> Sequence[Scalar]:
-        """As the joint."""
-        return self.joint.increment_velocities(x, rates)
-
-    def parameters(self) -> dict[str, float]:
-        """As the joint."""
-        return self.joint.parameters()
-
-    def domains(self) -> dict[str, Domain]:
-        """As the joint."""
-        return self.joint.domains()
+    parent = _of_joint("child")
+    child = _of_joint("parent")
+    name, labels, velocity_labels = _of_joint("name"), _of_joint("labels"), _of_joint("velocity_labels")
+    loss, stiffness, rest, anatomy = map(_of_joint, ("loss", "stiffness", "rest", "anatomy"))
+    is_planar, is_vector, is_elastic = map(_of_joint, ("is_planar", "is_vector", "is_elastic"))
+    orientation, adding, defaults = map(_of_joint, ("orientation", "adding", "defaults"))
+    compose, difference, normalise = map(_of_joint, ("compose", "difference", "normalise"))
+    coordinate_rates, increment_rates = _of_joint("coordinate_rates"), _of_joint("increment_rates")
+    increment_velocities, elastic_energy = _of_joint("increment_velocities"), _of_joint("elastic_energy")
+    parameters, domains = _of_joint("parameters"), _of_joint("domains")
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """The inverse placement."""
@@ -152,7 +58,7 @@ class Reversed(Joint):
         result = []
         for angular, linear in self.joint.subspace(q, scope):
             turn = rotate(R, angular)
-            result.append((scaled(-1.0, turn), difference(cross(turn, p), rotate(R, linear))))
+            result.append((scaled(-1.0, turn), algebra.difference(cross(turn, p), rotate(R, linear))))
         return result
 
     def rows(self, R: Rotation, p: Triple, scope: Scope) -> Sequence[tuple[str, Scalar]]:
