@@ -17,17 +17,7 @@ from mbd.constraints.user_measure import measure
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
-from mbd.forces.quantities import (
-    Mention,
-    Quantity,
-    Samples,
-    arguments_of,
-    law_names,
-    mentioned,
-    quantity_of,
-    scalar,
-    value_parameters,
-)
+from mbd.forces.quantities import Mention, OfQuantities, Quantity, Samples, arguments_of, mentioned, quantity_of, scalar
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import live
 from mbd.tape.functions import atan2, cos, sin
@@ -37,7 +27,7 @@ __all__ = ["Bilateral"]
 
 
 @dataclass(frozen=True)
-class Bilateral(Constraint):
+class Bilateral(OfQuantities, Constraint):
     """``h = g(q, t) − value(t) = 0`` at all times: a rod, a slot, a prescribed motion.
 
     Parameters
@@ -55,6 +45,7 @@ class Bilateral(Constraint):
     arguments: Any = ("t",)
 
     kind = "bilateral"
+    quantities = ("value",)
 
     def __post_init__(self) -> None:
         name_of(self.name, "Bilateral")
@@ -106,15 +97,11 @@ class Bilateral(Constraint):
 
     def parameters(self) -> dict[str, float]:
         """`value` where it is a number, arguments given as numbers, and those of its measure."""
-        return value_parameters(self.value, self.arguments, self.name, "value") | self.measure.parameters()
+        return super().parameters() | self.measure.parameters()
 
     def domains(self) -> dict[str, Domain]:
         """Those of its measure."""
         return self.measure.domains()
-
-    def laws(self) -> tuple[str, ...]:
-        """`value` where it is no number."""
-        return law_names(self.value, self.name, "value")
 
     def faults(self) -> list[str]:
         """Those of its measure."""

@@ -15,16 +15,7 @@ from mbd.constraints.base import Constraint
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
-from mbd.forces.quantities import (
-    Mention,
-    Quantity,
-    arguments_of,
-    law_names,
-    mentioned,
-    quantity_of,
-    scalar,
-    value_parameters,
-)
+from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of, mentioned, quantity_of, scalar
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
@@ -35,7 +26,7 @@ ORDERS = ("before", "with", "after")
 
 
 @dataclass(frozen=True)
-class Impulse(Constraint):
+class Impulse(OfQuantities, Constraint):
     """An impulse P on the mechanism each time a contact closes, as part of the impact problem.
 
     ``M (v⁺ − v⁻) + Bᵀ Λ = w P``, with w the direction: all rows hold, and contacts push or open.
@@ -75,6 +66,7 @@ class Impulse(Constraint):
     arguments: Any = ("t",)
 
     kind = "impulse"
+    quantities = ("size",)
 
     def __post_init__(self) -> None:
         put, title = object.__setattr__, f"Impulse '{self.name}'"
@@ -107,14 +99,6 @@ class Impulse(Constraint):
     def others(self) -> tuple[str, ...]:
         """The contact that it waits for."""
         return (self.on,)
-
-    def parameters(self) -> dict[str, float]:
-        """`size` where it is a number, and arguments given as numbers."""
-        return value_parameters(self.size, self.arguments, self.name, "size")
-
-    def laws(self) -> tuple[str, ...]:
-        """`size` where it is no number."""
-        return law_names(self.size, self.name, "size")
 
     def pair(self, scope: Scope) -> tuple[Scalar, Scalar]:
         """(velocity along it, P)."""

@@ -14,15 +14,14 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import (
     Mention,
+    OfQuantities,
     Quantity,
     Samples,
     arguments_of,
-    law_names,
     mentioned,
     quantity_of,
     resolved,
     scalar,
-    value_parameters,
 )
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import traced_scalar
@@ -33,7 +32,7 @@ TIME = (("t", "t"),)
 
 
 @dataclass(frozen=True)
-class Nonholonomic(VelocityConstraint):
+class Nonholonomic(OfQuantities, VelocityConstraint):
     """``a(q, t) · v + b(t) = 0`` at all times, a row that need not come from a position.
 
     ``Nonholonomic("blade", lambda vx, vy, angle: vx * mbd.sin(angle) - vy * mbd.cos(angle),
@@ -58,6 +57,8 @@ class Nonholonomic(VelocityConstraint):
     bias: Quantity = 0.0
     arguments: Any = ()
     unit: str = "m"
+
+    quantities = ("bias",)
 
     def __post_init__(self) -> None:
         name_of(self.name, "Nonholonomic")
@@ -91,11 +92,3 @@ class Nonholonomic(VelocityConstraint):
     def mentions(self) -> list[Mention]:
         """What its row depends on."""
         return mentioned(self.arguments)
-
-    def parameters(self) -> dict[str, float]:
-        """`bias` where it is a number, and arguments given as numbers."""
-        return value_parameters(self.bias, self.arguments, self.name, "bias")
-
-    def laws(self) -> tuple[str, ...]:
-        """`bias` where it is no number."""
-        return law_names(self.bias, self.name, "bias")

@@ -17,15 +17,14 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import (
     Mention,
+    OfQuantities,
     Quantity,
     QuantityTriple,
     arguments_of,
     is_single,
-    law_names,
     mentioned,
     triple_at,
     triple_of,
-    value_parameters,
 )
 from mbd.tape.node import Scalar
 
@@ -33,7 +32,7 @@ __all__ = ["Applied"]
 
 
 @dataclass(frozen=True)
-class Applied(Force):
+class Applied(OfQuantities, Force):
     """A force at the origin of a frame and a torque on its body: power ``F·v + T·ω``.
 
     Its components are those along the axes of the ground, or of another frame, with which it turns then: ``F = R f``.
@@ -64,6 +63,8 @@ class Applied(Force):
 
     kind = "applied"
     is_external = True
+    quantities = ("force", "torque")
+    in_components = True
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -89,16 +90,6 @@ class Applied(Force):
         """Its frames, and what its functions are called with."""
         own = [self.frame] if self.axes is None else [self.frame, self.axes]
         return [*own, *mentioned(self.arguments)]
-
-    def parameters(self) -> dict[str, float]:
-        """Components given as numbers, and arguments given as numbers."""
-        return value_parameters(self.force, self.arguments, self.name, "force") | value_parameters(
-            self.torque, self.arguments, self.name, "torque"
-        )
-
-    def laws(self) -> tuple[str, ...]:
-        """Components that are no numbers."""
-        return law_names(self.force, self.name, "force", True) + law_names(self.torque, self.name, "torque", True)
 
     def act(self, scope: Scope) -> Action:
         """Force on velocity, torque on angular velocity."""

@@ -10,16 +10,7 @@ from mbd.bodies.values import name_of, number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
-from mbd.forces.quantities import (
-    Mention,
-    Quantity,
-    arguments_of,
-    law_names,
-    mentioned,
-    quantity_of,
-    scalar,
-    value_parameters,
-)
+from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of, mentioned, quantity_of, scalar
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
@@ -27,7 +18,7 @@ __all__ = ["DCMotor"]
 
 
 @dataclass(frozen=True)
-class DCMotor(Force):
+class DCMotor(OfQuantities, Force):
     """A direct-current motor on the coordinate q of a joint: ``T = k i``, ``L di/dt = u − R i − k q̇``.
 
     The current i is a first-order state, 'name.current', and begins at 0 unless `assemble` says otherwise. With L = 0
@@ -57,6 +48,7 @@ class DCMotor(Force):
 
     kind = "applied"
     column = "motor"
+    quantities = ("voltage",)
 
     def __post_init__(self) -> None:
         name_of(self.name, "DCMotor")
@@ -86,7 +78,7 @@ class DCMotor(Force):
 
     def parameters(self) -> dict[str, float]:
         """`resistance`, `constant`, `inductance` unless it is 0, `voltage` where it is a number, and its arguments."""
-        return self._numbers() | value_parameters(self.voltage, self.arguments, self.name, "voltage")
+        return self._numbers() | super().parameters()
 
     def domains(self) -> dict[str, Domain]:
         """R > 0, L ≥ 0, any k."""
@@ -94,10 +86,6 @@ class DCMotor(Force):
         if self.inductance != 0.0:  # as it was made: a state is there or not
             found[f"{self.name}.inductance"] = positive("is not positive; make it with 0 for none", "H")
         return found
-
-    def laws(self) -> tuple[str, ...]:
-        """`voltage` where it is no number."""
-        return law_names(self.voltage, self.name, "voltage")
 
     def act(self, scope: Scope) -> Action:
         """k i on q̇, and the rate of i."""

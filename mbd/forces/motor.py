@@ -11,23 +11,14 @@ from mbd.bodies.values import name_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result, joint_of
-from mbd.forces.quantities import (
-    Mention,
-    Quantity,
-    arguments_of,
-    law_names,
-    mentioned,
-    quantity_of,
-    scalar,
-    value_parameters,
-)
+from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of, mentioned, quantity_of, scalar
 from mbd.joints.base import Joint
 
 __all__ = ["Motor"]
 
 
 @dataclass(frozen=True)
-class Motor(Force):
+class Motor(OfQuantities, Force):
     """A torque, or force, on the one coordinate of a joint, on the child and back on the parent: power ``T q̇``.
 
     ``Motor("drive", hinge, torque=2.0)``, ``Motor("drive", slider, force=50.0)``
@@ -71,6 +62,11 @@ class Motor(Force):
         object.__setattr__(self, "arguments", arguments_of(self.arguments, f"Motor '{self.name}'"))
 
     @property
+    def quantities(self) -> tuple[str, ...]:
+        """The one that was given."""
+        return (self.field,)
+
+    @property
     def field(self) -> str:
         """'torque' or 'force': which was given."""
         return "torque" if self.force is None else "force"
@@ -83,14 +79,6 @@ class Motor(Force):
     def mentions(self) -> list[Mention]:
         """Its joint, and what its function is called with."""
         return [self.joint, *mentioned(self.arguments)]
-
-    def parameters(self) -> dict[str, float]:
-        """`torque` where it is a number, and arguments given as numbers."""
-        return value_parameters(self.effort, self.arguments, self.name, self.field)
-
-    def laws(self) -> tuple[str, ...]:
-        """`torque` where it is no number."""
-        return law_names(self.effort, self.name, self.field)
 
     def act(self, scope: Scope) -> Action:
         """The torque on the rate."""

@@ -23,8 +23,9 @@ from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
 __all__ = [
-    "INCREMENT_PREFIX", "ArgumentSpec", "Mention", "Quantity", "QuantityTriple", "Samples", "arguments_of", "is_single",
-    "law_names", "mentioned", "quantity_of", "resolved", "scalar", "triple_at", "triple_of", "value_parameters",
+    "INCREMENT_PREFIX", "ArgumentSpec", "Mention", "OfQuantities", "Quantity", "QuantityTriple", "Samples",
+    "arguments_of", "is_single", "law_names", "mentioned", "quantity_of", "resolved", "scalar", "triple_at",
+    "triple_of", "value_parameters",
 ]  # fmt: skip
 
 INCREMENT_PREFIX = "+"
@@ -227,3 +228,29 @@ def law_names(value: Any, owner: str, field: str, components: bool = False) -> t
         return (f"{owner}.{field}",)
     parts = value if isinstance(value, tuple) else (None,) * 3
     return tuple(f"{owner}.{field}.{axis}" for part, axis in zip(parts, "xyz", strict=True) if not is_number(part))
+
+
+class OfQuantities:
+    """What words share whose fields are quantities, functions of which are called with `arguments`."""
+
+    name: str
+    arguments: Any
+    in_components = False
+    """Whether a quantity has three components."""
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the fields that are quantities."""
+        raise NotImplementedError
+
+    def parameters(self) -> dict[str, float]:
+        """Quantities, components and arguments that are given as numbers."""
+        found = value_parameters(None, self.arguments, self.name, "")
+        for field in self.quantities:
+            found |= value_parameters(getattr(self, field), (), self.name, field)
+        return found
+
+    def laws(self) -> tuple[str, ...]:
+        """Quantities, or their components, that are no numbers."""
+        named = (law_names(getattr(self, each), self.name, each, self.in_components) for each in self.quantities)
+        return tuple(name for names in named for name in names)

@@ -14,16 +14,7 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force, Result
 from mbd.forces.muscles.curves import CURVES, Curves
 from mbd.forces.muscles.paths import path_of
-from mbd.forces.quantities import (
-    Mention,
-    Quantity,
-    arguments_of,
-    law_names,
-    mentioned,
-    quantity_of,
-    scalar,
-    value_parameters,
-)
+from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of, mentioned, quantity_of, scalar
 from mbd.tape.functions import sin, sqrt, tanh
 from mbd.tape.node import Scalar
 
@@ -39,7 +30,7 @@ DELAYS, ABSENT = NUMBERS[-3:], ("pennation", "damping")
 
 
 @dataclass(frozen=True)
-class Muscle(Force):
+class Muscle(OfQuantities, Force):
     """A muscle of the Hill type, which pulls along its path with the force of its tendon F.
 
     Fibers of the length l with pennation α and the tendon between them fill the path, ``l_MT(q) = l cos α + l_T``, at a
@@ -103,6 +94,7 @@ class Muscle(Force):
     arguments: Any = ("t",)
 
     kind = "applied"
+    quantities = ("excitation",)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -159,9 +151,8 @@ class Muscle(Force):
 
     def parameters(self) -> dict[str, float]:
         """All numbers, the excitation where it is one, and its arguments."""
-        own = value_parameters(self.excitation, self.arguments, self.name, "excitation")
         points: dict[str, float] = self.path.parameters(self.name)
-        return self._numbers() | own | points
+        return self._numbers() | super().parameters() | points
 
     def domains(self) -> dict[str, Domain]:
         """Positive sizes, a pennation below 90°, an excitation from 0 to 1."""
@@ -176,10 +167,6 @@ class Muscle(Force):
         found[f"{self.name}.excitation"] = Domain(0.0, 1.0)
         of_path: dict[str, Domain] = self.path.domains(self.name)
         return found | of_path
-
-    def laws(self) -> tuple[str, ...]:
-        """`excitation` where it is no number."""
-        return law_names(self.excitation, self.name, "excitation")
 
     # what happens -------------------------------------------------------------------------------------------------
     def act(self, scope: Scope) -> Action:
