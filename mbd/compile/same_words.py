@@ -3,6 +3,8 @@
 Only what is listed here is read: numbers, texts, lists, arrays, words of `mbd`, and functions whose code refers to
 nothing but such values, other functions, and numpy and math. Of anything else, such as objects and classes of the
 user's, nobody can tell what it will do as it is called, so that a description that holds one has no digest.
+
+`mbd.results.identity` reads more in the same way: all that a study refers to, as it is at the moment.
 """
 
 from __future__ import annotations
@@ -17,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["digest_of_words"]
+__all__ = ["CannotTellError", "Reader", "codes_of", "digest_of_words", "values_of"]
 
-PACKAGES = frozenset({"mbd", "numpy", "math", "builtins"})
-"""What is in them is what its name says."""
-PLAIN = (bool, int, float, complex, str, bytes, type(None))
+PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...))
+
+
 CHANGING = frozenset(
     dis.opmap[name]
     for name in (
@@ -30,126 +32,140 @@ CHANGING = frozenset(
     if name in dis.opmap
 )  # fmt: skip
 """Instructions by which a function changes, or brings in, more than it returns."""
-UNREADABLE = frozenset({
-    "globals", "locals", "vars", "dir", "getattr", "setattr", "eval", "exec", "open", "input", "__import__", "random",
-    "__builtins__",
-})  # fmt: skip
-"""Names through which a function reaches values that its code does not tell."""
 
 
-class _CannotTellError(Exception):
-    """What a description says may change."""
+class CannotTellError(Exception):
+    """What something says may change, or is not known."""
 
 
 def digest_of_words(*words: Any) -> str | None:
     """Equal for two descriptions that say the same; None where none can be given."""
-    reader = _Reader()
     try:
-        text = "\0".join(reader.read(words))
-    except (_CannotTellError, RecursionError):
+        return Reader().digest(words)
+    except (CannotTellError, RecursionError):
         return None
-    return sha256(text.encode(errors="backslashreplace")).hexdigest()
 
 
-class _Reader:
-    """Reads words; one that is met again counts as the number of its first meeting."""
+class Reader:
+    """Reads objects; one that is met again counts as the number of its first meeting."""
+
+    packages = frozenset({"mbd", "numpy", "math", "builtins"})
+    """What is in them is what its name says."""
+    unreadable = frozenset({
+        "globals", "locals", "vars", "dir", "getattr", "setattr", "eval", "exec", "open", "input", "__import__",
+        "random", "__builtins__",
+    })  # fmt: skip
+    """Names through which a function reaches values that its code does not tell."""
 
     def __init__(self) -> None:
         self.met: dict[int, int] = {}
         self.kept: list[Any] = []  # so that no identity number is used twice
 
-    def read(self, item: Any) -> Iterator[str]:
-        """Everything below an object, in an order that follows from the object alone."""
+    def digest(self, root: Any) -> str:
+        """Of everything below an object, in an order that follows from the object alone.
+
+        Raises
+        ------
+        CannotTellError
+            for what is not read.
+        """
+        found, stack = sha256(), [root]
+        parts: Iterable[Any]
+        while stack:
+            item = stack.pop()
+            kind, parts = type(item), ()
+            if kind in PLAIN:
+                title = f"{kind.__name__} {item!r}"
+            elif id(item) in self.met:
+                title = f"again {self.met[id(item)]}"
+            else:
+                self.met[id(item)] = len(self.met)
+                self.kept.append(item)
+                title, parts = self.parts(item)
+            found.update(title.encode(errors="backslashreplace") + b"\0")
+            stack += [*parts][::-1]
+        return found.hexdigest()
+
+    def parts(self, item: Any) -> tuple[str, Iterable[Any]]:
+        """What an object is called, and what it holds."""
         kind = type(item)
-        if kind in PLAIN:
-            yield f"{kind.__name__} {item!r}"
-            return
-        if id(item) in self.met:
-            yield f"again {self.met[id(item)]}"
-            return
-        self.met[id(item)] = len(self.met)
-        self.kept.append(item)
-        if kind is tuple or kind is list:
-            yield f"{kind.__name__} {len(item)}"
-            for part in item:
-                yield from self.read(part)
-        elif kind is np.ndarray and item.dtype.kind in "biufc":
-            yield f"array {item.dtype.str} {item.shape} {item.tobytes().hex()}"
-        elif isinstance(item, np.generic) and _is_what_it_says(kind):
-            yield f"{kind.__name__} {item!r}"
-        elif _is_what_it_says(item):
-            yield f"{kind.__name__} {getattr(item, '__module__', '')} {getattr(item, '__qualname__', item.__name__)}"
-        elif kind is types.FunctionType:
-            yield from self._function(item)
-        elif is_dataclass(kind) and kind.__module__.startswith("mbd.") and _is_what_it_says(kind):
-            yield f"{kind.__module__}.{kind.__qualname__}"
-            for field in fields(item):
-                yield field.name
-                yield from self.read(getattr(item, field.name, None))
-        else:
-            raise _CannotTellError
+        if kind in (tuple, list):
+            return f"{kind.__name__} {len(item)}", item
+        if kind is frozenset:
+            return f"frozenset {sorted(type(self)().digest(each) for each in item)}", ()
+        if kind is np.ndarray and item.dtype.kind in "biufcSU":
+            return f"array {item.dtype.str} {item.shape} {item.tobytes().hex()}", ()
+        if isinstance(item, np.generic) and self.is_what_it_says(kind):
+            return f"{kind.__name__} {item!r}", ()
+        if self.is_what_it_says(item):
+            return f"{kind.__name__} {getattr(item, '__module__', '')} {_name_of(item)}", ()
+        if kind is types.CodeType:
+            counts = item.co_argcount, item.co_posonlyargcount, item.co_kwonlyargcount, item.co_flags
+            names = item.co_varnames, item.co_freevars, item.co_cellvars, item.co_names
+            return f"code {item.co_code.hex()} {counts} {names}", item.co_consts
+        if kind is types.FunctionType:
+            return "function", self.of_function(item)
+        if is_dataclass(kind) and kind.__module__.startswith("mbd.") and self.is_what_it_says(kind):
+            held = ((field.name, getattr(item, field.name, None)) for field in fields(item))
+            return f"{kind.__module__}.{kind.__qualname__}", [part for pair in held for part in pair]
+        raise CannotTellError(item)
 
-    def _function(self, function: types.FunctionType) -> Iterator[str]:
-        """What a function does: its code and all that it refers to."""
-        if function.__dict__:
-            raise _CannotTellError
-        yield "function"
-        names = set[str]()
-        yield from self._code(function.__code__, names)
-        if names & UNREADABLE:
-            raise _CannotTellError
-        known = function.__globals__
-        yield from self._fixed(function.__defaults__ or ())
-        yield from self._fixed([part for pair in (function.__kwdefaults__ or {}).items() for part in pair])
-        yield from self._fixed([cell.cell_contents for cell in function.__closure__ or () if _is_bound(cell)])
-        for name in sorted(names & known.keys()):
-            yield name
-            yield from self._fixed([known[name]])
+    def of_function(self, function: types.FunctionType) -> list[Any]:
+        """What a function does: its code and all that it refers to, values that can be replaced but not changed."""
+        codes = [*codes_of(function.__code__)]
+        names = {name for code in codes for name in code.co_names}
+        changing = any(CHANGING.intersection(code.co_code[::2]) for code in codes)
+        if function.__dict__ or changing or names & self.unreadable:
+            raise CannotTellError(function)
+        held = values_of(function)
+        held += [part for name in sorted(names & function.__globals__.keys())
+                 for part in (name, function.__globals__[name])]  # fmt: skip
+        _require_fixed(held)
+        return [function.__code__, *held]
 
-    def _code(self, code: types.CodeType, names: set[str]) -> Iterator[str]:
-        """Code with the functions inside it; the names that it uses go into `names`."""
-        if CHANGING.intersection(code.co_code[::2]):
-            raise _CannotTellError
-        names.update(code.co_names)
-        counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
-        yield f"{code.co_code.hex()} {counts} {code.co_varnames} {code.co_freevars} {code.co_cellvars} {code.co_names}"
-        for constant in code.co_consts:
-            if isinstance(constant, types.CodeType):
-                yield from self._code(constant, names)
-            else:
-                yield from (
-                    self.read(constant) if type(constant) is not frozenset else [repr(sorted(map(repr, constant)))]
-                )
+    def is_what_it_says(self, item: Any) -> bool:
+        """Whether something is found under its name in a package that is what it says."""
+        if isinstance(item, types.ModuleType):
+            return self.is_of_package(item.__name__) and sys.modules.get(item.__name__) is item
+        name = _name_of(item)
+        module = getattr(item, "__module__", None) or ("numpy" if isinstance(item, np.ufunc) else None)
+        if not isinstance(name, str) or not isinstance(module, str) or not self.is_of_package(module):
+            return False
+        found: Any = sys.modules.get(module)
+        for part in name.split("."):
+            found = getattr(found, part, None)
+        return found is item
 
-    def _fixed(self, values: Iterable[Any]) -> Iterator[str]:
-        """Values that a function refers to, which can be replaced there but not changed."""
-        for value in values:
-            if type(value) is tuple:
-                yield f"tuple {len(value)}"
-                yield from self._fixed(value)
-            elif type(value) in (list, np.ndarray):
-                raise _CannotTellError
-            else:
-                yield from self.read(value)
+    def is_of_package(self, module: str) -> bool:
+        """Whether a module belongs to one of the packages."""
+        return module.partition(".")[0] in self.packages
 
 
-def _is_bound(cell: types.CellType) -> bool:
+def _name_of(item: Any) -> Any:
+    return getattr(item, "__qualname__", None) or getattr(item, "__name__", None)
+
+
+def codes_of(code: types.CodeType) -> Iterator[types.CodeType]:
+    """Code with that of the functions inside it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from codes_of(constant)
+
+
+def values_of(function: types.FunctionType) -> list[Any]:
+    """Defaults of a function, and what it has captured."""
     try:
-        cell.cell_contents  # noqa: B018
+        cells = [cell.cell_contents for cell in function.__closure__ or ()]
     except ValueError as unbound:
-        raise _CannotTellError from unbound
-    return True
+        raise CannotTellError(function) from unbound
+    keywords = [part for pair in (function.__kwdefaults__ or {}).items() for part in pair]
+    return [function.__defaults__, tuple(keywords), tuple(cells)]
 
 
-def _is_what_it_says(item: Any) -> bool:
-    """Whether something is found under its name in a package that is what it says."""
-    if isinstance(item, types.ModuleType):
-        return item.__name__.partition(".")[0] in PACKAGES and sys.modules.get(item.__name__) is item
-    name = getattr(item, "__qualname__", None) or getattr(item, "__name__", None)
-    module = getattr(item, "__module__", None) or ("numpy" if isinstance(item, np.ufunc) else None)
-    if not isinstance(name, str) or not isinstance(module, str) or module.partition(".")[0] not in PACKAGES:
-        return False
-    found: Any = sys.modules.get(module)
-    for part in name.split("."):
-        found = getattr(found, part, None)
-    return found is item
+def _require_fixed(values: Iterable[Any]) -> None:
+    for value in values:
+        if type(value) in (list, np.ndarray):
+            raise CannotTellError(value)
+        if type(value) is tuple:
+            _require_fixed(value)

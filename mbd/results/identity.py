@@ -1,48 +1,64 @@
 """What something is, as a digest: equal digests of a model, a start or a function mean that runs with them are equal.
 
-Objects are read as they would be pickled, functions by their code with all that they refer to: defaults, captured and
-global values, other functions of the user's. Expressions on a tape are read by their structure. What belongs to Python
-or to an installed package counts by its name. An object that cannot be read counts by its class.
+Read are numbers, texts, arrays, tables, expressions on a tape by their structure, runs, functions by their code with
+all that they refer to (defaults, captured and global values, modules that they import, other functions), objects by
+their class and what a pickle of them holds, and classes by all that they define. What belongs to Python or to a package
+of the list counts by its name. What cannot be read has no digest, and is named.
 """
 
 from __future__ import annotations
 
+import dis
 import functools
-import os
+import importlib
 import sys
-import sysconfig
 import types
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism
+from mbd.compile.same_words import CannotTellError, Reader, codes_of, values_of
+from mbd.errors import ModelError
+from mbd.results.storage import Archive, contents
 from mbd.results.trajectory import Trajectory
+from mbd.state import State
 from mbd.tape.node import Node
 
 __all__ = ["identity", "identity_of_model"]
 
+PACKAGES = {"mbd", "numpy", "scipy", "sympy", "networkx", "pandas", "xarray", "matplotlib"}
+"""What is in them is what its name says; packages of users' own change, wherever they are installed."""
 
-_LIBRARY = tuple(
-    f"{Path(path).resolve()}{os.sep}"
-    for path in (
-        *map(sysconfig.get_path, ("stdlib", "platstdlib", "purelib", "platlib")),
-        str(Path(__file__).parent.parent),
-    )
-)
-"""Folders of Python, of installed packages and of this one."""
-
-SKIPPED = frozenset({"moved"})
-"""Fields that say how a value was found, and change no run."""
+OF_PYTHON = frozenset({
+    "__dict__", "__weakref__", "__doc__", "__module__", "__qualname__", "__annotations__", "__annotate__",
+    "__annotate_func__", "__annotations_cache__", "__abstractmethods__", "_abc_impl", "__firstlineno__",
+    "__static_attributes__", "__dataclass_fields__", "__dataclass_params__", "__match_args__", "__parameters__",
+    "__orig_bases__", "__type_params__",
+})  # fmt: skip
+"""What Python notes of a class beside what the class says."""
 
 
 def identity(*values: Any) -> str:
-    """The digest of some values."""
-    return _Reader().of(values)[:24]
+    """The digest of some values.
+
+    Raises
+    ------
+    ModelError
+        for what cannot be read.
+    """
+    try:
+        return _Reader().digest(values)[:24]
+    except CannotTellError as error:
+        raise ModelError(
+            f"file: the study depends on {shown(error.args[0]):.120}, of which nobody can tell whether it will be the "
+            "same in another process; let functions refer to numbers, texts, functions and objects that can be "
+            "pickled, or leave file= out"
+        ) from None
 
 
 def identity_of_model(model: Any, mechanism: Mechanism) -> dict[str, str]:
@@ -54,80 +70,81 @@ def identity_of_model(model: Any, mechanism: Mechanism) -> dict[str, str]:
     return {"model": identity(words), "equations": identity(laws)}
 
 
-class _Reader:
-    """Reads objects; one that is met again counts as the number of its first meeting."""
+class _Reader(Reader):
+    """Reads what a study refers to, as it is at the moment."""
+
+    packages = frozenset(PACKAGES | sys.stdlib_module_names)
+    unreadable = Reader.unreadable - {"random"}
 
     def __init__(self) -> None:
-        self.met: dict[int, int] = {}
-        self.kept: list[Any] = []  # so that no identity number is used twice
+        super().__init__()
         self.nodes: dict[int, str] = {}
 
-    def of(self, item: Any) -> str:
-        """The digest of an object."""
-        digest = sha256()
-        for word in self.words(item):
-            digest.update(word.encode() if isinstance(word, str) else word)
-            digest.update(b"\0")
-        return digest.hexdigest()
-
-    def words(self, root: Any) -> Iterable[str | bytes]:
-        """Everything below an object, in an order that follows from the object alone."""
-        stack = [root]
-        while stack:
-            item = stack.pop()
-            if isinstance(item, bool | str | bytes | complex) or item is None or item is Ellipsis:
-                yield repr(item)
-            elif isinstance(item, np.generic):
-                stack.append(item.item())
-            elif isinstance(item, int | float):
-                yield repr(float(item)) if isinstance(item, float) or abs(item) < 2**53 else repr(item)
-            elif id(item) in self.met:
-                yield f"again {self.met[id(item)]}"
-            else:
-                self.met[id(item)] = len(self.met)
-                self.kept.append(item)
-                title, parts = self.parts(item)
-                yield title
-                stack += parts[::-1]
-
-    def parts(self, item: Any) -> tuple[str | bytes, list[Any]]:
+    def parts(self, item: Any) -> tuple[str, Iterable[Any]]:
         """What an object is called, and what it holds."""
-        kind = f"{type(item).__module__}.{type(item).__qualname__}"
-        if isinstance(item, tuple | list):
-            return f"{kind} {len(item)}", list(item)
-        if isinstance(item, Mapping):
-            return f"{kind} {len(item)}", [part for pair in item.items() for part in pair]
-        if isinstance(item, set | frozenset):
-            return f"{kind} {sorted(_Reader().of(each) for each in item)}", []
-        if isinstance(item, np.ndarray):
-            if item.dtype.kind == "O":
-                return f"array {item.shape}", item.ravel().tolist()
-            return f"array {item.dtype.str} {item.shape}".encode() + np.ascontiguousarray(item).tobytes(), []
-        if isinstance(item, Node):
-            return self.of_node(item), []
-        if isinstance(item, Trajectory):
-            return kind, [item.record.time, item.record.q, item.record.v, item.record.z]
-        if isinstance(item, types.CodeType):
-            return b"code" + item.co_code, [item.co_consts, item.co_names]
-        if isinstance(item, types.FunctionType | type | types.ModuleType) and _is_library(item):
-            return f"{kind} {getattr(item, '__module__', '')}.{getattr(item, '__qualname__', item.__name__)}", []
-        if isinstance(item, types.FunctionType):
-            return "function", _of_function(item)
-        if isinstance(item, types.MethodType):
-            return "method", [item.__func__, item.__self__]
-        if isinstance(item, functools.partial):
-            return "partial", [item.func, item.args, item.keywords]
-        if isinstance(item, type):
-            own = {name: value for name, value in vars(item).items() if isinstance(value, _OF_CLASSES)}
-            return f"class {item.__qualname__}", [own, item.__bases__]
-        if isinstance(item, types.ModuleType):
-            return f"module {item.__name__}", []
-        if hasattr(item, "__wrapped__"):
-            return kind, [item.__wrapped__]
-        if is_dataclass(item):
-            held = [getattr(item, each.name, None) for each in fields(item) if each.name not in SKIPPED]
-            return kind, [type(item), *held]
-        return kind, _as_pickled(item)
+        kind = type(item)
+        if kind in (dict, types.MappingProxyType):
+            return f"{kind.__name__} {len(item)}", [part for pair in item.items() for part in pair]
+        if kind is set:
+            return f"set {sorted(type(self)().digest(each) for each in item)}", ()
+        if kind is np.ndarray and item.dtype.kind == "O":
+            return f"array {item.shape}", item.ravel().tolist()
+        if kind is Node:
+            return self.of_node(item), ()
+        if kind is Trajectory:
+            arrays, words = contents(item.record, Archive.of(item))
+            return "run", [arrays, {name: part for name, part in words.items() if name != "stats"}]
+        if kind is State:
+            return "state", [getattr(item, field.name) for field in fields(item) if field.name != "moved"]
+        try:
+            return super().parts(item)
+        except CannotTellError:
+            if isinstance(item, type):
+                return f"class {item.__module__}.{item.__qualname__}", self.of_class(item)
+            return kind.__name__, self.of_object(item)
+
+    def of_class(self, item: type) -> list[Any]:
+        """All that a class defines, and its bases."""
+        is_dataclass(item)  # one of `mbd.dataclass` is made at its first use
+        own = {name: value for name, value in vars(item).items() if name not in OF_PYTHON}
+        return [type(item), own, item.__bases__]
+
+    def of_object(self, item: Any) -> list[Any]:
+        """What a pickle of an object would hold."""
+        if isinstance(item, functools._lru_cache_wrapper):
+            return [item.__wrapped__]
+        if isinstance(item, property | classmethod | staticmethod | functools.cached_property):
+            return [getattr(item, name, None) for name in ("fget", "fset", "fdel", "__func__", "func")]
+        if isinstance(item, types.MemberDescriptorType | types.GetSetDescriptorType):
+            return [item.__name__]
+        try:
+            made = item.__reduce_ex__(4)
+        except Exception:  # locks, files and objects of users' own raise what they like
+            raise CannotTellError(item) from None
+        if isinstance(made, str):
+            return [type(item), made]
+        return [type(item), *made[:3], *(list(each or ()) for each in made[3:5])]
+
+    def of_function(self, function: types.FunctionType) -> list[Any]:
+        """What a function does: its code and all that it refers to."""
+        held = [function.__code__, function.__dict__, *values_of(function)]
+        if self.is_of_package(function.__module__ or ""):  # made inside another one, whose values it has captured
+            return held
+        codes = [*codes_of(function.__code__)]
+        names = {name for code in codes for name in code.co_names}
+        if names & self.unreadable:
+            raise CannotTellError(function)
+        known = {name: function.__globals__[name] for name in names & function.__globals__.keys()}
+        known |= {module.__name__: module for module in _imported(function, codes)}
+        return [*held, {name: self.used(known[name], names, set()) for name in sorted(known)}]
+
+    def used(self, value: Any, names: set[str], seen: set[str]) -> Any:
+        """A value that a function refers to; of a module of the user's what the function may take from it."""
+        if not isinstance(value, types.ModuleType) or self.is_what_it_says(value) or value.__name__ in seen:
+            return value.__name__ if isinstance(value, types.ModuleType) else value
+        seen = seen | {value.__name__}
+        found = {name: getattr(value, name) for name in sorted(names) if hasattr(value, name)}
+        return [value.__name__, {name: self.used(each, names, seen) for name, each in found.items()}]
 
     def of_node(self, root: Node) -> str:
         """An expression by its structure."""
@@ -140,23 +157,9 @@ class _Reader:
                 continue
             stack.pop()
             if node.index not in known:
-                data = _Reader().of(_data(node))
-                text = " ".join([node.op, data, *(known[each.index] for each in node.args)])
+                text = " ".join([node.op, type(self)().digest(_data(node)), *(known[each.index] for each in node.args)])
                 known[node.index] = sha256(text.encode()).hexdigest()
         return known[root.index]
-
-
-_OF_CLASSES = (
-    types.FunctionType,
-    property,
-    classmethod,
-    staticmethod,
-    functools.cached_property,
-    int,
-    float,
-    str,
-    tuple,
-)
 
 
 def _data(node: Node) -> Any:
@@ -167,57 +170,16 @@ def _data(node: Node) -> Any:
     return node.data
 
 
-def _as_pickled(item: Any) -> list[Any]:
-    """What a pickle of an object would hold; nothing for what has none."""
-    if isinstance(item, property | classmethod | staticmethod | functools.cached_property):
-        return [getattr(item, name, None) for name in ("fget", "__func__", "func")]
-    try:
-        made = item.__reduce_ex__(4)
-    except Exception:  # locks, files and objects of users' own raise what they like
-        return [getattr(item, "__qualname__", "")]
-    return [made] if isinstance(made, str) else [type(item), *made[1:3], *(list(each or ()) for each in made[3:5])]
-
-
-def _of_function(function: types.FunctionType) -> list[Any]:
-    """What a function does: its code and all that it refers to."""
-    known, wanted = function.__globals__, _names(function.__code__)
-    named: dict[str, Any] = {}
-    for name in sorted(wanted & known.keys()):
-        named[name] = _of_module(known[name], wanted) if isinstance(known[name], types.ModuleType) else known[name]
-    cells = [_content(cell) for cell in function.__closure__ or ()]
-    return [function.__code__, function.__defaults__, function.__kwdefaults__, cells, named]
-
-
-def _of_module(module: types.ModuleType, wanted: set[str]) -> Any:
-    """A module of the user's: what a function may take from it."""
-    if _is_library(module):
-        return module
-    return [module.__name__, {name: getattr(module, name) for name in sorted(wanted) if hasattr(module, name)}]
-
-
-def _names(code: types.CodeType) -> set[str]:
-    """Names of globals and attributes in a function and in the functions inside it."""
-    inner = (_names(each) for each in code.co_consts if isinstance(each, types.CodeType))
-    return set(code.co_names).union(*inner)
-
-
-def _content(cell: types.CellType) -> Any:
-    try:
-        return cell.cell_contents
-    except ValueError:  # not bound yet
-        return None
-
-
-def _is_library(item: Any) -> bool:
-    """Whether something belongs to Python, to an installed package or to this one, where its name tells what it is."""
-    if isinstance(item, types.FunctionType):
-        if "<" in item.__qualname__:  # made in another function, of whose values it may hold some
-            return False
-        path = item.__code__.co_filename
-    else:
-        module = item if isinstance(item, types.ModuleType) else sys.modules.get(item.__module__)
-        path = getattr(module, "__file__", None) or ""
-        if not path:
-            return getattr(module, "__name__", "") != "__main__"
-    where = str(Path(path).resolve()) if path else ""
-    return where.startswith(_LIBRARY)
+def _imported(function: types.FunctionType, codes: Iterable[types.CodeType]) -> list[types.ModuleType]:
+    """Modules that a function imports."""
+    package, found = function.__globals__.get("__package__") or None, []
+    for code in codes:
+        steps = [*dis.get_instructions(code)]
+        for k, step in enumerate(steps):
+            if step.opname == "IMPORT_NAME":
+                try:  # two values before it: how many dots, and what is taken from it
+                    module = importlib.import_module("." * steps[k - 2].argval + step.argval, package)
+                except Exception:  # such as a library that is not installed
+                    raise CannotTellError(function) from None
+                found += [module, sys.modules[module.__name__.partition(".")[0]]]
+    return found

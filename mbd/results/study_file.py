@@ -49,7 +49,7 @@ class StudyFile:
         self.path, self.kind = Path(named_file(path, ".jsonl")), kind
         self.parts: list[dict[str, Any]] = []
         self.writes = True
-        head = {"format": f"mbd {kind} 2", **head}
+        head = {"format": f"mbd {kind} 3", **head}
         self._head = _seal("", head)
         with writing(self.path):
             begun = self.path.exists() and _begun(self.path)
@@ -86,9 +86,9 @@ class StudyFile:
         lines = _lines(self.path)
         first = next(lines, None)
         formats = first.get("format") if first else None
-        if formats == f"mbd {self.kind} 1":
+        if formats in (f"mbd {self.kind} 1", f"mbd {self.kind} 2"):
             raise ModelError(
-                f"file: {str(self.path)!r} was written by an earlier mbd, which did not note the laws of the model; "
+                f"file: {str(self.path)!r} was written by an earlier mbd, which told less of a study from another; "
                 "give another name"
             )
         if first is None or formats != head["format"]:

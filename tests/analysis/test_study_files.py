@@ -6,7 +6,10 @@ import json
 import random
 import subprocess
 import sys
+import threading
+import types
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -176,10 +179,90 @@ def test_a_disk_that_is_full_later_costs_no_run(tmp_path, monkeypatch):
 
 
 def test_digests_follow_from_what_things_are():
-    assert identity({"a": 1}) == identity({"a": 1.0}) != identity({"a": 2})
+    assert identity({"a": 1}) == identity({"a": 1}) != identity({"a": 1.0})
     assert identity(np.arange(3.0)) != identity(np.arange(3)) != identity([0, 1, 2])
     assert (
         identity(np.random.default_rng(1)) == identity(np.random.default_rng(1)) != identity(np.random.default_rng(2))
     )
     assert identity(np.sin) != identity(np.cos)
     assert identity({3, 1, 2}) == identity({1, 2, 3})
+
+
+MODULE = """
+from dataclasses import dataclass
+from functools import lru_cache
+import {beside} as beside
+class Law:
+    sizes, kin = [{1}], {{"a": ({2},)}}
+    def __call__(self, run): return self.sizes[0]
+class Heir(Law):
+    gain = property(lambda self: {3})
+@dataclass
+class Foot:
+    moved: float
+def of_import(run):
+    import {beside}
+    return {beside}.GAIN
+def of_from(run):
+    from {beside} import GAIN as gain
+    return gain
+def of_module(run): return beside.GAIN
+@lru_cache
+def of_cache(run): return {4}
+"""
+MADE = {
+    "import in a function": (0, lambda own: own.of_import), "from in a function": (0, lambda own: own.of_from),
+    "module beside": (0, lambda own: own.of_module), "list of a class": (1, lambda own: own.Law()),
+    "dictionary of a class": (2, lambda own: own.Law), "class between": (3, lambda own: own.Heir()),
+    "method of an object": (1, lambda own: own.Law().__call__), "decorated": (4, lambda own: own.of_cache),
+    "a field 'moved'": (5, lambda own: own.Foot(own.NUMBERS[5])),
+    "captured list": (5, lambda own: partial(max, [own.NUMBERS[5]])),
+}  # fmt: skip
+"""What a function of a user's module refers to, by the place of its number."""
+
+
+@pytest.mark.parametrize("where", ["a script", "an installed package", "__main__ of cProfile"])
+@pytest.mark.parametrize("what", MADE)
+def test_everything_that_a_function_refers_to_counts(what, where, tmp_path, monkeypatch):
+    import cProfile
+
+    place, make = MADE[what]
+    path = {"a script": tmp_path}.get(where, Path(np.__file__).parents[1])
+    name = "__main__" if where.startswith("__main__") else "own_study_words"
+
+    def digest(numbers):
+        own, beside = types.ModuleType(name), types.ModuleType("own_words_beside")
+        beside.GAIN, own.NUMBERS = numbers[0], numbers
+        own.__file__ = str(path / "words.py")
+        monkeypatch.setitem(sys.modules, "own_words_beside", beside)
+        monkeypatch.setitem(sys.modules, name, own)
+        exec(MODULE.format(*numbers, beside="own_words_beside"), own.__dict__)
+        if name == "__main__":  # whose globals are those of the script, while the module is that of the profiler
+            monkeypatch.setitem(sys.modules, name, cProfile)
+        return identity(make(own))
+
+    numbers = [0.5] * 6
+    other = [0.75 if k == place else number for k, number in enumerate(numbers)]
+    assert digest(numbers) == digest([*numbers]) != digest(other)
+
+
+def test_runs_that_a_function_has_captured_count_with_their_parameters():
+    model = mbd.Model("still", gravity=(0.0, 0.0, 0.0))
+    rod = mbd.Link("rod", 1.0, 1.0, 0.5, 0.1)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    start = mbd.assemble(model, backend="python")
+    made = [
+        mbd.simulate(model, start, dt=0.1, until=0.2, backend="python", parameters={"rod.mass": mass})
+        for mass in (1.1, 1.1, 1.2)
+    ]
+    one, again, other = (identity(lambda run, seen=run: run.t - seen.t) for run in made)
+    assert one == again != other
+
+
+@pytest.mark.parametrize(
+    "unknown", [threading.Lock(), (x for x in "ab"), lambda run: eval("run"), lambda run: vars(run), sys.stdout]
+)
+def test_what_cannot_be_read_is_refused_by_name(unknown, tmp_path):
+    with pytest.raises(mbd.ModelError, match="file: the study depends on <.*nobody can tell whether .*leave file= out"):
+        study(tmp_path / "a", results={"swing": lambda run: unknown})
+    study(tmp_path / "b", results={"swing": lambda run: 1.0})
