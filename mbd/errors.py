@@ -20,6 +20,7 @@ __all__ = [
     "TrajectoryError",
     "UnknownNameError",
     "nearest",
+    "quoted",
 ]
 
 
@@ -134,6 +135,16 @@ COMPONENT = re.compile(r"(.*)\.[wxyz123](\..*)?")
 
 SHOWN = 12
 """Names that are listed of many."""
+
+
+def quoted(names: Iterable[str], most: int = 6) -> str:
+    """Some names for a message, each once, and how many more there are.
+
+    >>> quoted(["hip", "knee", "hip", "ankle"], 2)
+    "'hip', 'knee' and 1 more"
+    """
+    once = list(dict.fromkeys(names))
+    return ", ".join(map(repr, once[:most])) + (f" and {len(once) - most} more" if once[most:] else "")
 
 
 def nearest(

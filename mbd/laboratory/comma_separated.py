@@ -12,7 +12,7 @@ from mbd.errors import TrajectoryError
 from mbd.laboratory.plates_by_column import plates_by_column
 from mbd.laboratory.recording import Recording
 from mbd.laboratory.storage import read_storage
-from mbd.laboratory.text import MAX_HEADER, NUMBER, Lines, numbers_of, read_lines
+from mbd.laboratory.text import MAX_HEADER, NUMBER, Lines, numbers_of, read_lines, times_of
 from mbd.laboratory.units import factor_of, is_length, split_unit
 
 __all__ = ["read_csv", "write_csv"]
@@ -60,13 +60,7 @@ def read_csv(path: Path) -> Recording:
     table = numbers_of(source, rows, len(names), comma=mark != ",")
     factors = [_factor(source, first, *label) for label in labels[: len(names)]]
     table = table * np.array(factors)
-    time = table[:, at]
-    gap = np.flatnonzero(~np.isfinite(time))
-    if len(gap):
-        raise source.wrong(rows[int(gap[0])][0], "the time is missing")
-    steps = np.flatnonzero(np.diff(time) <= 0.0)
-    if len(steps):
-        raise source.wrong(rows[int(steps[0]) + 1][0], "the time does not increase from the row before")
+    time = times_of(source, table[:, at], rows)
     units = {name: unit for name, unit in labels if unit}
     notes = [f"units in the file: {', '.join(sorted(set(units.values())))}"] if units else []
     columns = {name: table[:, k] for k, name in enumerate(names) if k != at and name}

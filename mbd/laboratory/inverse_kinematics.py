@@ -16,7 +16,7 @@ from mbd.bodies.values import named_number_faults, number, shown
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of
 from mbd.equations.equations import Equations
-from mbd.errors import ModelError, nearest
+from mbd.errors import ModelError, nearest, quoted
 from mbd.joints.free import Free
 from mbd.laboratory.kinematics_result import InverseKinematics, stops_of
 from mbd.laboratory.marker_program import MarkerProgram, marker_program, point_names
@@ -134,12 +134,11 @@ def _pairs(
                 f"points such as mbd.Marker({next(iter(recording.markers), 'RHEE')!r}, foot, (0.1, 0.0))"
             )
         if rest:
-            notes.append(f"{len(rest)} markers are no points of the model: {', '.join(map(repr, rest[:5]))}")
+            notes.append(f"{len(rest)} markers are no points of the model: {quoted(rest, 5)}")
         own = [frame.name for frame in getattr(model, "markers", ()) if isinstance(frame, Marker)]
         absent = [name for name in own if name not in found.values()]
         if absent:
-            more = f" and {len(absent) - 5} more" if absent[5:] else ""
-            notes.append(f"the recording lacks markers of the model: {', '.join(map(repr, absent[:5]))}{more}")
+            notes.append(f"the recording lacks markers of the model: {quoted(absent, 5)}")
         return found
     if not isinstance(markers, Mapping) or not markers:
         raise ModelError(

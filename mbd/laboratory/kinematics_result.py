@@ -12,6 +12,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
+from mbd.errors import quoted
 from mbd.forces.smoothing import smoothed
 from mbd.laboratory.nearest_posture import Postures, Problem
 from mbd.laboratory.quaternion_rates import make_continuous, quaternion_rates
@@ -75,13 +76,13 @@ class InverseKinematics:
         if found.unseen.any():
             hidden = [name for name, free in zip(names, found.unseen, strict=True) if free]
             remarks.append(
-                f"markers do not determine {', '.join(map(repr, hidden[:5]))}{' and others' if hidden[5:] else ''} in "
-                "all frames; what is not determined stays as in the frame before"
+                f"markers do not determine {quoted(hidden, 5)} in all frames; what is not determined stays as in the "
+                "frame before"
             )
         if found.stopped.any():
             stops = [equations.contacts[k].name for k in stops_of(equations)]
             reached = [name for name, own in zip(stops, found.stopped.T, strict=True) if own.any()]
-            remarks.append(f"stops reached: {', '.join(map(repr, reached[:5]))}")
+            remarks.append(f"stops reached: {quoted(reached, 5)}")
         if cutoff is not None:
             remarks.append(f"coordinates filtered at {cutoff:g} Hz before their rates were taken")
         q, v, a = _rates(equations, time, found.q, cutoff)

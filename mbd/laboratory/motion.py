@@ -15,7 +15,7 @@ from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
-from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest, quoted
 from mbd.forces.samples import Samples, in_degrees
 from mbd.laboratory.closed_loops import close_loops, refuse_open_loops
 from mbd.laboratory.quaternion_rates import make_continuous, quaternion_rates
@@ -133,7 +133,7 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
         raise ModelError(
             f"motion: the coordinate {missing[0]!r} of '{equations.name}' is missing"
             f"{f', and {len(missing) - 1} more' if missing[1:] else ''}; give values of all of them at the times"
-            f"{'; the recording has ' + _few(unused) if unused else ''}"
+            f"{'; the recording has ' + quoted(unused) if unused else ''}"
         )
     turned, spinning = set[int](), list[tuple[int, slice]]()
     waiting: list[tuple[Vector, Vector | None, Vector | None]] = []
@@ -176,7 +176,7 @@ def _of_arrays(model: Any, mechanism: Mechanism, given: Mapping[str, Any], chang
         make_continuous(q[at : at + 4], names[at].removesuffix(".w"))
     _differentiate(time, q, v, a, waiting, spinning)
     doubt(*_in_degrees(equations, q), *_in_milliseconds(time), of=model)
-    remarks = (f"channels that are no coordinates are not used: {_few(unused)}",) if unused else ()
+    remarks = (f"channels that are no coordinates are not used: {quoted(unused)}",) if unused else ()
     motion = Motion(time, q.T, v.T, a.T, None, remarks, bool(spinning or waiting))
     return motion if not missing else _closed(model, mechanism, motion, missing, changed)
 
@@ -309,10 +309,6 @@ def _of_recording(equations: Equations, recording: Recording) -> tuple[dict[str,
     return {"time": recording.time, **used}, [name for name in recording.channels if name not in used]
 
 
-def _few(names: Sequence[str]) -> str:
-    return ", ".join(map(repr, names[:6])) + (f" and {len(names) - 6} more" if names[6:] else "")
-
-
 def _spellings(names: list[str]) -> dict[str, str]:
     """Names without spaces, and of joints with one coordinate without its label."""
     plain = {"_".join(name.split()): name for name in names}
@@ -374,6 +370,5 @@ def _closed(
     known = (motion.q, motion.v, motion.a)
     found = close_loops(mechanism, motion.time, known, missing, assembled, parameters)
     refuse_open_loops(found, mechanism.equations, motion.time, missing)
-    shown_names = ", ".join(map(repr, missing[:4])) + (f" and {len(missing) - 4} more" if missing[4:] else "")
-    remarks = (*motion.notes, f"{shown_names} follow from the closed loops")
+    remarks = (*motion.notes, f"{quoted(missing, 4)} follow from the closed loops")
     return Motion(motion.time, found.q, found.v, found.a, None, remarks)

@@ -11,7 +11,7 @@ from mbd.arrays import Vector
 from mbd.errors import TrajectoryError
 from mbd.laboratory.plates_by_column import plates_by_column
 from mbd.laboratory.recording import Recording
-from mbd.laboratory.text import Lines, numbers_of, read_lines, with_tabs
+from mbd.laboratory.text import Lines, numbers_of, read_lines, times_of, with_tabs
 from mbd.laboratory.units import split_unit
 
 __all__ = ["read_storage", "write_storage_text"]
@@ -52,7 +52,7 @@ def read_storage(path: Path) -> Recording:
     promised = header.get("nrows", header.get("datarows", ""))
     if promised.isdigit() and int(promised) != len(rows):
         notes.append(f"the header promises {promised} rows, the file has {len(rows)}")
-    time = _times(source, table[:, 0], rows)
+    time = times_of(source, table[:, 0], rows)
     degrees = header.get("indegrees", "no").lower() in ("yes", "true", "1", "y")
     channels: dict[str, Vector] = {}
     turned = 0
@@ -107,16 +107,6 @@ def _labels(source: Lines, number: int) -> list[str]:
     return labels
 
 
-def _times(source: Lines, time: Vector, rows: list[tuple[int, list[str]]]) -> Vector:
-    gap = np.flatnonzero(~np.isfinite(time))
-    if len(gap):
-        raise source.wrong(rows[int(gap[0])][0], "the time is missing")
-    steps = np.flatnonzero(np.diff(time) <= 0.0)
-    if len(steps):
-        raise source.wrong(rows[int(steps[0]) + 1][0], "the time does not increase from the row before")
-    return time
-
-
 def _of_vectors(
     source: Lines, rows: list[tuple[int, list[str]]], labels: list[str], header: dict[str, str]
 ) -> Recording:
@@ -131,7 +121,7 @@ def _of_vectors(
             flat += parts if cell.strip() else ["", "", ""]
         wide.append((line, flat))
     table = numbers_of(source, wide, 1 + 3 * (len(labels) - 1))
-    time = _times(source, table[:, 0], rows)
+    time = times_of(source, table[:, 0], rows)
     factor = 1e-3 if header.get("units", "m").lower() in ("mm", "millimeters") else 1.0
     unit = "m" if factor == 1.0 else "mm"
     note = f"{len(labels) - 1} columns of three numbers are markers in {unit}, whatever they hold"

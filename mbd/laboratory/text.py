@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 from mbd.free_memory import available
 
-__all__ = ["MAX_HEADER", "Lines", "numbers_of", "read_lines", "with_tabs"]
+__all__ = ["MAX_HEADER", "Lines", "numbers_of", "read_lines", "times_of", "with_tabs"]
 
 MAX_HEADER = 100
 """Lines within which the header of a storage file ends."""
@@ -111,3 +111,14 @@ def numbers_of(source: Lines, rows: Sequence[tuple[int, Sequence[str]]], width: 
                 shown = cells[j].strip()
                 raise source.wrong(line, f"column {j + 1} holds {shown[:40]!r}; a number or a gap is expected")
     return out
+
+
+def times_of(source: Lines, time: Vector, rows: Sequence[tuple[int, Sequence[str]]]) -> Vector:
+    """Times of rows, of which each is there and later than the one before; the error has the line."""
+    gap = np.flatnonzero(~np.isfinite(time))
+    if len(gap):
+        raise source.wrong(rows[int(gap[0])][0], "the time is missing")
+    steps = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(steps):
+        raise source.wrong(rows[int(steps[0]) + 1][0], "the time does not increase from the row before")
+    return time

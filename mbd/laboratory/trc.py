@@ -15,7 +15,7 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.errors import TrajectoryError
 from mbd.laboratory.recording import Recording
-from mbd.laboratory.text import Lines, numbers_of, read_lines, with_tabs
+from mbd.laboratory.text import Lines, numbers_of, read_lines, times_of, with_tabs
 from mbd.laboratory.units import factor_of, is_length
 
 __all__ = ["read_trc", "write_trc"]
@@ -130,10 +130,7 @@ def _times(
             raise source.wrong(rows[wrong][0], "the time is missing, and frames with a DataRate are not there either")
         time = (frames - 1.0) / rate
         notes.append(f"times follow from the frames at {rate:g} Hz")
-    steps = np.flatnonzero(np.diff(time) <= 0.0)
-    if len(steps):
-        raise source.wrong(rows[int(steps[0]) + 1][0], "the time does not increase from the frame before")
-    return time
+    return times_of(source, time, rows)
 
 
 def write_trc(recording: Recording, target: Path) -> str:

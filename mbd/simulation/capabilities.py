@@ -6,11 +6,12 @@ pair of the table run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
+from mbd.errors import quoted
 from mbd.integrators import KINDS, Integrator
 
 __all__ = ["LAWS", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
@@ -108,21 +109,15 @@ def refusals(equations: Equations, scheme: Integrator, options: Mapping[str, Any
     if options.get("tol") is not None:
         texts.append(scheme.check_tolerance(len(held)))
         found += [text for (argument, value), text in WITH_TOLERANCE.items() if options.get(argument) == value]
-    found += [f"{text} (rows on positions: {_listed(held)})" if held else text for text in texts if text]
+    found += [f"{text} (rows on positions: {quoted(held, 4)})" if held else text for text in texts if text]
     if equations.impulses and options.get("contact") == "nonsmooth":
         found.append(
-            f"contact='nonsmooth' locates no strike at which {_listed([each.name for each in equations.impulses])} "
+            f"contact='nonsmooth' locates no strike at which {quoted([each.name for each in equations.impulses], 4)} "
             "could act; use contact='events'"
         )
     if equations.compose is not None and not scheme.any_chart:
         found.append(f"{scheme!r} moves coordinates along q + x, which {CHARTED_JOINTS}; use mbd.HHT(0.05)")
     return found
-
-
-def _listed(names: Sequence[str], most: int = 4) -> str:
-    """Some names, quoted, each once."""
-    once = list(dict.fromkeys(names))
-    return ", ".join(map(repr, once[:most])) + (f" and {len(once) - most} more" if len(once) > most else "")
 
 
 def _cells() -> list[list[str]]:

@@ -11,6 +11,7 @@ from mbd.bodies.link import Link
 from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.measures import JointMeasure
 from mbd.constraints.spring_leg import SpringLeg
+from mbd.errors import quoted
 from mbd.forces.muscles.wrapping import WrappingCylinder
 from mbd.forces.samples import Samples, in_degrees
 from mbd.forces.spring import Spring
@@ -166,10 +167,10 @@ def _wrapped(model: Any) -> list[str]:
             found.append(force.name)
     if not found:
         return []
-    names = ", ".join(map(repr, found[:4])) + (f" and {len(found) - 4} more" if found[4:] else "")
     return [
-        f"the path of {names} goes around two cylinders that follow each other and have no side; the shorter way "
-        "around one depends on that around the other, so that either side is possible: give WrappingCylinder(…, side=)"
+        f"the path of {quoted(found, 4)} goes around two cylinders that follow each other and have no side; the "
+        "shorter way around one depends on that around the other, so that either side is possible: give "
+        "WrappingCylinder(…, side=)"
     ]
 
 

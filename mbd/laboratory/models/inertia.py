@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.equal import EQUAL_RTOL
+from mbd.errors import ModelError, quoted
+from mbd.laboratory.models.report import ImportReport
 
-__all__ = ["possible_inertia"]
+__all__ = ["note_repairs", "possible_inertia"]
 
 
 def possible_inertia(tensor: Matrix) -> Matrix:
@@ -21,3 +25,14 @@ def possible_inertia(tensor: Matrix) -> Matrix:
         return tensor
     second = np.maximum(second, 0.0)
     return np.asarray(axes @ np.diag(second.sum() - second) @ axes.T)
+
+
+def note_repairs(file: str, broken: Sequence[str], repair: bool, report: ImportReport) -> None:
+    """Note bodies whose inertia was made possible; an error where that was not asked for."""
+    if broken and not repair:
+        raise ModelError(
+            f"{file}: no body can have the moments of inertia of {quoted(broken)}: one is negative, or larger than the "
+            "two others together; repair=True takes the nearest that a body can have"
+        )
+    if broken:
+        report.approximated.append(f"moments of inertia made possible: {quoted(broken)}")

@@ -18,7 +18,7 @@ from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.measures import extension, flexion
 from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
-from mbd.errors import ModelError
+from mbd.errors import ModelError, quoted
 from mbd.forces.rotor import Rotor
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
@@ -237,15 +237,14 @@ class _Reader:
                 report.left_out.append(text)
         turned = [joint.name for k, joint in self.of_joint.items() if kinds[k] >= SLIDE and self._reference(k)]
         if turned:
-            names = ", ".join(map(repr, turned[:6]))
-            report.approximated.append(f"coordinates are counted from the posture of the file: {names}")
+            report.approximated.append(f"coordinates are counted from the posture of the file: {quoted(turned)}")
         if self.rotors:
-            names = ", ".join(map(repr, self.rotors[:6]))
+            names = quoted(self.rotors)
             report.understood.append(f"armature (inertia of rotors) of {len(self.rotors)} joints: {names}")
         dofs = {k: int(source.jnt_dofadr[k]) for k in self.of_joint}
         heavy = [j.name for k, j in self.of_joint.items() if kinds[k] < SLIDE and source.dof_armature[dofs[k]] > 0.0]
         if heavy:
-            report.left_out.append(f"armature of joints of several coordinates: {', '.join(map(repr, heavy[:6]))}")
+            report.left_out.append(f"armature of joints of several coordinates: {quoted(heavy)}")
         others = sum(int(kind) != EQUAL_JOINTS for kind in source.eq_type)
         rest = {
             "shapes (contacts)": source.ngeom, "actuators": source.nu, "tendons": source.ntendon,

@@ -10,13 +10,12 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.bodies.marker import Marker
 from mbd.bodies.rigid_body import RigidBody
-from mbd.errors import ModelError
+from mbd.errors import quoted
 from mbd.joints.free import Free
-from mbd.laboratory.models.inertia import possible_inertia
+from mbd.laboratory.models.inertia import note_repairs, possible_inertia
 from mbd.laboratory.models.osim_constraints import Coupler, couplers_of, hold, loops_closed
 from mbd.laboratory.models.osim_elements import (
     flag_of,
-    listed,
     number_of,
     numbers_of,
     objects_in,
@@ -103,13 +102,7 @@ def _bodies(file: OsimFile) -> dict[str, Element]:
         file.bodies[name] = RigidBody(name, mass, _six(fixed), center)
     if not elements:
         raise file.source.wrong("has no bodies")
-    if broken and not file.repair:
-        raise ModelError(
-            f"{file.source.file}: no body can have the moments of inertia of {listed(broken)}: one is negative, "
-            "or larger than the two others together; repair=True takes the nearest that a body can have"
-        )
-    if broken:
-        file.report.approximated.append(f"moments of inertia made possible: {listed(broken)}")
+    note_repairs(file.source.file, broken, file.repair, file.report)
     return elements
 
 
@@ -151,22 +144,22 @@ def _summary(file: OsimFile, joints: list[OsimJoint], couplers: list[Coupler], m
     first = [f"{len(file.bodies)} bodies and {len(joints)} joints ({counts}), {len(file.coordinates)} coordinates"]
     if file.dependents:
         first.append(
-            f"motions that are functions of coordinates, as rows: {listed(m.name for m, _ in file.dependents)}"
+            f"motions that are functions of coordinates, as rows: {quoted(m.name for m, _ in file.dependents)}"
         )
     if file.measured:
-        first.append(f"coordinates that no motion is by itself, of joints without mass: {listed(file.measured)}")
+        first.append(f"coordinates that no motion is by itself, of joints without mass: {quoted(file.measured)}")
     if couplers:
-        first.append(f"couplers as rows: {listed(each.name for each in couplers)}")
+        first.append(f"couplers as rows: {quoted(each.name for each in couplers)}")
     coordinates = file.coordinates.values()
     locked = [each.name for each in coordinates if each.locked]
     clamped = [each.name for each in coordinates if each.is_limited]
     empty = [each.name for each in coordinates if each.clamped and not each.locked and not each.is_limited]
     if locked:
-        first.append(f"locked coordinates as rows: {listed(locked)}")
+        first.append(f"locked coordinates as rows: {quoted(locked)}")
     if clamped and file.stops:
-        first.append(f"clamped coordinates with stops: {listed(clamped)}")
+        first.append(f"clamped coordinates with stops: {quoted(clamped)}")
     if file.loops:
-        first.append(f"constraints that close loops, as joints: {listed(each[0] for each in file.loops)}")
+        first.append(f"constraints that close loops, as joints: {quoted(each[0] for each in file.loops)}")
     if muscles:
         first.append(f"{muscles} muscles, which act where they are applied: model.apply(*found.muscles.values())")
     if markers:
@@ -174,15 +167,15 @@ def _summary(file: OsimFile, joints: list[OsimJoint], couplers: list[Coupler], m
     report.understood[:0] = first
     left = report.left_out
     if clamped and not file.stops:
-        left.append(f"ranges of clamped coordinates, stops=True makes stops of them: {listed(clamped)}")
+        left.append(f"ranges of clamped coordinates, stops=True makes stops of them: {quoted(clamped)}")
     if empty:
-        left.append(f"ranges of clamped coordinates, whose lower end is not below the upper one: {listed(empty)}")
+        left.append(f"ranges of clamped coordinates, whose lower end is not below the upper one: {quoted(empty)}")
     prescribed = [each.name for each in coordinates if flag_of(each.element, "prescribed")]
     if prescribed:
-        left.append(f"prescribed functions of time: {listed(prescribed)}")
+        left.append(f"prescribed functions of time: {quoted(prescribed)}")
     moving = [each.name for each in coordinates if number_of(each.element, "default_speed_value", 0.0)]
     if moving:
-        left.append(f"default speeds: {listed(moving)}")
+        left.append(f"default speeds: {quoted(moving)}")
     for child in file.source:
         if child.tag not in READ:
             tags = [each.tag for each in child.find("objects") or () if not is_muscle(each)]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 from mbd.laboratory.models.xml import Element
 
-__all__ = ["flag_of", "listed", "number_of", "numbers_of", "objects_in", "plain", "text_of", "unlike"]
+__all__ = ["flag_of", "number_of", "numbers_of", "objects_in", "plain", "text_of", "unlike"]
 
 
 def objects_in(owner: Element, tag: str) -> list[Element]:
@@ -27,11 +26,6 @@ def unlike(name: str, taken: set[str], behind: str = " again") -> str:
         name += behind
     taken.add(name)
     return name
-
-
-def listed(names: Iterable[str]) -> str:
-    names = list(names)
-    return ", ".join(map(repr, names[:6])) + (f" and {len(names) - 6} more" if names[6:] else "")
 
 
 def text_of(owner: Element, tag: str, otherwise: str | None = None) -> str:

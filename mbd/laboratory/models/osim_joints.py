@@ -11,13 +11,14 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.algebra import constant_rotation
 from mbd.bodies.rigid_body import RigidBody
+from mbd.errors import quoted
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
 from mbd.joints.prismatic import Prismatic
 from mbd.joints.revolute import Revolute
 from mbd.joints.spherical import Spherical
 from mbd.joints.weld import Weld
-from mbd.laboratory.models.osim_elements import flag_of, listed, number_of, numbers_of, objects_in, plain, text_of
+from mbd.laboratory.models.osim_elements import flag_of, number_of, numbers_of, objects_in, plain, text_of
 from mbd.laboratory.models.osim_file import (
     Motion,
     OsimCoordinate,
@@ -199,13 +200,13 @@ def tree_of(file: OsimFile, joints: list[OsimJoint]) -> list[OsimJoint]:
         above[child] = joint
     loose = [name for name in file.bodies if name not in above]
     if loose:
-        raise file.source.wrong(f"has no joint of the bodies {listed(loose)} to a parent")
+        raise file.source.wrong(f"has no joint of the bodies {quoted(loose)} to a parent")
     reached, ordered = {"ground"}, list[OsimJoint]()
     while len(ordered) < len(joints):
         found = [each for each in joints if each.child[0] not in reached and each.parent[0] in reached]
         if not found:
             circle = [each.name for each in joints if each.child[0] not in reached]
-            raise file.source.wrong(f"has joints that no way from the ground reaches: {listed(circle)}")
+            raise file.source.wrong(f"has joints that no way from the ground reaches: {quoted(circle)}")
         ordered += found
         reached |= {each.child[0] for each in found}
     return ordered

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from mbd.bodies.base import Frame
-from mbd.errors import ModelError
+from mbd.errors import ModelError, quoted
 from mbd.forces.muscles import Muscle, ViaPoint, WrappingEllipsoid
 from mbd.laboratory.models.osim_elements import (
     flag_of,
-    listed,
     number_of,
     numbers_of,
     objects_in,
@@ -74,13 +73,13 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
     report = file.report
     for kind, muscles in surfaces.straight.items():
         report.approximated.append(
-            f"paths around {kind} go straight, so that their moment arms differ: {listed(dict.fromkeys(muscles))}"
+            f"paths around {kind} go straight, so that their moment arms differ: {quoted(dict.fromkeys(muscles))}"
         )
     round_ones = [name for name in surfaces.used if isinstance(surfaces.known[name], WrappingEllipsoid)]
     if round_ones:
         report.approximated.append(
             f"paths around ellipsoids lie in planes, longer than the shortest ones by less than a thousandth of the "
-            f"radii most of the time: {listed(sorted(round_ones))}"
+            f"radii most of the time: {quoted(sorted(round_ones))}"
         )
     if surfaces.used:
         report.approximated.append(
@@ -88,15 +87,15 @@ def muscles_of(file: OsimFile) -> dict[str, Muscle]:
             "with a jump"
         )
     if others:
-        report.approximated.append(f"curves of De Groote and Fregly stand for others: {listed(others)}")
+        report.approximated.append(f"curves of De Groote and Fregly stand for others: {quoted(others)}")
     if slow:
         report.approximated.append(
-            f"velocity of fibers, of which there is none, as {Muscle.max_velocity:g} 1/s: {listed(slow)}"
+            f"velocity of fibers, of which there is none, as {Muscle.max_velocity:g} 1/s: {quoted(slow)}"
         )
     if pathless:
-        report.left_out.append(f"muscles without a <GeometryPath>: {listed(pathless)}")
+        report.left_out.append(f"muscles without a <GeometryPath>: {quoted(pathless)}")
     if off:
-        report.left_out.append(f"muscles that are switched off: {listed(off)}")
+        report.left_out.append(f"muscles that are switched off: {quoted(off)}")
     return found
 
 

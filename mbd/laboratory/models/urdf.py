@@ -17,14 +17,14 @@ from mbd.constraints.bilateral import Bilateral
 from mbd.constraints.measures import extension, flexion
 from mbd.constraints.unilateral import Unilateral
 from mbd.constraints.user_measure import measure
-from mbd.errors import ModelError
+from mbd.errors import quoted
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
 from mbd.joints.losses import Coulomb, Viscous
 from mbd.joints.prismatic import Prismatic
 from mbd.joints.revolute import Revolute
 from mbd.joints.weld import Weld
-from mbd.laboratory.models.inertia import possible_inertia
+from mbd.laboratory.models.inertia import note_repairs, possible_inertia
 from mbd.laboratory.models.report import ImportedModel, ImportReport
 from mbd.laboratory.models.xml import Element, read_xml
 from mbd.model import Model
@@ -112,14 +112,7 @@ def _bodies(root: Element, report: ImportReport, repair: bool) -> dict[str, Body
         found[name] = RigidBody(title, mass, tuple(map(float, elements)), center)
     if not found:
         raise root.wrong("has no links")
-    if broken and not repair:
-        raise ModelError(
-            f"{root.file}: no body can have the moments of inertia of {', '.join(map(repr, broken[:6]))}"
-            f"{f' and {len(broken) - 6} more' if broken[6:] else ''}: one is negative, or larger than the two others "
-            "together; repair=True takes the nearest that a body can have"
-        )
-    if broken:
-        report.approximated.append(f"moments of inertia made possible: {', '.join(map(repr, broken))}")
+    note_repairs(root.file, broken, repair, report)
     if hollow:
         report.approximated.append(f"inertia without a mass taken as none: {', '.join(map(repr, hollow))}")
     if massless:
@@ -286,9 +279,7 @@ def _mimics(links: list[Element], joints: dict[str, Joint], report: ImportReport
         coupled = measure(partial(_apart, factor=factor, offset=offset), *coordinates, unit=unit)
         found.append(Bilateral(f"{name} mimic", coupled))
     if found:
-        report.understood.append(
-            f"{len(found)} mimics as couplings: {', '.join(repr(each.name) for each in found[:6])}"
-        )
+        report.understood.append(f"{len(found)} mimics as couplings: {quoted(each.name for each in found)}")
     return found
 
 
