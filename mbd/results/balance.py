@@ -23,7 +23,7 @@ from mbd.equal import NOMINAL_RTOL, REST_SPEED, ROUND_OFF_RTOL
 from mbd.equations import programs
 from mbd.equations.equations import Equations
 from mbd.equations.magnitudes import magnitudes
-from mbd.kernel.algebra.redundancy import MIN_LIMIT_SHARE
+from mbd.kernel.algebra.redundancy import JOINT_SHARE, MIN_LIMIT_SHARE
 from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
@@ -158,12 +158,14 @@ class Balance:
         return way
 
     def _shares(self, held: Held, limits: Matrix) -> Matrix:
-        """W of the rows that hold (k, every): 1, or the limit of the friction that holds one over the largest."""
+        """W of the rows that hold (k, every): as of `mbd.kernel.algebra.redundancy.share`."""
         largest = np.max(limits, axis=1, initial=0.0)
         weight = np.ones((len(limits), len(held.every)))
         for place, row in enumerate(held.every):
             friction = self.equations.rows[row].friction
-            if friction >= 0:
+            if friction < 0 and self.equations.rows[row].contact < 0:
+                weight[:, place] = JOINT_SHARE
+            elif friction >= 0:
                 part = np.divide(limits[:, friction], largest, out=np.ones_like(largest), where=largest > 0.0)
                 weight[:, place] = np.maximum(part, MIN_LIMIT_SHARE)
         return weight

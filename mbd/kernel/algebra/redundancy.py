@@ -15,7 +15,10 @@ from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions, Model, Reals, Singular
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["find_dependent", "find_dependence", "find_shares", "shared", "sharing", "spread", "take_shares"]
+__all__ = [
+    "JOINT_SHARE", "MIN_LIMIT_SHARE", "find_dependence", "find_dependent", "find_shares", "shared", "sharing", "spread",
+    "take_shares",
+]  # fmt: skip
 
 
 SHORT_ROW_RATIO = 1e-2
@@ -29,6 +32,13 @@ NOT_YET_JUDGED = 2
 
 Two feet that stick hold the line through them twice. Of the four tangents the one that lies along that line is left
 out, else the coefficients of the one that is are large, and at the limit there are none.
+"""
+
+JOINT_SHARE = 2.0**26
+"""Size of multipliers of rows that always act over those of contacts with which they count the same [-].
+
+Contacts open and slide by their multipliers: these must not follow from which joints are cut, and have rows of their
+own. So contacts share a load with the least norm of theirs, however large those of joints are for it.
 """
 
 MIN_LIMIT_SHARE = 1e-4
@@ -219,8 +229,10 @@ def largest_limit(K: Frictions) -> float:
 
 
 def share(K: ContactRows, row: int, largest: float) -> float:
-    """Size W by which a multiplier counts: parallel frictions then share their load in the ratio of their limits."""
+    """Size W by which a multiplier counts: joints follow contacts, parallel frictions share by the ratio of limits."""
     f = K.row_friction[row]
+    if f < 0 and K.row_contact[row] < 0:
+        return JOINT_SHARE
     if f < 0 or largest == 0.0:
         return 1.0
     return float(max(K.limit[f] / largest, MIN_LIMIT_SHARE))
