@@ -154,7 +154,12 @@ class Mechanism:
 
     def _made_at_once(self) -> Made:
         """What steps of every mode need."""
-        made = {"accelerations": self._accelerations, "guards": programs.guards(self.equations)}
+        n, untouched = self.layout.n, self.equations.tape.untouched  # M alone is ever written to by others
+        of_rows = range(n * (n + 1), n * (n + 1) + 2 * n * self.layout.n_rows)
+        accelerations = [
+            untouched if node.is_zero and k in of_rows else node for k, node in enumerate(self._accelerations)
+        ]
+        made = {"accelerations": accelerations, "guards": programs.guards(self.equations)}
         composed = programs.compose(self.equations)
         if composed is not None:
             made |= {"compose": composed, "increment_rates": programs.increment_rates(self.equations)}
@@ -366,6 +371,16 @@ class Mechanism:
         later = Postponed(make, size)
         self.postponed.append(later)
         return later
+
+    def order(self, rows: tuple[int, ...]) -> Any | None:
+        """The order in which matrices of accelerations with these rows are eliminated, None where it does not pay."""
+
+        def make() -> Made:
+            places = self._filled.places(self.layout.n, rows)
+            return {}, {"order": self._order(dict.fromkeys(places, True), rows)}
+
+        question = "order of accelerations", rows
+        return self.kept((Mechanism.order, rows), lambda: _numbers(self._compiled(question, make)["order"]))
 
     def _order(self, tangent: Mapping[tuple[int, int], bool], rows: Sequence[int]) -> list[int] | None:
         """The order in which the matrices of these rows are eliminated, None where it does not pay."""

@@ -23,11 +23,12 @@ OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)
 
 
 def order_at(K: Motion, m: int) -> int:
-    """Where the order for the m rows in K.rows begins in K.orders, 0 if there is none."""
+    """Where the order for the m rows in K.rows begins in K.orders, 0 if there is none.
+
+    Before a run has a mode it is that of its start, which K.orders begins with the place of.
+    """
     mode = K.mode_id
-    if mode < 0 or mode >= K.n_modes:
-        return 0
-    o = K.mode_order[mode]
+    o = K.orders[0] if mode < 0 or mode >= K.n_modes else K.mode_order[mode]
     if o == 0 or K.orders[o + 1] != m:
         return 0
     for k in range(m):

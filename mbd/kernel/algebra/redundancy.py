@@ -7,9 +7,10 @@ Where one does, its force depends on how a load is shared (other μ, other drag)
 
 from __future__ import annotations
 
-from mbd.equal import RANK_RTOL
+from mbd.equal import DIRECT_PIVOT_RTOL, RANK_RTOL
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.linear import factor, solve
+from mbd.kernel.algebra.ordered import SYMMETRIC, factor_ordered, order_at
 from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions, Model, Reals, Singular
@@ -50,7 +51,8 @@ def find_dependent(K: DependentRows, m: int) -> None:
 
     Gram–Schmidt on columns scaled by √M_ii, by turns: in the order of the rows those come first of which a tenth is
     left, then those of which a hundredth is, and so on, short ones after the others of the first turns; B is that of
-    K.acc. What is kept is as independent as any choice is, but for a factor of ten.
+    K.acc. What is kept is as independent as any choice is, but for a factor of ten. Where none is short and elimination
+    in an order chosen beforehand keeps much of each, none depends on others.
     """
     K.n_dropped = 0
     K.dropped[: K.n_rows] = 0
@@ -58,10 +60,13 @@ def find_dependent(K: DependentRows, m: int) -> None:
         return
     for k in range(m):
         K.work[k] = length_of(K, K.rows[k])
-        K.dropped[K.rows[k]] = NOT_YET_JUDGED
     lengths = longest_row(K, m, 0)
     angles = longest_row(K, m, 1)
     others = longest_row(K, m, 2)
+    if are_independent(K, m, lengths, angles, others):
+        return
+    for k in range(m):
+        K.dropped[K.rows[k]] = NOT_YET_JUDGED
     kept = 0
     waiting = m
     bar = 0.1
@@ -70,9 +75,7 @@ def find_dependent(K: DependentRows, m: int) -> None:
             row = K.rows[k]
             if K.dropped[row] != NOT_YET_JUDGED:
                 continue
-            unit = K.row_unit[row]
-            far = lengths if unit == 0 else (angles if unit == 1 else others)
-            part = K.work[k] / far if far > 0.0 else 1.0
+            part = part_of_longest(K, k, lengths, angles, others)
             left = remaining_norm(K, row, kept) * (part if part < SHORT_ROW_RATIO else 1.0)
             if left > bar:
                 K.dropped[row] = 0
@@ -85,6 +88,24 @@ def find_dependent(K: DependentRows, m: int) -> None:
                 combine(K, row, kept)
                 waiting -= 1
         bar = max(0.1 * bar, RANK_RTOL)
+
+
+def are_independent(K: Equations, m: int, lengths: float, angles: float, others: float) -> bool:
+    """Whether none of the m rows in K.rows is short and their matrix has an order whose pivots keep much of each."""
+    o = order_at(K, m)
+    if o == 0:
+        return False
+    for k in range(m):
+        if part_of_longest(K, k, lengths, angles, others) < SHORT_ROW_RATIO:
+            return False
+    return bool(factor_ordered(K, K.acc, o, SYMMETRIC, DIRECT_PIVOT_RTOL))
+
+
+def part_of_longest(K: Equations, k: int, lengths: float, angles: float, others: float) -> float:
+    """Length in K.work of the k-th of K.rows over that of the longest of its unit."""
+    unit = K.row_unit[K.rows[k]]
+    far = lengths if unit == 0 else (angles if unit == 1 else others)
+    return float(K.work[k] / far) if far > 0.0 else 1.0
 
 
 def longest_row(K: Equations, m: int, unit: int) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.assembly.dependence import MIN_COEFFICIENT
 from mbd.compile.mechanism import AccelerationTerms, Mechanism
+from mbd.compile.orders import MIN_UNKNOWNS
 from mbd.equations.clusters import clusters
 from mbd.equations.equations import Equations
 from mbd.equations.programs import ActiveSet, follows_multipliers
@@ -337,6 +338,9 @@ class Stepper:
 
     def _called(self) -> int:
         v = self.kernel
+        if v.n_kkt >= MIN_UNKNOWNS and v.n_modes == 0 and v.orders[0] == 0:
+            order = self.mechanism.order(self.manager.active_rows(v.closed[: v.n_contacts]))
+            v.orders = v.orders if order is None else np.concatenate([[1], order])
         if v.auto:
             v.strategy = int(v.fallback > 0)
         # parts in which a step of a scheme of order 3 or more is looked at for guards
