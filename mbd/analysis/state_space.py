@@ -10,6 +10,7 @@ import numpy as np
 from mbd.arrays import ComplexArray, Matrix
 from mbd.bodies.values import is_number
 from mbd.dataclass import dataclass
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.errors import ModelError
 from mbd.notebook import table
 from mbd.results.tables import library
@@ -52,9 +53,19 @@ class StateSpace:
 
     @property
     def is_stable(self) -> bool:
-        """Whether all poles decay: Re s < 0, or |z| < 1."""
-        decays = self.poles.real < 0.0 if self.dt is None else np.abs(self.poles) < 1.0
-        return bool(np.all(decays))
+        """Whether all poles decay: Re s < 0, or |z| < 1, by more than round-off of A may move them.
+
+        Of entries that are off by ε each a pole with eigenvectors w and u is off by ``ε |w|ᵀ |A| |u| / |wᴴ u|`` (Golub
+        & Van Loan 2013, Matrix Computations, 7.2): a mechanism without damping is not stable, whatever its numbers.
+        """
+        from scipy.linalg import eig
+
+        if not len(self.A):
+            return True
+        poles, left, right = eig(self.A, left=True, right=True)  # type: ignore[misc]
+        terms = np.einsum("ik,ij,jk->k", np.abs(left), np.abs(self.A), np.abs(right))
+        decay = -poles.real if self.dt is None else 1.0 - np.abs(poles)
+        return bool(np.all(decay * np.abs(np.einsum("ik,ik->k", left.conj(), right)) > ROUND_OFF_RTOL * terms))
 
     def discrete(self, dt: float, method: str = "zoh") -> StateSpace:
         """The equations from sample to sample, by `scipy.signal.cont2discrete`.

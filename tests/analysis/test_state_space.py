@@ -45,6 +45,17 @@ def test_sampled_equations_are_the_exact_motion_under_held_inputs(dt):
     assert sampled.is_stable and found.state_space.is_stable
 
 
+@given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=3), st.sampled_from([0.0, 1e-7, 1e-2]))
+@settings(max_examples=25)
+def test_what_nothing_damps_is_not_stable_by_round_off(masses, damping):
+    """Real parts of its poles are round-off of either sign; a little damping is none."""
+    model = pendulums(masses, [0.4] * len(masses), loss=mbd.Viscous(damping) if damping else None)
+    model.apply(mbd.Motor("drive", model.joints[0], torque=0.0))
+    state = mbd.assemble(model, backend=PLAIN)
+    found = mbd.linearize(model, state, backend=PLAIN, inputs=["drive.torque"])
+    assert found.state_space.is_stable == found.discrete(0.1).is_stable == (damping > 0.0)
+
+
 @pytest.mark.parametrize("method", ["zoh", "bilinear", "euler", "backward_diff", "foh", "impulse"])
 def test_slow_motions_are_the_same_sampled_or_not(method):
     found, w = driven(outputs=["second.end.x"]), np.array([0.5, 2.0])
