@@ -203,6 +203,26 @@ def test_a_step_too_large_is_listed_and_the_others_go_on():
     assert "not reached; the best is SymplecticEuler(limit=0.05) with dt = 0.01 s" in result.recommendation[0]
 
 
+def test_a_quantity_that_a_run_has_no_number_for_has_no_small_error():
+    """What is left of the last hundredth of the energy has no root any more where a scheme damps."""
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    least = 0.99 * G * (1.0 - np.cos(0.6))
+    model.observe(
+        "margin",
+        lambda a, v: a + 1e-3 * mbd.sqrt(v * v / 2.0 + G * (1.0 - mbd.cos(a)) - least),
+        "pin.angle",
+        "pin.rate",
+    )
+    start = mbd.assemble(model, {"pin.angle": 0.6})
+    schemes = {"damps": mbd.HHT(0.3), "keeps": mbd.RungeKutta4()}
+    study = mbd.accuracy(model, start, 4.0, quantities=["margin"], integrators=schemes, dts=[0.1])
+    lost, kept = study.points
+    assert "is no number" in lost.failure and lost.at_most is None and not kept.failure
+    assert kept.error < 0.1
+
+
 def test_every_wrong_argument_is_named_at_once():
     model, start = pendulum()
     with pytest.raises(mbd.UnknownNameError, match=r"pin\.angel[^\n]*did you mean 'pin\.angle'[\s\S]*rods\.end"):

@@ -246,6 +246,20 @@ def test_what_is_hardly_compared_is_not_left_out():
     assert not Change({"hip.angle": 0.0}, until=1.0, event_time=0.9, left_out=0.9).within(1e-3)
 
 
+def test_an_output_that_is_no_number_without_an_effect_is_no_small_change():
+    """A stop keeps the angle below 0.5, and with it under the root of what is observed."""
+    model = mbd.Model("stopped")
+    rod = mbd.Link("rod", 1.0, length=1.0, center=1.0)
+    pin = mbd.Revolute("pin", model.ground.origin, rod.start)
+    model.connect(pin)
+    model.constrain(mbd.Penalty("stop", mbd.measure(lambda a: 0.45 - a, "pin.angle", unit="rad"), stiffness=1e4))
+    model.observe("room", lambda a: 1.0 + 1e-9 * mbd.sqrt(0.5 - a), "pin.angle")
+    start = mbd.assemble(model, {"pin.angle": -0.6})
+    one = mbd.effects(model, start, 2.0, dt=5e-3, outputs=["room"])
+    [stop] = [each for each in one.contributions if each.name == "stop"]
+    assert stop.change.largest == np.inf and not stop.change.within(1e-3)
+
+
 def test_bad_input_is_answered_at_once():
     model, start = leg()
     with pytest.raises(UnknownNameError, match=r"no output named 'hop.angle'; did you mean 'hip.angle'"):

@@ -76,7 +76,7 @@ def differences(run: Trajectory, reference: Trajectory, scales: Mapping[str, flo
     ends = {} if found.late else gaps(run, reference, scales, run.time[-1:], reference.time[-1:])
     return Difference(
         {name: float(np.nanmax(gap, initial=0.0)) for name, gap in compared.items()},
-        {name: float(gap[0]) for name, gap in ends.items() if np.isfinite(gap[0])},
+        {name: float(gap[0]) for name, gap in ends.items() if not np.isnan(gap[0])},
         max((abs(a - b) for a, b in pairs), default=0.0),
         found.alone == 0,
         1.0 - float(np.mean(keep)) if len(keep) else 1.0,
@@ -86,6 +86,10 @@ def differences(run: Trajectory, reference: Trajectory, scales: Mapping[str, flo
 def gaps(
     run: Trajectory, reference: Trajectory, scales: Mapping[str, float], ours: Vector, theirs: Vector
 ) -> dict[str, Vector]:
-    """|difference| over range of each quantity."""
+    """|difference| over range of each quantity: NaN where neither run has a number, infinite where only one has."""
     first, second = run.at(ours).read(*scales), reference.at(theirs).read(*scales)
-    return {name: np.abs(first[name] - second[name]) / scale for name, scale in scales.items()}
+    alone = {name: np.isnan(first[name]) != np.isnan(second[name]) for name in scales}
+    return {
+        name: np.where(alone[name], np.inf, np.abs(first[name] - second[name]) / scale)
+        for name, scale in scales.items()
+    }

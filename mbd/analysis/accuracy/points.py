@@ -205,6 +205,8 @@ def _judged(run: Trajectory, truth: Truth | Published, scheme: Integrator) -> di
     worst = {name: max(found.largest.get(name, 0.0), found.at_end.get(name, 0.0)) for name in known}
     clear = {name: worst[name] >= MIN_REPORTED_OVER_BOUND * bound for name, bound in known.items()}
     leading = max(worst, key=lambda name: worst[name])
+    if np.isinf(worst[leading]):
+        return {"failure": f"{leading!r} is no number where it is one in the reference, or the other way round"}
     is_clear = clear[leading]
     notes = [] if is_clear else [f"no clear error beside the reference's own, {known[leading]:.1g}"]
     notes += [remark] if (remark := truth.remark(found)) else []
