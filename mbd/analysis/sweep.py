@@ -181,8 +181,8 @@ def sweep(
         in a tuple change together: ``{("left leg.mass", "right leg.mass"): [(5.0, 5.0), (5.0, 4.2)]}``, as those of
         the designs `latin_hypercube` and `sobol` do
     start : a state; or a function of the parameters that differ, by name, that assembles one
-    results : what to keep: names of quantities, whose value at the end of the run is kept, of a vector its components;
-        or functions by title, ``{"top": lambda run: run["hip.angle"].max()}``
+    results : what to keep: names of quantities, whose value at the end of the run is kept, of a vector its components,
+        of a discrete state its number; or functions by title, ``{"top": lambda run: run["hip.angle"].max()}``
     executor : any ``concurrent.futures.Executor``, for runs side by side: a ``ThreadPoolExecutor()`` (machine code runs
         without Python's lock), or a ``ProcessPoolExecutor()`` where model, start and functions can be pickled, whose
         processes derive a model once at most and take its machine code from the cache; with the extra dask also

@@ -20,6 +20,7 @@ from weakref import WeakValueDictionary
 from mbd.dataclass import dataclass
 from mbd.equations.derivation import FrontDoor
 from mbd.errors import MbdError, ModelError, SimulationError
+from mbd.results.tables import last_number
 from mbd.results.trajectory import Trajectory
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.run.user_calls import call_user
@@ -85,7 +86,7 @@ class Runs:
         if not run.success:
             return self.failed(run.message, stopped(run))
         if not isinstance(self.results, Mapping):
-            return Row([float(run[name][-1]) for name in self.results], True, run.message)
+            return Row([last_number(run, name) for name in self.results], True, run.message)
         found, missing = [], []
         for title, function in self.results.items():
             try:

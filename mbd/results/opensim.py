@@ -35,7 +35,7 @@ def storage_file(
     from mbd.results.tables import columns_of
 
     target = _target(path)
-    time, columns = columns_of(run, names, at, "after")
+    time, columns = columns_of(run, names, at, "after", in_words=False)
     turned = target.suffix == ".mot" if degrees is None else bool(degrees)
     for name in columns:
         if turned and unit(name, run.facts).startswith("rad"):

@@ -21,7 +21,7 @@ from mbd.results.units import unit
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["columns_of", "csv_file", "dataframe", "dataset", "library", "text_cell"]
+__all__ = ["columns_of", "csv_file", "dataframe", "dataset", "last_number", "library", "text_cell"]
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With what a formula of a spreadsheet begins."""
@@ -81,14 +81,20 @@ def csv_file(
 
 
 def columns_of(
-    run: Trajectory, names: Sequence[str] | None, at: ArrayLike | None, side: OneSide | None
+    run: Trajectory, names: Sequence[str] | None, at: ArrayLike | None, side: OneSide | None, in_words: bool = True
 ) -> tuple[Vector, dict[str, Vector]]:
-    """The times of a table and its columns, a vector's components each."""
+    """The times of a table and its columns, a vector's components each; of discrete states words, or numbers from 0."""
     time, read = _axis(run, at, side)
     wanted = _wanted(run, names)
     scalars = list(dict.fromkeys(part for name in wanted for part in run.columns.components(name)))
     found = zip(scalars, read(scalars), strict=True)
-    return time, {name: run.facts.worded(name, values) for name, values in found}
+    return time, {name: run.facts.worded(name, values) if in_words else values for name, values in found}
+
+
+def last_number(run: Trajectory, name: str) -> float:
+    """A scalar at the end of a run, of a discrete state its number from 0."""
+    values = run[name]
+    return float(values[-1] if values.dtype.kind == "f" else run.columns.at_rows([name])[0][-1])
 
 
 def dataset(

@@ -1,4 +1,4 @@
-"""Sweeps and batches keep vectors, quaternions and Euler angles by their one name."""
+"""Sweeps and batches keep vectors, quaternions and Euler angles by their one name, discrete states by their number."""
 
 import numpy as np
 import pytest
@@ -30,3 +30,20 @@ def test_a_vector_by_name_is_kept_by_its_components():
         assert [batch.results[title][1] for title in titles] == end.tolist()
     with pytest.raises(mbd.UnknownNameError, match="no result named 'tip.eulr.zxy'"):
         mbd.sweep(model, {"top.mass": masses}, start, ["tip.eulr.zxy"], integrator=scheme, dt=2e-3, until=0.05)
+
+
+def test_a_discrete_state_is_kept_and_written_as_its_number(tmp_path):
+    """Tables have its words; columns of numbers, and files of OpenSim, where it stands among its states."""
+    model, rod = mbd.Model("clock"), mbd.Link("rod", 1.0, length=1.0, center=0.5)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    turn = mbd.Event("turn", mbd.measure(lambda a: a + 10.0, "pin.angle"), reset={"pin.angle": "pin.angle"})
+    model.apply(mbd.Mode("phase", ("first", "second"), transitions=[mbd.Transition("first", "second", after=0.2)]))
+    start, how = mbd.assemble(model, {"pin.angle": 0.4}), {"dt": 0.01, "until": 0.3}
+    run = mbd.simulate(model, start, **how)
+    assert list(run["phase"][[0, -1]]) == ["first", "second"]
+    assert mbd.sweep(model, {"rod.mass": [1.0, 2.0]}, start, ["phase"], **how).results["phase"] == (1.0, 1.0)
+    assert list(mbd.batch(model, [start], **how, results=["phase"]).results["phase"]) == [1.0]
+    model.constrain(turn)  # whose runs are made one by one
+    assert list(mbd.batch(model, [start], **how, results=["phase"]).results["phase"]) == [1.0]
+    read = mbd.read(run.to_sto(tmp_path / "run.sto", ["phase", "pin.angle"]))
+    assert list(read["phase"][[0, -1]]) == [0.0, 1.0]

@@ -60,7 +60,8 @@ def batch(
     dt : step [s]
     until : as for `simulate`: end time [s], name of an event, or (name, latest time)
     parameters : values that differ from the model's, by name: numbers, or columns with a value for each run
-    results : names of quantities to keep, at the end of each run; of a vector its components
+    results : names of quantities to keep, at the end of each run; of a vector its components, of a discrete state its
+        number
     contact, impact, locate, rest_speed, backend : as for `simulate`
     workers : threads; by default as many as there are processors
     progress : True for a bar on a terminal

@@ -16,6 +16,7 @@ from mbd.kernel import codes
 from mbd.notebook import table
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Rows
+from mbd.results.tables import last_number
 from mbd.simulation.batch.alone import NAMES, Alone
 from mbd.simulation.batch.starts import Starts
 from mbd.simulation.many_runs import Ends
@@ -139,7 +140,7 @@ class Batch:
         self.steps[k] = self.events[k] = -1
         for name in self._names:
             whole = one.run is not None and one.run.success
-            self.results[name][k] = float(one.run[name][-1]) if whole and one.run is not None else np.nan
+            self.results[name][k] = last_number(one.run, name) if whole and one.run is not None else np.nan
 
     # what users ask -----------------------------------------------------------------------------------------------
     def __len__(self) -> int:
