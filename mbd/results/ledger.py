@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-__all__ = ["KINDS", "SPENT", "Ledger", "Part"]
+__all__ = ["KINDS", "SPENT", "Ledger", "Part", "titled"]
 
 KINDS = (
     "joint loss", "damper", "friction", "penalty", "impact", "motor", "force", "constraint", "reset",
@@ -28,6 +28,9 @@ KINDS = (
 
 SPENT = ("joint loss", "damper", "friction", "penalty", "impact")
 """Kinds that take energy out; the others may give or take."""
+
+TOTALS = ("kinetic", "potential", "total", "numerical")
+"""Names of what the ledger is made of, which no part takes from it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,11 @@ class Part:
     def passed(self) -> float:
         """Energy that went through it, ``Σ |ΔE|`` over the rows [J]: what a loss took, and twice a spring's swing."""
         return float(np.sum(np.abs(np.diff(self.energy))))
+
+
+def titled(parts: Iterable[Part], taken: Container[str]) -> dict[str, Vector]:
+    """The energy of each part by its name, 'bumper (potential)' with its kind where that name is taken [J]."""
+    return {f"{part.name} ({part.kind})" if part.name in taken else part.name: part.energy for part in parts}
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +122,12 @@ class Ledger:
     @property
     def sums(self) -> dict[str, float]:
         """Each part at the end of the run, and 'numerical'; together they make `change` [J]."""
-        found = {part.name: _last(part.energy) for part in self.parts}
-        found["numerical"] = _last(self.numerical)
-        return found
+        return {title: _last(energy) for title, energy in (*self.work.items(), ("numerical", self.numerical))}
 
     @property
     def work(self) -> dict[str, Vector]:
-        """Each part over time [J]."""
-        return {part.name: part.energy for part in self.parts}
+        """Each part over time, by `titled` [J]."""
+        return titled(self.parts, TOTALS)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -142,13 +148,17 @@ class Ledger:
 
     @property
     def _columns(self) -> dict[str, Vector]:
+        work = self.work
         return {
-            **self.by_kind(), **{part.name: part.energy for part in self.stored},
-            "kinetic": self.kinetic, "potential": self.potential, "total": self.total, **self.work,
+            **self.by_kind(), **titled(self.stored, {*TOTALS, *work}),
+            "kinetic": self.kinetic, "potential": self.potential, "total": self.total, **work,
         }  # fmt: skip
 
     def __getitem__(self, name: str) -> Vector:
-        """'kinetic', 'potential', 'total', 'numerical', a part, stored energy or kind by its name [J]."""
+        """'kinetic', 'potential', 'total', 'numerical', a part, stored energy or kind by its name [J].
+
+        What is stored has its kind behind a name that it shares: 'bumper (potential)' beside the part 'bumper'.
+        """
         columns = self._columns
         if name not in columns:
             raise UnknownNameError(nearest(name, columns, "part of the energy", "The ledger has"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ from scipy.integrate._ivp import dop853_coefficients as tableau
 
 import mbd
 from mbd.errors import ModelError
+from mbd.gait.energies import cost_of_transport, energy_by_cause
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
 from mbd.results.forces import Forces
-from mbd.results.ledger import KINDS
+from mbd.results.ledger import KINDS, Ledger, Part
 from mbd.results.quadrature import cumulative
 
 SCHEMES = (mbd.Newmark(), mbd.HHT(alpha=0.05), mbd.GeneralizedAlpha(rho_inf=0.8))
@@ -240,6 +242,45 @@ def test_kinds_sum_to_the_change_and_are_found_by_name(tmp_path):
     assert again.marks == books.marks == tuple((e.time, e.name) for e in run.events if e.kind != "opened")
     np.testing.assert_array_equal(again["knee spring"], books["knee spring"])
     assert repr(again) == repr(books)
+
+
+def test_words_may_be_called_as_the_ledger_calls_its_own():
+    """Dampers 'kinetic', 'total' and 'numerical', a spring 'damper', and a bushing that stores and takes."""
+    model, body = slider(), None
+    body = model.bodies["body"]
+    far = model.ground.point(5.0, 0.0)
+    model.apply(*(mbd.Damper(name, far, body.origin, 0.3) for name in ("kinetic", "total", "numerical")))
+    model.apply(mbd.Spring("damper", far, body.origin, stiffness=20.0, length=5.0))
+    model.apply(mbd.Bushing("bush", model.ground.origin, body.origin, stiffness=30.0, damping=2.0))
+    run = run_of(model, v=1.0)
+    energy = run.energy
+    assert len(set(energy.sums)) == len(energy.parts) + 1
+    assert sum(energy.sums.values()) == pytest.approx(energy.change, rel=1e-12)
+    for name in ("kinetic", "potential", "total", "numerical"):
+        np.testing.assert_array_equal(energy[name], getattr(energy, name))
+        np.testing.assert_array_equal(energy.to_dataframe()[name], getattr(energy, name))
+    assert energy["kinetic (damper)"][-1] == energy["total (damper)"][-1] < 0.0
+    assert energy["bush"][-1] < 0.0 < energy["bush (potential)"][-1]
+    given = energy_by_cause(run)
+    assert given["damper"] == pytest.approx(sum(part.energy[-1] for part in energy.of("damper")))
+    assert sum(given.values()) == pytest.approx(energy.kinetic[-1] - energy.kinetic[0], rel=1e-9)
+    through = {each.name: each.energy for each in mbd.effects(model, mbd.assemble(model), 0.1, dt=0.01).contributions}
+    assert through == dict.fromkeys(through, 0.0)
+    study = mbd.effects(model, run.record.start, 1.0, mbd.Newmark(), dt=1e-3)
+    bush = next(each for each in study.contributions if each.name == "bush")
+    parts = [part.passed for part in (*energy.parts, *energy.stored) if part.name == "bush"]
+    assert len(parts) == 2 and bush.energy == pytest.approx(sum(parts))
+
+
+def test_a_cost_of_which_a_part_is_withheld_is_not_known():
+    time, gone = np.array([0.0, 1.0]), np.full(2, np.nan)
+    parts = (Part("knee loss", "joint loss", np.array([0.0, -2.0])), Part("foot", "penalty", gone, "too few rows"))
+    run = SimpleNamespace(energy=Ledger(time, np.zeros(2), np.array([5.0, 2.0]), parts))
+    given = energy_by_cause(run)
+    assert given["joint loss"] == -2.0 and np.isnan(given["penalty"])
+    model = SimpleNamespace(parameters={"hip.mass": 1.0, "gravity.y": -9.81}, bodies={"hip": None})
+    assert np.isnan(cost_of_transport(given, model, {}, 1.0))
+    assert cost_of_transport({"joint loss": -2.0}, model, {}, 1.0) == pytest.approx(2.0 / 9.81)
 
 
 def test_the_ledger_is_a_table_by_element_or_by_kind():

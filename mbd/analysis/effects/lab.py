@@ -224,8 +224,12 @@ def _contribution(
 
 
 def _energies(ledger: Ledger) -> dict[str, float]:
-    """What went through each element of the ledger [J]."""
-    return {part.name: part.passed for part in (*ledger.parts, *ledger.stored) if not part.withheld}
+    """What went through each element of the ledger [J]: a bushing's springs and dampers together."""
+    found: dict[str, float] = {}
+    for part in (*ledger.parts, *ledger.stored):
+        if not part.withheld:
+            found[part.name] = found.get(part.name, 0.0) + part.passed
+    return found
 
 
 def _check(model: Any, start: Any, tolerance: Any, outputs: Any, options: Mapping[str, Any]) -> None:
