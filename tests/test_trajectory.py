@@ -73,9 +73,22 @@ def test_a_terminal_event_is_a_success_with_its_own_status():
             run.record.a,
             closed=run.record.closed,
             events=[end],
+            message=f"ended by 'fell' at t = {end.time:.6g} s",
         )
     )
     assert fell.success and fell.status == 1
+
+
+def test_an_event_at_the_end_has_not_ended_the_run():
+    model = mbd.Model("fall")
+    ball = mbd.PointMass("ball", mass=1.0)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, ball.origin, axis=(0.0, 1.0, 0.0)))
+    model.constrain(mbd.Event("passes", mbd.measure(lambda y: y, "fall.displacement")))
+    start = mbd.assemble(model, {"fall.displacement": 1.0})
+    ended = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.1, until="passes")
+    reached = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.1, until=float(ended.time[-1]))
+    assert [event.name for event in reached.events] == ["passes"] and reached.time[-1] == ended.time[-1]
+    assert (ended.status, reached.status) == (1, 0)
 
 
 def test_units_follow_from_names():

@@ -218,10 +218,7 @@ class Trajectory:
         """0: reached its end time, 1: an event ended it, −1: it failed (as in ``scipy.integrate.solve_ivp``)."""
         if not self.record.success:
             return -1
-        until = self.settings.get("until")
-        stop = until if isinstance(until, str) else until[0] if isinstance(until, list | tuple) else None
-        ending = (event for event in self.record.events if event.time >= self.record.time[-1])
-        return int(any(event.kind == "event" or event.name == stop for event in ending))
+        return int(self.record.message.startswith("ended by"))
 
     @cached_property
     def sensitivities(self) -> Any:
@@ -359,7 +356,7 @@ class Trajectory:
         ----------
         path : ending in .sto, or in .mot, a motion
         names : of scalars and vectors; a vector gives three columns; all of `names` by default. Spaces in them become
-            underscores, 'left_hip.angle'
+            underscores, 'left_hip.angle'; discrete states are numbers from 0
         at : as for `to_dataframe`; at an event the values after it
         degrees : whether angles and their rates are in degrees; None: in a .mot file
 
