@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import BRACKET_RTOL
-from mbd.errors import MbdError
+from mbd.errors import GaitError, MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.return_map import ReturnMap, Values
 from mbd.gait.special_points import MAX_EVALUATIONS, SpecialPoint
@@ -142,29 +141,45 @@ def _located(
     given: Continuation, watched: list[Margin], one: BranchPoint, key: tuple[str, str],
     bracket: tuple[float, float, float],
 ) -> SpecialPoint | None:  # fmt: skip
-    """The zero of a margin by the Illinois form of the rule of false position."""
-    fa, fb, b = bracket
-    a, side, width = 0.0, 0, b
-    corrected: Any = None
-    for _ in range(MAX_EVALUATIONS):
-        middle = b - fb * (b - a) / (fb - fa)
-        try:
-            corrected = given.corrected(one, one.tangent, middle)
-        except MbdError:
-            return None
-        if not isinstance(corrected, Corrected):
-            return None
-        values = given.with_value(corrected.value)
-        now = least_margins(given.map, watched, corrected.state, values, exact=True).get(key, np.nan)
-        width = abs(middle - (b if now * fb > 0.0 else a))
-        if now == 0.0 or width <= BRACKET_RTOL or not np.isfinite(now):
-            break
-        if now * fb > 0.0:
-            b, fb, fa, side = middle, now, fa * (0.5 if side == 1 else 1.0), 1
-        else:
-            a, fa, fb, side = middle, now, fb * (0.5 if side == -1 else 1.0), -1
+    """The zero of a margin between its values at 0 and ds along the tangent, by Brent's method; None where it is lost.
+
+    Its error is the width of the bracket, what is left of the gait's equations, and what half the step changes.
+    """
+    from scipy.optimize import brentq
+
+    before, after, ds = bracket
+    ends = {0.0: before, ds: after}
     try:
+        place = brentq(
+            lambda place: ends[place] if place in ends else _at(given, watched, one, key, place)[0], 0.0, ds,
+            xtol=BRACKET_RTOL, maxiter=MAX_EVALUATIONS, disp=False,
+        )  # fmt: skip
+        here, corrected = _at(given, watched, one, key, place)
         point = given.point(corrected, given.whole(one))
+        finer, corrected_finer = _at(given.with_half_steps(), watched, one, key, place)
     except MbdError:
         return None
-    return SpecialPoint(key[0], point.value, point, width * given.width, key[1])
+    moves = given.width * abs(ds / (after - before))  # of the parameter, for a margin that differs by 1 N
+    error = given.width * BRACKET_RTOL + moves * (abs(here) + abs(finer - here))
+    error += abs(corrected_finer.value - corrected.value) + corrected.left + corrected_finer.left
+    return SpecialPoint(key[0], point.value, point, error, key[1])
+
+
+def _at(
+    given: Continuation, watched: list[Margin], one: BranchPoint, key: tuple[str, str], place: float
+) -> tuple[float, Corrected]:  # fmt: skip
+    """The margin at a place along the tangent, and the gait there.
+
+    Raises
+    ------
+    MbdError
+        where there is no gait, or none that has this margin.
+    """
+    corrected = given.corrected(one, one.tangent, place)
+    if not isinstance(corrected, Corrected):
+        raise GaitError(str(corrected))
+    values = given.with_value(corrected.value)
+    margins = least_margins(given.map, watched, corrected.state, values, exact=True)
+    if not np.isfinite(margins.get(key, np.nan)):
+        raise GaitError(f"{key[1]!r} does not stand there")
+    return margins[key], corrected

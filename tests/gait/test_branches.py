@@ -138,6 +138,15 @@ def test_the_slope_at_which_a_foot_would_slip_is_that_at_which_friction_is_used_
     run = found.gait(slip.value).run
     needed = np.abs(run["left foot.friction.forward"][:-1]) / run["left foot.force"][:-1]
     assert slip.what == "left foot" and abs(np.max(needed) - 0.325) < 1e-9
+    # its error is that of the steps too, which longer ones have more of
+    for dt in (0.04, 0.08):
+        coarse = mbd.limit_cycle(
+            model, start, dt=dt, section="right foot", mirror=("left", "right"), parameters={"slope": 0.1},
+            functions=slope_of(sizes["g"]),
+        )  # fmt: skip
+        (other,) = mbd.branch(coarse, "slope", 0.106, friction=0.325, step=0.1).points("slip")
+        off = abs(other.value - slip.value)
+        assert off > 3.0 * slip.error and 0.2 * off < other.error < 5.0 * off
     with pytest.raises(mbd.ModelError, match="friction must be a positive coefficient or None, not -1"):
         mbd.branch(gait, "slope", 0.106, friction=-1)
 
