@@ -224,6 +224,7 @@ def test_bounds_hold_and_values_may_be_missing():
     values[::3] = np.nan
     bounded = found(values, {"rod.center": (1.0, 0.9, 1.1)})
     assert bounded.values["rod.center"] == pytest.approx(1.1)
+    assert "At a bound, beyond which the data would have it: 'rod.center'" in repr(bounded)
     assert len(bounded.residuals["pin.angle"]) == np.isfinite(values).sum()
 
 

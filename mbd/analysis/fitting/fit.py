@@ -402,11 +402,15 @@ class _Search:
             dict(zip(self.names, map(float, errors), strict=True)),
             covariance / np.maximum(np.outer(deviation, deviation), 1e-300),
             tuple(tuple(self.names[k] for k in group) for group in groups), self._by_name(found.fun), times,
-            self.data.scales, noise, found.status > 0, self._said(found.message, degrees), self.runs, degrees, run,
+            self.data.scales, noise, found.status > 0, self._said(found, degrees), self.runs, degrees, run,
         )  # fmt: skip
 
-    def _said(self, message: str, degrees: int) -> str:
-        """Why the search ended; that nothing is left over to tell errors; how exact runs are whose steps differ."""
+    def _said(self, found: Any, degrees: int) -> str:
+        """Why the search ended; estimates at a bound; that nothing tells errors; how exact runs of own steps are."""
+        message = str(found.message)
+        sides = zip(self.names, getattr(found, "active_mask", ()), strict=False)
+        if bounded := ", ".join(repr(name) for name, side in sides if side):
+            message += f" At a bound, beyond which the data would have it: {bounded}; no interval holds there."
         if not degrees:
             message += f" As few as {self.data.count} values tell nothing of the errors of estimates."
         return message if self.tol is None else f"{message} Steps follow tol={self.tol:g} and are held in derivatives."
