@@ -6,9 +6,9 @@ smoothly from row to row comes off them by its own error. Positions follow Newto
 ``M x + Bᵀ μ = 0,  B x = −(h − h*)``,  ``q ← q ⊕ x``,
 
 and velocities take one such step with ḣ; ``h* = (1 − ϑ) h₀ + ϑ h₁`` of the rows before and after, which in index 3
-miss ḣ = 0. Next to a pose in which B loses rank a correction is an error over the distance from it: there, and where
-the second correction is not less than half the first (Deuflhard 2004, Newton Methods for Nonlinear Problems, 2.1), the
-state stays as it was.
+miss ḣ = 0. Next to a pose in which B loses rank a correction is an error over the distance from it, of what the rows at
+the ends miss or of round-off: there, and where the second correction is not less than half the first (Deuflhard 2004,
+Newton Methods for Nonlinear Problems, 2.1), the state stays as it was.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.equal import ROUND_OFF_RTOL
+from mbd.equal import DIRECT_PIVOT_RTOL, EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.results.balance import Balance, Flags, Held, saddle
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
@@ -29,6 +29,7 @@ __all__ = ["Projection"]
 MIN_SINGULAR_VALUE = 0.005
 """Least singular value from which rows are followed: of B over sizes of its columns, then lengths of rows, in the run.
 
+From `DIRECT_PIVOT_RTOL` on where the rows before and after hold ḣ = 0: nothing but the interpolation is off there.
 Inertia is no part of it: in its metric the rows at the two ends of a light link depend on each other.
 """
 
@@ -67,8 +68,12 @@ class Projection:
         theta = places.theta[:, None]
         first, last = (self._missed(kept, rows, places.lower, ends) for ends in (places.lower, places.upper))
         aim, aim_rate = ((1.0 - theta) * a + theta * b for a, b in zip(first, last, strict=True))
-        least = np.linalg.svd(self._rows_at(kept, found) / sizes, compute_uv=False)[:, -1]
-        led, good, before = found, least > MIN_SINGULAR_VALUE, np.full(len(found), np.inf)
+        B = self._rows_at(kept, found)
+        least = np.linalg.svd(B / sizes, compute_uv=False)[:, -1]
+        terms = np.abs(B[:, :, : found.v.shape[1]]) @ np.abs(found.v)[:, :, None]
+        hold = np.all(np.abs(aim_rate) <= EQUAL_RTOL * terms[:, :, 0], axis=1)
+        good = least > np.where(hold, DIRECT_PIVOT_RTOL, MIN_SINGULAR_VALUE)
+        led, before = found, np.full(len(found), np.inf)
         for _ in range(3):  # an error of 0.01 is round-off after the third
             x, sound = self._correction(kept, led, aim)
             size = np.max(np.abs(x), axis=1, initial=0.0)
