@@ -108,7 +108,8 @@ def assemble(
     changed, project = dict(parameters or {}), flag(project, "project")
     require_inertia(model, position or {}, changed)
     mechanism = mechanism_of(model, backend, changed)
-    equations, values = mechanism.equations, mechanism.parameters(changed, getattr(model, "parameters", {}))
+    folded = getattr(model, "parameters", {}) if changed else {}
+    equations, values = mechanism.equations, mechanism.parameters(changed, folded)
     manager = manager_of(mechanism, values)
     named, faults = _named(model, mechanism, position or {}, velocity or {})
     known = manager.names
@@ -167,7 +168,7 @@ def _named(
     equations = mechanism.equations
     coordinates = {coordinate.name: k for k, coordinate in enumerate(equations.coordinates)}
     states = {state.name: k for k, state in enumerate(equations.states)}
-    rates = rate_names(equations)
+    rates = mechanism.kept(rate_names, lambda: rate_names(equations))
     elsewhere = {name: value for name, value in position.items() if name not in states and name not in coordinates}
     places, unknown = conditions(mechanism, three_of_four(model, elsewhere), rates=False)
     speeds, strange = conditions(mechanism, {k: v for k, v in velocity.items() if k not in rates}, rates=True)

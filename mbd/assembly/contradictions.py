@@ -101,11 +101,13 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
 
 def _sets(work: Posture, attempt: Attempt, off: bool, fast: bool, model: Any) -> Mapping[str, str]:
     """For each name, the irreducible set of rows and named values in conflict that it belongs to."""
-    loops, conflicts = loops_of(model), dict[str, str]()
     finite = np.isfinite(attempt.misfit).all() and np.isfinite(attempt.speed_misfit).all()
     levels = [(False, attempt.rows, attempt.q, attempt.held_q)] if off else []
     levels += [(True, work.active_rows, attempt.y, attempt.held_v)] if fast else []
-    for speeds, rows, start, held in levels if finite else ():
+    if not (finite and levels):
+        return {}
+    loops, conflicts = loops_of(model), dict[str, str]()
+    for speeds, rows, start, held in levels:
         left = list(rows)
         for _ in range(MAX_CONFLICTING_SETS):
             names = named_conflict(work, left, start, held, loops, speeds)

@@ -12,7 +12,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.islands import alike_islands, islands_of_rows
 from mbd.assembly.not_finite import first_cause, tape_inputs
 from mbd.assembly.posture import Posture
-from mbd.compile.mechanism import AccelerationTerms
+from mbd.compile.orders import MIN_UNKNOWNS
 from mbd.equal import ROUND_OFF_RTOL
 
 __all__ = ["lost_inertia", "lost_sentence", "undetermined"]
@@ -31,7 +31,7 @@ def undetermined(work: Posture) -> list[str]:
     n = len(terms.f)
     if n == 0:
         return ["nothing can move: the model has no coordinate; connect a body by a joint that lets it move"]
-    matrix = _equations(terms, picked)
+    matrix = terms.saddle(picked)
     if not np.isfinite(matrix).all() or not np.isfinite(terms.f).all():
         block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
         inputs = tape_inputs(work.mechanism, block, work.parameters)
@@ -60,7 +60,7 @@ def lost_inertia(work: Posture) -> str:
     """A sentence on the motion of least inertia where elimination has lost it; '' if it has none at all."""
     terms = work.terms()
     n, n_v = len(terms.f), work.equations.n_v
-    matrix = _equations(terms, work.active_rows)
+    matrix = terms.saddle(work.active_rows)
     if not np.isfinite(matrix).all():
         return ""
     for size, motion in reversed(_weak_motions(matrix, n)):
@@ -70,17 +70,13 @@ def lost_inertia(work: Posture) -> str:
     return ""
 
 
-def _equations(terms: AccelerationTerms, picked: list[int]) -> Matrix:
-    """The matrix of accelerations and multipliers."""
-    m = len(picked)
-    return np.block([[terms.M, terms.R[:, picked]], [terms.B[picked], np.zeros((m, m))]])
-
-
 def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
     """Unknowns that the equations, scaled, hardly determine, the weakest last, with their relative singular values."""
     scale = np.sqrt(np.max(np.abs(matrix), axis=1))
     scale[scale == 0.0] = 1.0
     scaled, found, largest = matrix / np.outer(scale, scale), list[tuple[float, Vector]](), 1e-300
+    if len(matrix) < MIN_UNKNOWNS and _is_regular(scaled[np.newaxis], len(matrix)):
+        return []
     groups = list(alike_islands(scaled, n))
     if all(_is_regular(scaled[islands[:, :, np.newaxis], islands[:, np.newaxis]], len(matrix)) for islands in groups):
         return []
@@ -145,6 +141,8 @@ def _negative(work: Posture, M: Matrix, B: Matrix) -> list[str]:
     scale = np.sqrt(np.abs(np.diag(M)) + 1e-300)
     scaled, rows = M / np.outer(scale, scale), B / scale
     least, motion = -1e-9, np.zeros(0)
+    if len(M) < MIN_UNKNOWNS and _is_definite(scaled, least):
+        return []
     for own, lines in islands_of_rows(scaled, rows):
         if _is_definite(scaled[own[:, :, np.newaxis], own[:, np.newaxis]], least):
             continue

@@ -71,14 +71,20 @@ class Body(Parameterized, ABC):
     def frames(self) -> dict[str, Frame]:
         """Its own frames by name."""
         places = self.landmarks(self.fields().__getitem__)
-        return {name: Frame(self, name, triple(place, name), landmark=name) for name, place in places.items()}
+        return {name: self._own_frame(name, place) for name, place in places.items()}
+
+    def _own_frame(self, name: str, place: Triple) -> Frame:
+        return Frame(self, name, triple(place, name), landmark=name)
 
     def frame(self, name: str) -> Frame:
         """One of its own frames, 'origin', 'center', …, or a named point that was made on it: 'toe'."""
-        frames = {point.name: point for point in self.points.values()} | self.frames
-        if name not in frames:
-            raise ModelError(f"body '{self.name}': " + nearest(name, frames, "frame", "The body has"))
-        return frames[name]
+        places = self.landmarks(self.fields().__getitem__)
+        if name in places:
+            return self._own_frame(name, places[name])
+        points = {point.name: point for point in self.points.values()}
+        if name not in points:
+            raise ModelError(f"body '{self.name}': " + nearest(name, {**points, **places}, "frame", "The body has"))
+        return points[name]
 
     @property
     def origin(self) -> Frame:

@@ -92,8 +92,10 @@ class AccelerationTerms:
 
     def saddle(self, rows: Sequence[int], R: Matrix | None = None) -> Matrix:
         """``[M R; B 0]`` of some rows, with another R if one is given."""
-        R = self.R if R is None else R
-        return np.block([[self.M, R[:, rows]], [self.B[rows], np.zeros((len(rows), len(rows)))]])
+        n, size = len(self.f), len(self.f) + len(rows)
+        whole = np.zeros((size, size))
+        whole[:n, :n], whole[:n, n:], whole[n:, :n] = self.M, (self.R if R is None else R)[:, rows], self.B[rows]
+        return whole
 
 
 T = TypeVar("T")

@@ -60,6 +60,7 @@ class Reader:
     def __init__(self) -> None:
         self.met: dict[int, int] = {}
         self.kept: list[Any] = []  # so that no identity number is used twice
+        self.kinds: dict[type, tuple[str, list[str]]] = {}  # of words of mbd: what they are called, and their fields
 
     def digest(self, root: Any) -> str:
         """Of everything below an object, in an order that follows from the object alone.
@@ -83,7 +84,8 @@ class Reader:
                 self.kept.append(item)
                 title, parts = self.parts(item)
             found.update(title.encode(errors="backslashreplace") + b"\0")
-            stack += [*parts][::-1]
+            if parts:
+                stack += [*parts][::-1]
         return found.hexdigest()
 
     def parts(self, item: Any) -> tuple[str, Iterable[Any]]:
@@ -91,6 +93,8 @@ class Reader:
         kind = type(item)
         if kind in (tuple, list):
             return f"{kind.__name__} {len(item)}", item
+        if kind in self.kinds:
+            return self.of_word(item)
         if kind is frozenset:
             return f"frozenset {sorted(type(self)().digest(each) for each in item)}", ()
         if kind is np.ndarray and item.dtype.kind in "biufcSU":
@@ -106,9 +110,15 @@ class Reader:
         if kind is types.FunctionType:
             return "function", self.of_function(item)
         if is_dataclass(kind) and kind.__module__.startswith("mbd.") and self.is_what_it_says(kind):
-            held = ((field.name, getattr(item, field.name, None)) for field in fields(item))
-            return f"{kind.__module__}.{kind.__qualname__}", [part for pair in held for part in pair]
+            names = [field.name for field in fields(item)]
+            self.kinds[kind] = f"{kind.__module__}.{kind.__qualname__} {names}", names
+            return self.of_word(item)
         raise CannotTellError(item)
+
+    def of_word(self, item: Any) -> tuple[str, Iterable[Any]]:
+        """A word of `mbd`, field by field."""
+        title, names = self.kinds[type(item)]
+        return title, [getattr(item, name, None) for name in names]
 
     def of_function(self, function: types.FunctionType) -> list[Any]:
         """What a function does: its code and all that it refers to, values that can be replaced but not changed."""

@@ -177,9 +177,11 @@ def _wrapped(model: Any) -> list[str]:
 def _weak_legs(model: Any) -> list[str]:
     """Spring legs that cannot carry the model however far they are compressed, whose stiffness may be in kN/m."""
     legs = [contact for contact in getattr(model, "constraints", ()) if isinstance(contact, SpringLeg)]
+    if not legs:
+        return []
     mass = sum(getattr(body, "mass", 0.0) for body in getattr(model, "bodies", {}).values())
     weight = mass * math.hypot(*getattr(model, "gravity", (0.0, 0.0, 0.0)))
-    if not legs or sum(leg.stiffness * leg.length for leg in legs) >= weight:
+    if sum(leg.stiffness * leg.length for leg in legs) >= weight:
         return []
     return [
         f"'{leg.name}' of {leg.stiffness:g} N/m and {leg.length:g} m pushes with {leg.stiffness * leg.length:.3g} N at "
