@@ -110,8 +110,8 @@ class Reader:
         if kind is types.FunctionType:
             return "function", self.of_function(item)
         if is_dataclass(kind) and kind.__module__.startswith("mbd.") and self.is_what_it_says(kind):
-            names = [field.name for field in fields(item)]
-            self.kinds[kind] = f"{kind.__module__}.{kind.__qualname__} {names}", names
+            own = [field.name for field in fields(item)]
+            self.kinds[kind] = f"{kind.__module__}.{kind.__qualname__} {own}", own
             return self.of_word(item)
         raise CannotTellError(item)
 
