@@ -9,6 +9,7 @@ import numpy as np
 
 from mbd.arrays import Vector, read_only
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.later import later
 from mbd.notebook import table
@@ -111,11 +112,11 @@ class Ledger:
     @property
     @np.errstate(all="ignore")
     def drift(self) -> float:
-        """Largest |numerical| over the largest swing of kinetic energy [-]; zero for a mechanism that never moves, NaN
-        where energies are too large for numbers.
+        """Largest |numerical| over the largest swing of kinetic energy, over the energy where that swings by round-off
+        alone [-]; zero for a mechanism that never moves, NaN where energies are too large for numbers.
         """
-        scale = float(np.ptp(self.kinetic)) if len(self.kinetic) else 0.0
-        scale = scale or float(np.max(np.abs(self.kinetic), initial=0.0))
+        scale, largest = np.ptp(self.kinetic) if len(self.kinetic) else 0.0, np.max(np.abs(self.kinetic), initial=0.0)
+        scale = float(largest if scale <= EQUAL_RTOL * largest else scale)
         worst = float(np.max(np.abs(self.numerical), initial=0.0))
         return worst / scale if scale != 0.0 else 0.0
 

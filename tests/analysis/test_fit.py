@@ -187,6 +187,23 @@ def test_fewer_values_than_parameters_determine_none():
     assert set(*one.alike) == {"rod.center", "pin loss.coefficient"} and np.isinf(list(one.errors.values())).all()
 
 
+@pytest.mark.parametrize("height", [0.0, 0.7])
+def test_a_column_that_rests_but_for_round_off_weighs_no_more_than_others(height):
+    """Its range is no scale: residuals of 1e-16 m were thousands, and errors of the estimates with them."""
+    model, start = pendulum()[0].without(), pendulum()[1]
+    noise = np.random.default_rng(5).standard_normal((2, len(TIMES))) * np.array([[1e-3], [1e-16]])
+    guess = {"rod.center": 1.2, "pin loss.coefficient": 0.3}
+    data = {"time": TIMES, "pin.angle": seen() + noise[0]}
+    model.observe("place", lambda a: height + 0.0 * a, "pin.angle")
+    alone, both = (
+        mbd.fit(model, start, {**data, **more}, guess, mbd.Newmark(), 0.02)
+        for more in ({}, {"place": height + noise[1]})
+    )
+    for name in guess:
+        assert both.values[name] == pytest.approx(alone.values[name], rel=1e-6)
+        assert both.errors[name] <= 1.1 * alone.errors[name]
+
+
 def test_as_many_values_as_parameters_tell_nothing_of_errors(tmp_path):
     """They are met exactly, whatever their errors: Student's distribution has no degree of freedom left."""
     model, start = pendulum()

@@ -12,6 +12,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.bodies.values import is_number, shown
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.errors import ModelError
 
 __all__ = ["Data"]
@@ -67,7 +68,8 @@ class Data:
             faults.append("there is nothing to fit to: data and events have no value")
         if faults:
             raise ModelError(faults)
-        scales = {name: given.get(name, _spread(values)) for name, (_, values) in columns.items()}
+        largest = max((float(np.max(np.abs(values))) for _, values in columns.values()), default=0.0)
+        scales = {name: given.get(name, _spread(values, largest)) for name, (_, values) in columns.items()}
         lengths = max([float(np.ptp(times)) for times, _ in columns.values()], default=0.0)
         scales |= {name: given.get(name, 1e-2 * (lengths or abs(each) or 1.0)) for name, each in instants.items()}
         return cls(columns, instants, scales)
@@ -109,6 +111,10 @@ def _numbers(given: Any, what: str, example: str, faults: list[str]) -> dict[str
     return {name: float(each) for name, each in given.items()}
 
 
-def _spread(values: Vector) -> float:
-    """A hundredth of the range of a column; of its size where it is constant."""
-    return 1e-2 * float(np.ptp(values) or np.max(np.abs(values)) or 1.0)
+def _spread(values: Vector, largest: float) -> float:
+    """A hundredth of the range of a column; of its size where it is constant, and of the largest of all where it is
+    nothing, up to round-off.
+    """
+    swing, size = float(np.ptp(values)), float(np.max(np.abs(values)))
+    spread = swing if swing > EQUAL_RTOL * size else size
+    return 1e-2 * (spread if spread > ROUND_OFF_RTOL * largest else largest or 1.0)
