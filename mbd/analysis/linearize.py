@@ -45,7 +45,7 @@ def linearize(
     Parameters
     ----------
     model : a `Model` or `Lagrangian`
-    state : from `assemble`, `run.final` or `run.at`
+    state : from `assemble`, or `run.final`
     parameters : values that differ from the model's, by name
     backend : see `mbd.simulate`; for `Linearization.rhs`
     inputs : names of run-time parameters ('drive.torque', 'push.force.x', 'gravity.x', whatever a `Controller` may

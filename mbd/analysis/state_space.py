@@ -74,7 +74,8 @@ class StateSpace:
         ----------
         dt : time between samples [s]
         method : 'zoh' (inputs hold between samples, as those that a `Controller` writes; exact), 'bilinear', 'euler',
-            'backward_diff', 'foh' or 'impulse'
+            'backward_diff', 'foh' or 'impulse'. Of 'bilinear', 'backward_diff' and 'foh' the states are scipy's, which
+            inputs are mixed into; outputs are at samples what they are called
         """
         from scipy.signal import cont2discrete
 
