@@ -115,6 +115,9 @@ class Memory(SchemeAbilities):
     aux_step: float = place("clock")  # step size of aux
     turning: Reals = reals(lambda s: s.n_rows * s.n)  # ∂ḣ/∂x of the active rows, stabilized only
     stages: Reals = reals(lambda s: 0)  # what a scheme of several stages works on
+    coupled: Reals = reals(lambda s: 0)  # matrix of all stages at once, its right-hand side, and pivots
+    coupled_rhs: Reals = reals(lambda s: 0)
+    coupled_pivots: Integers = integers(lambda s: 0)
     past_stages: Reals = reals(lambda s: 0, kept=True)  # those of the last step, which predict the next
     tableau: Reals = reals(lambda s: 0)  # coefficients of its formula
     error: Reals = reals(lambda s: s.n_v + s.n)  # local error of the candidate: of positions x, then of (v, z)

@@ -39,7 +39,7 @@ SCHEMES: tuple[str, ...] = (
 """Modules of the schemes that the kernel is built with; a scheme has its place here as its number."""
 
 
-MEMORY = ("stages", "past_stages", "tableau")
+MEMORY = ("stages", "past_stages", "tableau", "coupled", "coupled_rhs", "coupled_pivots")
 """Arrays whose lengths an entry may ask for."""
 
 
@@ -126,8 +126,9 @@ class Scheme:
     programs : the model code that steps call (`Stepper.add_mode`): 'mode': residual and tangent, factored here;
         'stepping': the same, factored in straight-line code where that pays, as `solve_step` takes it; 'explicit': none
         but accelerations, rows and their Jacobian
-    memory : lengths of "stages" (work), "past_stages" (kept from step to step) and "tableau" by the sizes of the
-        mechanism (`Stepper`); an array that is used without a length is refused as the kernel is built
+    memory : lengths of "stages" (work), "past_stages" (kept from step to step), "tableau", and of "coupled", its
+        "coupled_rhs" and "coupled_pivots", one matrix for all stages, by the sizes of the mechanism (`Stepper`); an
+        array that is used without a length is refused as the kernel is built
     coefficients : what these arrays begin with
     """
 

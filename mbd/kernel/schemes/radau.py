@@ -15,13 +15,20 @@ from mbd.kernel.contact.cones import HOLD_DIRECTION
 from mbd.kernel.records import Kernel, Settings, SingularSteps, Steps
 from mbd.kernel.schemes.collocation import RADAU
 from mbd.kernel.schemes.contract import Abilities, Scheme
+from mbd.kernel.schemes.coupled_stages import coupled_step
 from mbd.kernel.schemes.direction_continuation import (
     NO_HOLD,
     begin_continuation,
     continue_directions,
     wants_continuation,
 )
-from mbd.kernel.schemes.iteration import MIN_HALVED_RESIDUAL, roughly, runs_away, weigh_by_accelerations
+from mbd.kernel.schemes.iteration import (
+    MIN_HALVED_RESIDUAL,
+    MIN_RETRY_SHARE,
+    roughly,
+    runs_away,
+    weigh_by_accelerations,
+)
 from mbd.kernel.schemes.memory import accept_step, forget_steps, look_a_step_ahead
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import (
@@ -133,6 +140,8 @@ def radau_step(K: Kernel, h: float, t1: float) -> int:
         and is_beside_singularity(K, h, MAX_NOISY_STEPS_AWAY)
     ):
         return singular_stages_step(K, h, t1)
+    if (status == NOT_CONVERGED or status == STAGNATED) and K.adaptive == 0 and h <= MIN_RETRY_SHARE * K.step:
+        return coupled_step(K, h, t1, m)
     return status
 
 
@@ -357,7 +366,11 @@ def was_enough(K: Kernel, h: float, t1: float, m: int, iteration: int, error: fl
 
 def radau_memory(K: Settings) -> dict[str, int]:
     """Lengths of what stages take, and of those of the last step."""
-    return {"stages": stage_place(K, STAGES_END), "past_stages": 3 * (K.n + K.n_rows + K.n_v)}
+    size = 3 * (K.n + K.n_rows)
+    return {
+        "stages": stage_place(K, STAGES_END), "past_stages": size + 3 * K.n_v,
+        "coupled": size * size, "coupled_rhs": size, "coupled_pivots": size,
+    }  # fmt: skip
 
 
 SCHEME = Scheme(

@@ -45,8 +45,8 @@ from mbd.kernel.schemes.stage_matrices import matrices, solve_pair, solve_real
 from mbd.kernel.stepping.restart import share_loads
 
 __all__ = [
-    "correct_positions_where_off", "correct_rates", "correct_stages", "evaluate_stages", "hold_block", "load_stage",
-    "predict_stages", "retreat_stages",
+    "apply_changes", "correct_positions_where_off", "correct_rates", "correct_stages", "evaluate_stages", "hold_block",
+    "load_stage", "predict_stages", "retreat_stages",
 ]  # fmt: skip
 
 
@@ -249,22 +249,33 @@ def correct_positions_where_off(K: Steps, m: int, h: float, whole: bool) -> None
 
 def correct_rates(K: Steps, m: int, h: float) -> float:
     """The correction of rates and multipliers by the residuals in K.stages; its size relative to the largest rate."""
-    n = K.n
-    size = n + m
+    size = K.n + m
     S = K.stages
     solve_real(K, m, h)
     solve_pair(K, m, h)
-    K.n_iterations += 1
-    o_W = stage_place(K, STAGE_RATES)
-    o_L = stage_place(K, STAGE_LAM)
     o_D = stage_place(K, CHANGES)
     o_b = stage_place(K, PAIR_RHS)
-    biggest = 0.0
-    fastest = 1e-300
     for i in range(3):
         for j in range(size):
             change = S[T_REAL + i] * K.rhs[j] + 2.0 * (S[T_RE + i] * S[o_b + j] - S[T_IM + i] * S[o_b + size + j])
             S[o_D + i * size + j] = change
+    return apply_changes(K, m)
+
+
+def apply_changes(K: Steps, m: int) -> float:
+    """The correction in K.stages to rates and multipliers; its size relative to the largest rate."""
+    n = K.n
+    size = n + m
+    S = K.stages
+    o_W = stage_place(K, STAGE_RATES)
+    o_L = stage_place(K, STAGE_LAM)
+    o_D = stage_place(K, CHANGES)
+    K.n_iterations += 1
+    biggest = 0.0
+    fastest = 1e-300
+    for i in range(3):
+        for j in range(size):
+            change = S[o_D + i * size + j]
             if j < n:
                 biggest = max(biggest, abs(change))
                 fastest = max(fastest, abs(S[o_W + i * n + j]))

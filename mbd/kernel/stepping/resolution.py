@@ -16,7 +16,14 @@ from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import GAINED, LEAPT, NOT_FINITE, OUTGROWN, UNSTABLE
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.records import Equations, Guards, Kernel, Motion, Steps, Switching
-from mbd.kernel.schemes.iteration import MAX_CURVATURE, MAX_UNCHECKED_ERROR, MIN_RATE_SHARE, is_small, note_fastest
+from mbd.kernel.schemes.iteration import (
+    MAX_CURVATURE,
+    MAX_RATE_ERROR,
+    MAX_UNCHECKED_ERROR,
+    MIN_RATE_SHARE,
+    is_small,
+    note_fastest,
+)
 from mbd.kernel.stepping.barriers import crosses_barrier
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.charts import whole_step
@@ -27,8 +34,6 @@ from mbd.kernel.stepping.scales import still_energy
 
 __all__ = ["judge_change"]
 
-MAX_RATE_ERROR = 0.2
-"""Estimated error of a rate, over the rate, above which the work of the forces is asked for [-]."""
 BULGE_SHARE = 0.5
 """Error of a rate over dt times the largest way of slopes from a line, where forces begin within a step [-]."""
 MAX_UNEXPLAINED_ENERGY = 0.5

@@ -17,6 +17,7 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact.nonsmooth_cones import hold_all
 from mbd.kernel.records import Balance, Guards, Kernel, SchemeAbilities, State
+from mbd.kernel.schemes.iteration import MIN_RETRY_SHARE
 from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONG_PART, SECOND, SHORT_PART, may_pair
 from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
 from mbd.kernel.stepping.control import controlled_step
@@ -26,8 +27,6 @@ from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["is_shortened", "part_end", "step_end", "tried_step"]
 
-MIN_RETRY_SHARE = 0.1
-"""Part of a step below which a failing step is not shortened any further [-]."""
 MIN_TURNING_SHARE = 1e-3
 """The same of a step that is too long for how friction in a plane turns with a slow γ [-]."""
 RETRY_FACTOR = 0.6180339887498949

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL
+from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.redundancy import sharing
+from mbd.kernel.codes import NO_DERIVATIVE
 from mbd.kernel.records import Kernel
+from mbd.kernel.schemes.coupled_stages import correct_coupled_rates, couple_stages
 from mbd.kernel.schemes.radau import singular_stages_step
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import CHANGES, HELD, MU_REAL, STAGE_BEND, STAGE_RATES, STAGE_SHIFT, stage_place
@@ -19,6 +23,7 @@ from mbd.kernel.schemes.stages import (
 )
 from mbd.kernel.tangent_rules import NOT_FOLLOWED
 from mbd.sensitivity.tangent.words import (
+    MAX_CONTRACTION,
     MAX_CORRECTIONS,
     are_corrected,
     derivative_of,
@@ -30,6 +35,10 @@ from mbd.sensitivity.tangent.words import (
 )
 
 __all__ = ["follow_stages"]
+
+
+MAX_SHARE_LEFT = 0.5
+"""Part of the last correction of derivatives above which stages take matrices of their own [-]."""
 
 
 def n_stage_numbers(K: Kernel) -> int:
@@ -85,12 +94,22 @@ def follow_held(K: Kernel, m: int) -> None:
             K.stages[o_H + i * m + k] = without_tangent(K.stages[o_H + i * m + k]) + total
 
 
+def factor_coupled_stages(K: Kernel, m: int, h: float, t1: float) -> bool:
+    """Factors, without derivatives, of the matrix of all stages at once; false where a pivot is missing."""
+    size = 3 * (K.n + m)
+    couple_stages(K, m, h, t1)
+    for i in range(size * size):
+        K.coupled[i] = without_tangent(K.coupled[i])
+    return bool(factor(K.coupled, size, K.coupled_pivots) == 0)
+
+
 def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
     """The derivatives of the stages that are there, from those of their prediction.
 
     Stages on both sides of a singular configuration are found once more, as they were found.
 
     The matrices are those of the middle stage, as in the step itself: corrections are taken until they are round-off.
+    Where they do not shrink, each stage takes matrices of its own.
     """
     if sharing(K):
         return NOT_FOLLOWED
@@ -121,24 +140,44 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
         K.kkt[i] = without_tangent(K.kkt[i])
     o_D = stage_place(K, CHANGES)
     before = 1e300
+    left = 0.0
+    largest = 0.0
+    coupled = False
     for iteration in range(MAX_CORRECTIONS):
         evaluate_stages(K, h, t1, m, 1.0, c, c * c, False)
-        if K.vector == 0 and m == 0:
+        if K.vector == 0 and m == 0 and not coupled:
             exchange_masses(K, h, t1)
         if m > 0:
             if iteration == 0:
                 follow_held(K, m)
             correct_positions_of_stages(K, m, h, iteration == 0)
-        correct_rates(K, m, h)
+        if coupled:
+            correct_coupled_rates(K, m, h)
+        else:
+            correct_rates(K, m, h)
         change = 0.0
         largest = 0.0
         for i in range(3):
             for j in range(n):
                 change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
                 largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
+        if not coupled and change > MAX_SHARE_LEFT * before and change > EQUAL_RTOL * largest:
+            if not factor_coupled_stages(K, m, h, t1):
+                return NOT_FOLLOWED
+            coupled = True
+            before = 1e300
+            continue
         if are_corrected(change, before, largest):
+            left = change if change > MAX_CONTRACTION * before else 0.0
             break
         before = change
+        left = change
     status = complete(K, h, t1, m, False, False)
     restore_stages(K)
+    # where rates die away their derivatives are round-off beside those of velocities
+    for j in range(n):
+        largest = max(largest, largest_derivative(K.y[j]) / h)
+    if left > NOMINAL_RTOL * largest:
+        K.failure_time = t1
+        return NO_DERIVATIVE
     return status

@@ -11,8 +11,8 @@ from mbd.kernel.codes import PASSING
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
-    "MAX_CORRECTIONS", "are_corrected", "at_root", "derivative_of", "every_row_place", "is_differentiated",
-    "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
+    "MAX_CONTRACTION", "MAX_CORRECTIONS", "are_corrected", "at_root", "derivative_of", "every_row_place",
+    "is_differentiated", "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
     "solution_place", "solve_plain", "step_place", "takes_part", "was_near_singular", "without_tangent",
 ]  # fmt: skip
 
@@ -20,7 +20,7 @@ MAX_CONTRACTION = 0.9
 """Part of the last correction of derivatives above which the next one is round-off [-]."""
 SAFETY = 0.1
 """Part of `ROUND_OFF_RTOL` that a correction must be expected to stay below if it is not made [-]."""
-MAX_CORRECTIONS = 12
+MAX_CORRECTIONS = 40
 """Corrections of derivatives with matrices that are not quite those of the solution [-]."""
 
 

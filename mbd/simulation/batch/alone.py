@@ -31,7 +31,7 @@ NAMES = {
         "NOT_FINITE", "NOT_CONVERGED", "SINGULAR", "STAGNATED", "CHATTER", "NO_IMPACT", "DEPENDENT", "CONFLICT",
         "NO_LOCATION", "ENERGY_GAIN", "NO_FORCE", "TOO_TIGHT", "TOO_NEAR", "TOO_SMALL", "SINGULAR_ROWS_MOVE",
         "OUTGROWN", "GAINED", "TOO_BRIEF", "AT_POSE", "LEAPT", "ILL_CONDITIONED", "JUMPED", "ENDLESS_TRANSITIONS",
-        "UNSTABLE",
+        "UNSTABLE", "NO_DERIVATIVE",
     )
 }  # fmt: skip
 """Outcomes of runs that failed, by the kernel's codes."""

@@ -323,6 +323,11 @@ CAUSES = (
         "try a smaller dt or softer stiffness; a force that jumps with the state (mbd.where, sign) must be made "
         "continuous, or be switched by an Event or Controller{x.rushing}",
     ),
+    Cause(
+        (codes.NO_DERIVATIVE,),
+        "the run goes on, but the derivatives of this step by wrt= do not converge{x.closed}: forces change too much "
+        "within it", "use a smaller dt, tol= or a smoother force",
+    ),
     # steps whose change cannot be that of the motion
     Cause(
         (codes.OUTGROWN,),
