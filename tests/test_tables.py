@@ -147,6 +147,22 @@ def test_a_motion_has_its_angles_in_degrees(tmp_path):
         np.testing.assert_array_equal(numbers[:, 3], swing["rod.end.x"])
 
 
+@pytest.mark.parametrize("cut", ["auto", "all"])
+def test_rates_of_a_motion_are_in_degrees_whichever_joints_are_cut(tmp_path, cut):
+    model = mbd.Model("pendulum", cut=cut)
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
+    model.connect(mbd.Revolute("left hip", model.ground.origin, rod.start))
+    start = mbd.assemble(model, {"left hip.angle": 0.3}, project=True)
+    swing = mbd.simulate(model, start, dt=0.05, until=0.5, backend="python")
+    names = [f"left hip.{last}" for last in (
+        "angle", "rate", "acceleration", "angle.rate", "angle.acceleration", "reaction_torque.z")]  # fmt: skip
+    assert [swing.to_dataframe(names).attrs["units"].get(name) for name in names[3:]] == ["rad/s", "rad/s²", "N m"]
+    _, _, numbers = stored(swing.to_sto(tmp_path / "swing.mot", names))
+    for k, name in enumerate(names):
+        factor = 1.0 if "torque" in name else 180.0 / np.pi
+        np.testing.assert_allclose(numbers[:, 1 + k], factor * swing[name], rtol=1e-14)
+
+
 def test_other_files_and_names_are_refused(run, tmp_path):
     for path, names, text in (("ball.txt", None, "end in .sto or .mot"), ("ball.sto", ["flight.z"], "flight.z")):
         with pytest.raises(mbd.MbdError, match=text):

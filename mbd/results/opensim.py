@@ -38,9 +38,18 @@ def storage_file(
     time, columns = columns_of(run, names, at, "after", in_words=False)
     turned = target.suffix == ".mot" if degrees is None else bool(degrees)
     for name in columns:
-        if turned and unit(name, run.facts).startswith("rad"):
+        if turned and _is_angular(run, name):
             columns[name] = np.rad2deg(columns[name])
     return write_storage(target, run.name, time, columns, turned)
+
+
+def _is_angular(run: Trajectory, name: str) -> bool:
+    """Whether a result is an angle or a rate of one, of cut joints too: 'knee.rate' beside 'knee.angle'."""
+    joint, _, last = name.rpartition(".")
+    known = unit(name, run.facts)
+    return known.startswith("rad") or (
+        not known and last in ("rate", "acceleration") and run.columns.knows(f"{joint}.angle")
+    )
 
 
 def write_storage(

@@ -65,6 +65,7 @@ def unit(name: str, facts: Facts) -> str:
             own.get(stem)
             or ("rad" if stem in facts.angles else "")
             or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")
+            or (unit(stem, facts) if "." in stem else "")  # of a cut joint, whose angle is no coordinate
         )
         return base + power if base else ""
     effort = stem.removesuffix(".a").rpartition(".")[2]  # 'mount.force.a.x': in the axes of a frame a
