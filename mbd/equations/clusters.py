@@ -1,4 +1,4 @@
-"""Clusters: coordinates and first-order states that masses, forces or rows connect, however indirectly.
+"""Clusters: coordinates, first-order states and rows that masses, forces or rows connect, however indirectly.
 
 What happens in one of them leaves the others as they are, so whether it is resolved must not depend on these.
 """
@@ -16,18 +16,23 @@ __all__ = ["clusters"]
 
 
 def clusters(equations: Equations) -> tuple[int, ...]:
-    """The number of the cluster of each component of the balance (n_v + n_z), counted from 0."""
+    """The number of the cluster of each component of the balance and of each row (n_v + n_z + m), counted from 0.
+
+    Rows that no component enters, which never act, are of the first.
+    """
     n = equations.n_v + equations.n_z
+    size = n + len(equations.rows)
     geometry = equations.geometry
     if geometry is not None and geometry.largest_tree == equations.n_v:  # its masses connect all
-        return (0,) * n
+        return (0,) * size
     found = list[int]()
     for group in _connected(equations, n):
         joined = [each for each in found if each & group]
         found = [each for each in found if not each & group] + [reduce(or_, joined, group)]
     numbers: dict[int, int] = {}
-    groups = [next(each for each in found if each >> i & 1) for i in range(n)]
-    return tuple(numbers.setdefault(group, len(numbers)) for group in groups)
+    groups = [next(each for each in found if each >> i & 1) for i in range(size)]
+    moving = (1 << n) - 1
+    return tuple(numbers.setdefault(group, len(numbers)) if group & moving else 0 for group in groups)
 
 
 def _connected(equations: Equations, n: int) -> list[int]:

@@ -238,6 +238,7 @@ def test_what_forces_masses_or_rows_connect_is_one_cluster():
     found = clusters(derive(model))
     assert found[:2] == found[4:6] and found[2:4] == found[6:8] and found[8:10] == found[10:12]
     assert len({found[k] for k in (0, 2, 8, 12, 13)}) == len(set(found)) == 5, "both ways of a point are apart, too"
+    assert found[14:] == (found[2],), "a row is of the cluster that it connects"
 
 
 # forces that begin, end or act within a step ------------------------------------------------------------------------

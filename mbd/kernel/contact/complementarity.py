@@ -26,7 +26,7 @@ from mbd.kernel.contact.cone_contacts import keep_branches, solve_cones
 from mbd.kernel.contact.cone_directions import misses, turn_directions
 from mbd.kernel.contact.cone_problem import CONE_RTOL
 from mbd.kernel.contact.cones import aim, follows, set_sticking
-from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, DependentRows, Motion
+from mbd.kernel.records import Balance, ContactForces, Contacts, DependentRows, Motion
 from mbd.kernel.stepping.restart import active_rows, refresh_scales
 
 __all__ = ["complementarity"]
@@ -116,12 +116,11 @@ def is_held_still(K: ContactForces, f: int) -> bool:
 
 def is_contradicted(K: ContactForces) -> bool:
     """Whether a contact or friction that may choose breaks its law in the solution."""
-    largest = largest_impulse(K)
     found = False
     for f in range(K.n_frictions):
-        found = found or (K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f, largest) > 0.0)
+        found = found or (K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f) > 0.0)
     for c in range(K.n_contacts):
-        found = found or (K.free[c] > 0 and contact_fault(K, c, largest) > 0.0)
+        found = found or (K.free[c] > 0 and contact_fault(K, c) > 0.0)
     return found
 
 
@@ -154,26 +153,26 @@ def departure(K: ContactForces, row: int, sign: float, tolerance: float) -> floa
     return float(-sign * value - tolerance * size)
 
 
-def contact_fault(K: ContactForces, c: int, largest: float) -> float:
+def contact_fault(K: ContactForces, c: int) -> float:
     """How badly contact c breaks its law; ≤ 0 if it does not."""
     if K.active[c] == 1 and K.parting[c] == 0:
-        return float(K.impulse[K.normal[c]] - LAW_RTOL * largest)  # λ > 0 would pull
+        return float(K.impulse[K.normal[c]] - LAW_RTOL * largest_impulse(K, K.normal[c]))  # λ > 0 would pull
     return departure(K, K.normal[c], 1.0, LAW_RTOL)
 
 
-def friction_fault(K: ContactForces, f: int, largest: float) -> float:
+def friction_fault(K: ContactForces, f: int) -> float:
     """How badly friction f breaks its law; ≤ 0 if it does not."""
     row = K.friction_row[f]
     if K.group_size[f] > 1:
-        return group_fault(K, f, largest)
+        return group_fault(K, f)
     if K.sticks[f] == 1:
-        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - LAW_RTOL * largest)
+        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - LAW_RTOL * largest_impulse(K, row))
     return departure(
         K, row, K.slip[f], NOMINAL_RTOL if K.loose[f] == 2 else LAW_RTOL
     )  # it slides against its own friction
 
 
-def group_fault(K: ContactForces, f: int, largest: float) -> float:
+def group_fault(K: ContactForces, f: int) -> float:
     """How badly frictions that slide together break their law; all but the first of them never do."""
     if follows(K, f):
         return -1.0
@@ -182,7 +181,7 @@ def group_fault(K: ContactForces, f: int, largest: float) -> float:
         for g in range(f, f + K.group_size[f]):
             pull = K.impulse[K.friction_row[g]] + K.past[K.friction_row[g]]
             square += pull * pull
-        return float(sqrt(square) - K.limit[f] - LAW_RTOL * largest)
+        return float(sqrt(square) - K.limit[f] - LAW_RTOL * largest_impulse(K, K.friction_row[f]))
     return misses(K, f, NOMINAL_RTOL if K.loose[f] == 2 else LAW_RTOL)
 
 
@@ -210,11 +209,12 @@ def give_way(K: DependentRows) -> int:
     return 0
 
 
-def largest_impulse(K: Complementarity) -> float:
-    """Size of the multipliers."""
+def largest_impulse(K: ContactForces, row: int) -> float:
+    """Size of the multipliers of the cluster of a row."""
     largest = 0.0
     for k in range(K.n_rows):
-        largest = max(largest, abs(K.impulse[k]))
+        if K.cluster[K.n + k] == K.cluster[K.n + row]:
+            largest = max(largest, abs(K.impulse[k]))
     return largest
 
 
@@ -238,14 +238,13 @@ def turn(K: ContactForces, f: int) -> None:
 
 def change_all(K: ContactForces) -> int:
     """Every contact and friction takes the branch that the solution asks for; how many changed."""
-    largest = largest_impulse(K)
     count = 0
     for f in range(K.n_frictions):
-        if K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f, largest) > 0.0:
+        if K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f) > 0.0:
             turn(K, f)
             count += 1
     for c in range(K.n_contacts):
-        if K.free[c] > 0 and contact_fault(K, c, largest) > 0.0:
+        if K.free[c] > 0 and contact_fault(K, c) > 0.0:
             toggle(K, c)
             count += 1
     return count
@@ -253,16 +252,15 @@ def change_all(K: ContactForces) -> int:
 
 def change_worst(K: ContactForces) -> int:
     """The contact or friction that breaks its law most takes its other branch; 0 if none breaks it."""
-    largest = largest_impulse(K)
     found = -1
     most = 0.0
     for place in range(K.n_contacts + K.n_frictions):
         f = place - K.n_contacts
         fault = 0.0
         if f < 0:
-            fault = contact_fault(K, place, largest) if K.free[place] > 0 else 0.0
+            fault = contact_fault(K, place) if K.free[place] > 0 else 0.0
         elif K.loose[f] > 0 and is_on(K, f):
-            fault = friction_fault(K, f, largest)
+            fault = friction_fault(K, f)
         if fault > most:
             found = place
             most = fault

@@ -48,10 +48,14 @@ def solve_cones(K: Balance, level: int, allowed: float) -> int:
     held = load_held(K, level, count)
     if held >= 0:
         fill_cones(K, held, count)
+        if K.n_clusters > 1:
+            take_own_units(K, count)
         cone_solve(
             K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
             K.cone_work, K.side_pivots,
         )  # fmt: skip
+        if K.n_clusters > 1:
+            leave_own_units(K, count)
         residual = K.cone_work[0]
         if residual <= allowed and take_impulses(K, level, count):
             take_cone_branches(K, level, count)
@@ -234,12 +238,64 @@ def fill_cones(K: Balance, held: int, count: int) -> None:
             K.cone_matrix[i * count + j] = value
 
 
+def are_together(K: ContactForces, u: int, v: int) -> bool:
+    """Whether two unknowns are of one cluster."""
+    return bool(K.cluster[K.n + K.cone_rows[u]] == K.cluster[K.n + K.cone_rows[v]])
+
+
+def take_own_units(K: Balance, count: int) -> None:
+    """Impulses and velocities of each cluster in units of its own, in K.loads and K.rhs: all are of the size of one.
+
+    One that is heavy would else hide what a light one apart misses of its laws.
+    """
+    for u in range(count):
+        ease = 0.0
+        for v in range(count):
+            if are_together(K, u, v):
+                ease = max(ease, K.cone_matrix[v * count + v])
+        ease = ease if ease > 0.0 else 1.0
+        size = 0.0
+        for v in range(count):
+            if are_together(K, u, v):
+                size = max(size, max(abs(K.cone_shift[v]) / ease, max(abs(K.cone_found[v]), K.cone_limit[v])))
+        K.loads[u] = size if size > 0.0 else 1.0
+        K.rhs[u] = ease
+    for u in range(count):
+        K.cone_shift[u] /= K.rhs[u] * K.loads[u]
+        K.cone_found[u] /= K.loads[u]
+        K.cone_limit[u] /= K.loads[u]
+        for v in range(count):
+            K.cone_matrix[u * count + v] /= K.rhs[u]
+
+
+def leave_own_units(K: Balance, count: int) -> None:
+    """Those of all again, also of ρ in K.cone_work."""
+    o_rho = count * count + 2 * count
+    for u in range(count):
+        K.cone_shift[u] *= K.rhs[u] * K.loads[u]
+        K.cone_found[u] *= K.loads[u]
+        K.cone_limit[u] *= K.loads[u]
+        K.cone_work[o_rho + u] /= K.rhs[u]
+        for v in range(count):
+            K.cone_matrix[u * count + v] *= K.rhs[u]
+
+
 def take_impulses(K: Balance, level: int, count: int) -> bool:
     """K.jump and the multipliers of held rows under the impulses found."""
     for u in range(count):
         for i in range(K.n):
             K.force[i] -= K.acc[K.acc_R + i * K.n_rows + K.cone_rows[u]] * K.cone_found[u]
     return bool(solve_at(K, active_rows(K, K.active), level) == 0)
+
+
+def size_beside(K: ContactForces, count: int, u: int) -> float:
+    """The largest impulse of the cluster of an unknown, or what would be."""
+    o_rho = count * count + 2 * count
+    size = 1e-300
+    for v in range(count):
+        if are_together(K, u, v):
+            size = max(size, max(abs(K.cone_found[v]), abs(K.cone_work[o_rho + v] * K.cone_shift[v])))
+    return size
 
 
 def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
@@ -249,13 +305,11 @@ def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
         K.cone_work,
     )  # fmt: skip
     o_w = count * count + count
-    size = 1e-300
-    for u in range(count):
-        size = max(size, max(abs(K.cone_found[u]), abs(K.cone_work[o_w + count + u] * K.cone_shift[u])))
     for c in range(K.n_contacts):
         u = K.cone_normal[c]
         if u >= 0:
-            parts = K.cone_owner[u] == PUSH and K.cone_work[o_w + count + u] * K.cone_work[o_w + u] > REST_SPEED * size
+            small = REST_SPEED * size_beside(K, count, u)
+            parts = K.cone_owner[u] == PUSH and K.cone_work[o_w + count + u] * K.cone_work[o_w + u] > small
             if K.free[c] == 2:
                 K.parting[c] = 1 if parts else 0
             else:
@@ -263,7 +317,7 @@ def take_cone_branches(K: ContactForces, level: int, count: int) -> None:
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
         if f >= 0 and K.loose[f] > 0:
-            take_friction(K, u, f, REST_SPEED * size, o_w, count)
+            take_friction(K, u, f, REST_SPEED * size_beside(K, count, u), o_w, count)
     for u in range(count):
         row = K.cone_rows[u]
         K.impulse[row] = -K.cone_found[u] - (K.past[row] if level == 1 else 0.0)

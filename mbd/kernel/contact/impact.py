@@ -88,12 +88,13 @@ def rebounds(K: Contacts) -> bool:
 
 def would_hold_back(K: ContactForces) -> bool:
     """Whether a contact that opens on pull would have to pull in the impact just found, its smooth step included."""
-    largest = 0.0
-    for k in range(K.n_rows):
-        largest = max(largest, abs(K.impulse[k] + K.past[k]))
     for c in range(K.n_contacts):
         row = K.normal[c]
         if K.kind[c] == 0 and K.active[c] == 1 and K.opens[c] == 0:
+            largest = 0.0
+            for k in range(K.n_rows):
+                if K.cluster[K.n + k] == K.cluster[K.n + row]:
+                    largest = max(largest, abs(K.impulse[k] + K.past[k]))
             if K.impulse[row] + K.past[row] > PULL * largest:
                 return True
     return False

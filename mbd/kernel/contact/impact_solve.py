@@ -133,15 +133,23 @@ def let_rebound(K: ContactForces) -> None:
 
 
 def energy_gain(K: ContactForces) -> float:
-    """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms.
+    """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms; the most of any cluster.
 
     Non-smooth steps in space find friction for the whole step: what the smooth one had of it may be given back.
     """
+    most = -1e300
+    for c in range(K.n_clusters):
+        most = max(most, gain_of_cluster(K, c))
+    return most
+
+
+def gain_of_cluster(K: ContactForces, c: int) -> float:
+    """The same of one cluster."""
     n = K.n
     loss = 0.0
     size = 1e-300
     for k in range(K.n_rows):
-        if K.impulse[k] != 0.0:
+        if K.impulse[k] != 0.0 and K.cluster[n + k] == c:
             half = 0.0
             for j in range(n):
                 half += 0.5 * K.acc[K.acc_B + k * n + j] * K.jump[j]

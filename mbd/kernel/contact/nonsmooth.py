@@ -23,7 +23,7 @@ from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.contact.nonsmooth_cones import hold_together, release, turned_in_plane
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.events.switching import close_by_impact, mark_touching
-from mbd.kernel.records import Balance, ContactForces, ContactRows, Contacts, Guards, Reals, Switching
+from mbd.kernel.records import Balance, ContactForces, ContactRows, Guards, Reals, Switching
 from mbd.kernel.stepping.candidate import accept_candidate, carry
 from mbd.kernel.stepping.restart import consistent, displace, evaluate, is_held, largest_force, take_consistent
 
@@ -42,15 +42,13 @@ def must_release(K: Switching, t1: float) -> int:
 
     What has let go for a step does not hold again in it, even where frictions that depend on each other share a load.
     """
-    force = largest_force(K)
     count = 0
-    if K.n_cones > 0 and hold_together(K, t1, force):
+    if K.n_cones > 0 and hold_together(K, t1):
         return 0
-    doubtful = largest_tension(K, K.lam1) > PULL * force  # multipliers of a step may oscillate: consistent ones decide
+    doubtful = any_pulls(K, K.lam1, PULL)  # multipliers of a step may oscillate: consistent ones decide
     known = doubtful and consistent(K, t1, K.q1, K.y1) == 0
     for c in range(K.n_contacts):
-        pull = K.impulse[K.normal[c]] if known else K.lam1[K.normal[c]]
-        if doubtful and may_release(K, c) and pull > PULL * force:
+        if doubtful and pulls(K, c, K.impulse if known else K.lam1, PULL):
             K.closed[c] = 0
             K.armed[c] = 1
             count += 1
@@ -62,7 +60,7 @@ def must_release(K: Switching, t1: float) -> int:
             K.slip[f] = 0.0
             continue
         if not follows(K, f):
-            count += release(K, f, PULL * force)
+            count += release(K, f, PULL * largest_force(K, K.friction_row[f]))
     if count > 0:
         for f in range(K.n_frictions):
             if K.let_go[f] == 1 and K.slip[f] != 0.0:
@@ -72,18 +70,19 @@ def must_release(K: Switching, t1: float) -> int:
     return count
 
 
-def may_release(K: Contacts, c: int) -> bool:
-    """Whether contact c is closed and opens on pull."""
-    return bool(K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0)
+def pulls(K: ContactRows, c: int, lam: Reals, part: float) -> bool:
+    """Whether contact c, closed, opens on pull and does so by more than this part of the forces."""
+    if K.kind[c] != 0 or K.closed[c] == 0 or K.opens[c] != 0:
+        return False
+    return bool(lam[K.normal[c]] > part * largest_force(K, K.normal[c]))
 
 
-def largest_tension(K: Contacts, lam: Reals) -> float:
-    """The most with which a contact that opens on pull does so by these multipliers; 0 where none does."""
-    largest = 0.0
+def any_pulls(K: ContactRows, lam: Reals, part: float) -> bool:
+    """Whether one of them does."""
+    found = False
     for c in range(K.n_contacts):
-        if may_release(K, c):
-            largest = max(largest, lam[K.normal[c]])
-    return largest
+        found = found or pulls(K, c, lam, part)
+    return found
 
 
 def closes_below_surface(K: Guards) -> bool:
@@ -184,7 +183,7 @@ def strike(K: Switching, h: float, t1: float) -> int:
     for k in range(K.n_rows):
         K.past[k] = h * K.lam[k]
     K.past_time = h
-    if largest_tension(K, K.lam) > 0.0 and consistent(K, t1, K.q, K.y) == 0:
+    if any_pulls(K, K.lam, 0.0) and consistent(K, t1, K.q, K.y) == 0:
         take_consistent(K)
     return project_gaps(K)
 

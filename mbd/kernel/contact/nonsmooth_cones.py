@@ -22,7 +22,7 @@ from mbd.kernel.contact.cones import (
     set_hold,
     speed_of,
 )
-from mbd.kernel.records import Balance, Frictions, Guards, Reals, Switching
+from mbd.kernel.records import Balance, ContactRows, Frictions, Guards, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate, evaluate_loaded, largest_force, limit_of
 
 __all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release", "turned_in_plane"]
@@ -75,12 +75,12 @@ def release(K: Switching, f: int, least: float) -> int:
     return 1
 
 
-def hold_together(K: Switching, t1: float, force: float) -> bool:
+def hold_together(K: Switching, t1: float) -> bool:
     """Whether contacts that depend on each other hold although multipliers of least norm pull or leave a cone."""
     if K.n_dropped == 0:
         return False
     K.limit[: K.n_frictions] = K.guards1[K.at_limit : K.at_limit + K.n_frictions]
-    return not is_within(K, K.lam1, PULL * force) and all_hold(K, t1)
+    return not is_within(K, K.lam1) and all_hold(K, t1)
 
 
 def keep_within(K: Balance) -> None:
@@ -94,17 +94,17 @@ def keep_within(K: Balance) -> None:
     evaluate_loaded(K, K.lam)
     for f in range(K.n_frictions):
         K.limit[f] = limit_of(K, f)
-    if not is_within(K, K.lam, PULL * largest_force(K)):
+    if not is_within(K, K.lam):
         K.lam[: K.n_rows] = K.impulse[: K.n_rows]
 
 
-def is_within(K: Frictions, lam: Reals, least: float) -> bool:
+def is_within(K: ContactRows, lam: Reals) -> bool:
     """Whether no contact that opens on pull pulls, and no friction sticks beyond its limit, by these multipliers."""
     within = True
     for c in range(K.n_contacts):
-        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0 and lam[K.normal[c]] > least:
-            within = False
+        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0:
+            within = within and lam[K.normal[c]] <= PULL * largest_force(K, K.normal[c])
     for f in range(K.n_frictions):
-        if K.sticks[f] == 1 and friction_size(K, f, lam) - K.limit[f] > least:
-            within = False
+        if K.sticks[f] == 1:
+            within = within and friction_size(K, f, lam) - K.limit[f] <= PULL * largest_force(K, K.friction_row[f])
     return within

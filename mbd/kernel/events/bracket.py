@@ -102,7 +102,7 @@ def root_tolerance(K: ContactForces, kind: int, index: int, f_low: float, f_high
     if kind == CLOSE:
         return float(gap_tolerance(K, index))
     if kind == OPEN_PULL:
-        return FORCE_ULPS * EPS * largest_force(K)
+        return FORCE_ULPS * EPS * largest_force(K, K.normal[index])
     if kind == PRESS or kind == OPEN_FORCE:
         return float(enough(K, kind, index, f_low, f_high))
     if kind == SLIP:
@@ -164,8 +164,10 @@ def find_way(K: Kernel, kind: int, index: int, high: float, tiny: float) -> floa
         value = guard_value(K, kind, index, K.time + low)
         if value > tiny:
             return low
-        if (kind == SLIP or kind == OPEN_PULL) and value < -HALF_PRECISION_RTOL * largest_force(K):
-            note_ahead(K, low)
+        if kind == SLIP or kind == OPEN_PULL:
+            row = K.friction_row[index] if kind == SLIP else K.normal[index]
+            if value < -HALF_PRECISION_RTOL * largest_force(K, row):
+                note_ahead(K, low)
     return 0.0
 
 

@@ -309,13 +309,13 @@ def pull_of(K: Balance, c: int, h: float) -> float:
     the consistent one is asked.
     """
     pull = float(K.lam1[K.normal[c]])
-    if is_doubtful(K, pull, pull - K.lam[K.normal[c]]) and consistent(K, K.time + h, K.q1, K.y1) == 0:
+    if is_doubtful(K, K.normal[c], pull, pull - K.lam[K.normal[c]]) and consistent(K, K.time + h, K.q1, K.y1) == 0:
         return float(K.impulse[K.normal[c]])
     return pull
 
 
-def is_doubtful(K: Model, force: float, change: float) -> bool:
-    """Whether the sign of a force that follows from multipliers of a step is asked of consistent ones.
+def is_doubtful(K: Model, row: int, force: float, change: float) -> bool:
+    """Whether the sign of a force along a row that follows from multipliers of a step is asked of consistent ones.
 
     The multipliers of an implicit step of low order balance its own accelerations, which may lag by what the step
     changes: where the motion is prescribed they are off by a part of the change of the force within the step.
@@ -325,7 +325,7 @@ def is_doubtful(K: Model, force: float, change: float) -> bool:
         return False
     if abs(force) < abs(change):
         return True
-    return bool(K.stabilized == 0 and abs(force) < DOUBTFUL_SHARE * largest_force(K))
+    return bool(K.stabilized == 0 and abs(force) < DOUBTFUL_SHARE * largest_force(K, row))
 
 
 def judge_friction(K: Switching, f: int, h: float) -> None:
@@ -335,7 +335,7 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
     if K.sticks[f] == 1:
         m0 = K.guards0[K.at_limit + f] - friction_size(K, f, K.lam)
         m1 = K.guards1[K.at_limit + f] - friction_size(K, f, K.lam1)
-        if is_doubtful(K, m1, change_of_margin(K, f)):
+        if is_doubtful(K, K.friction_row[f], m1, change_of_margin(K, f)):
             m1 = margin(K, f, K.time + h)
         if m1 < -pull_round_off(K, f, K.lam1):
             consider(K, SLIP, f, crossing(max(m0, 0.0), m1), 0.0)
@@ -366,7 +366,7 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
 
 def pull_round_off(K: ContactRows, f: int, lam: Reals) -> float:
     """Round-off of what is left of a sticking friction at given multipliers: that of all forces enters each of them."""
-    return FORCE_ULPS * EPS * max(friction_size(K, f, lam), largest_force(K))
+    return FORCE_ULPS * EPS * max(friction_size(K, f, lam), largest_force(K, K.friction_row[f]))
 
 
 def change_of_margin(K: Guards, f: int) -> float:

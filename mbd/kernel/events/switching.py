@@ -24,7 +24,16 @@ from mbd.kernel.events.guards import gap_scale, is_watched
 from mbd.kernel.events.impulses import AFTER, BEFORE, BESIDE, push
 from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Mechanism, Switching
 from mbd.kernel.stepping.accept_restart import project_velocity
-from mbd.kernel.stepping.restart import active_rows, capture, consistent, evaluate, evaluate_loaded, limit_of, row_speed
+from mbd.kernel.stepping.restart import (
+    active_rows,
+    capture,
+    consistent,
+    evaluate,
+    evaluate_loaded,
+    largest_force,
+    limit_of,
+    row_speed,
+)
 
 __all__ = ["switch"]
 
@@ -175,10 +184,7 @@ def bursts(K: Mechanism, c: int) -> bool:
     """Whether the force of a sliding contact changed its sign through a pole, not through zero."""
     for f in range(K.n_frictions):
         if K.friction_contact[f] == c and K.slip[f] != 0.0:
-            largest = 0.0
-            for i in range(K.n):
-                largest = max(largest, K.scale[i])
-            return bool(abs(K.lam[K.normal[c]]) > 1e-3 * largest)
+            return bool(abs(K.lam[K.normal[c]]) > 1e-3 * largest_force(K, K.normal[c]))
     return False
 
 

@@ -39,7 +39,7 @@ class Model(SchemeAbilities):
     row_friction: Integers = integers()  # friction of each row that holds only while it sticks, −1 otherwise
     row_unit: Integers = integers()  # 0 [m], 1 [rad], 2 other, of each row
     unit: Integers = integers()  # unit block of each balance component
-    cluster: Integers = integers(lambda s: s.n)  # number of the cluster of each balance component
+    cluster: Integers = integers(lambda s: s.n + s.n_rows)  # number of the cluster of each balance component, row
     turned_by: Integers = integers(lambda s: s.n_v)  # from 1: the joint in charts that each velocity turns, 0: none
     chart: Reals = reals()  # what programs of charts are called with
     chart_end: Reals = reals(lambda s: 3 * s.n_v)  # x, ẋ and ẍ of the candidate in the chart of the step

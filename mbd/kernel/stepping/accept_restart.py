@@ -59,10 +59,10 @@ def event_at_start(K: Kernel) -> None:
 
 def would_pull(K: Balance) -> bool:
     """Whether a contact that pushes by the multipliers of the step pulls by those in K.impulse."""
-    force = largest_force(K)
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0:
-            if K.lam[K.normal[c]] <= 0.0 and K.impulse[K.normal[c]] > PULL * force:
+            row = K.normal[c]
+            if K.lam[row] <= 0.0 and K.impulse[row] > PULL * largest_force(K, row):
                 return True
     return False
 

@@ -54,12 +54,12 @@ def has_spurious_reaction(K: Mechanism) -> bool:
     """
     for c in range(K.n_contacts):
         if K.closed[c] == 1 and K.kind[c] == 0 and K.opens[c] == 0 and K.lam1[K.normal[c]] > 0.0:
-            if K.lam1[K.normal[c]] > PULL * largest_force(K):
+            if K.lam1[K.normal[c]] > PULL * largest_force(K, K.normal[c]):
                 return True
     if K.strategy == 0:
         for f in range(K.n_frictions):
             excess = friction_size(K, f, K.lam1) - K.limit[f]
-            if K.sticks[f] == 1 and excess > 0.0 and excess > PULL * largest_force(K):
+            if K.sticks[f] == 1 and excess > 0.0 and excess > PULL * largest_force(K, K.friction_row[f]):
                 return True
     return False
 

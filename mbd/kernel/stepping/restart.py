@@ -84,14 +84,14 @@ def refresh_scales(K: Model) -> None:
     call(K, SCALES, K.scale)
     for i in range(K.n):
         K.scale[i] = max(K.scale[i], 1e-300)
-    for unit in range(2):  # forces [N] and torques [N m] are judged as blocks of their own
-        big = 0.0
+    for unit in range(2):  # forces [N] and torques [N m] of a cluster are judged as blocks of their own
+        K.typical[: K.n] = 0.0  # the largest of each cluster
         for i in range(K.n):
             if K.unit[i] == unit:
-                big = max(big, K.scale[i])
+                K.typical[K.cluster[i]] = max(K.typical[K.cluster[i]], K.scale[i])
         for i in range(K.n):
             if K.unit[i] == unit:
-                K.scale[i] = big
+                K.scale[i] = K.typical[K.cluster[i]]
     weigh(K)
     far = 1e-3
     if K.vector == 0:  # a coordinate without a velocity of its own has none of the units
@@ -167,11 +167,15 @@ def raise_to_accepted(K: Equations) -> None:
         K.work[i] = max(K.work[i], K.scale[i])
 
 
-def largest_force(K: Model) -> float:
-    """The largest magnitude that forces have in the balance [N, N m]."""
+def largest_force(K: Model, row: int) -> float:
+    """The largest magnitude that forces have in the balance of the cluster of a row [N, N m].
+
+    What is heavy apart says nothing of the round-off here.
+    """
     force = 0.0
     for i in range(K.n_v):
-        force = max(force, K.scale[i])
+        if K.cluster[i] == K.cluster[K.n + row]:
+            force = max(force, K.scale[i])
     return float(force)
 
 

@@ -220,7 +220,7 @@ class Stepper:
         v.was[:] = codes.NOT_KNOWN_YET
         fill_coefficients(v, self.own)
         v.unit = unit_blocks(self.mechanism).copy()
-        v.cluster[: v.n] = self.clusters
+        v.cluster[: v.n + v.n_rows] = self.clusters
         for number, (_, turning) in enumerate(self.mechanism.turning, 1):
             v.turned_by[turning] = number
         v.row_unit = np.array([*row_units(self.mechanism), 2], dtype=np.int64)

@@ -1,0 +1,81 @@
+"""A heavy body apart decides nothing of a light one: whether it pushes, sticks, parts or is solved for."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import mbd
+
+ENDS = {
+    "slide": ("at.x", "at.x.rate"), "lift": ("at.y", "at.y.rate"), "bounce": ("at.x", "at.y", "at.x.rate"),
+    "swing": ("pin.angle", "pin.angle.rate"), "plane": ("at.x", "at.z", "at.x.rate", "at.z.rate"),
+    "table": ("at.x", "at.z", "at.x.rate", "at.z.rate"),
+}  # fmt: skip
+SCHEMES = [mbd.RadauIIA(), mbd.HHT(0.05), mbd.RungeKutta4()]
+
+
+def light(model, kind, a):
+    """A mechanism of 1 kg on the ground, or on a stop, whose contact changes; what closes and what is named of it."""
+    if kind == "swing":
+        rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
+        pin = mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Coulomb(0.4 * a))
+        model.connect(pin)
+        model.constrain(mbd.Unilateral("stop", mbd.extension(pin, -0.3), restitution=0.5))
+        return [], {"pin.angle": 1.0 + 0.2 * a}, {}
+    in_space = kind in ("plane", "table")
+    body = mbd.PointMass("body", mass=1.0)
+    model.connect(mbd.Translation("at", model.ground.origin, body.origin, axes="xyz" if in_space else "xy"))
+    friction = {"slide": 0.5, "lift": 0.5, "bounce": 0.3, "plane": 0.3, "table": 0.5}[kind]
+    where = mbd.touchdown(body.origin)
+    model.constrain(mbd.Unilateral("foot", where, friction=friction, restitution=0.5 if kind == "bounce" else 0.0))
+    weight = 9.81
+    if kind == "lift":
+        model.apply(mbd.Applied("force", body.origin, force=(0.0, lambda t: weight * t / (0.4 * a))))
+    if kind in ("slide", "table"):
+        sideways = (lambda t: 0.3 * weight * t / a) if kind == "table" else 0.0
+        pull = (lambda t: weight * t / a, 0.0, sideways)
+        model.apply(mbd.Applied("force", body.origin, force=pull))
+    velocity = {"at.x": 1.0} if kind in ("bounce", "plane") else {}
+    if kind == "plane":
+        velocity |= {"at.z": a}
+    if kind == "bounce":
+        return [], {"at.x": 0.0, "at.y": 0.1 * a}, velocity
+    return ["foot"], {"at.x": 0.0} | ({"at.z": 0.0} if in_space else {}), velocity
+
+
+def end(kind, a, scheme, contact, mass=None):
+    model = mbd.Model("beside")
+    closed, position, velocity = light(model, kind, a)
+    if mass is not None:
+        heavy = mbd.PointMass("heavy", mass=mass)
+        in_space = kind in ("plane", "table")
+        model.connect(mbd.Translation("there", model.ground.origin, heavy.origin, axes="xyz" if in_space else "xy"))
+        model.constrain(mbd.Unilateral("sill", mbd.touchdown(heavy.origin), friction=0.9))
+        closed, position = [*closed, "sill"], position | {"there.x": 0.0} | ({"there.z": 0.0} if in_space else {})
+    start = mbd.assemble(model, closed=closed, position=position, velocity=velocity)
+    run = mbd.simulate(model, start, scheme, dt=1e-2, until=0.8, contact=contact)
+    events = [event.time for event in run.events if event.name != "sill"]
+    return [float(run[name][-1]) for name in ENDS[kind]], events
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.sampled_from(list(ENDS)), st.floats(0.5, 1.5), st.sampled_from(SCHEMES),
+    st.sampled_from(["events", "nonsmooth"]), st.floats(4.0, 12.0),
+)  # fmt: skip
+def test_contacts_are_the_same_beside_a_heavy_body(kind, a, scheme, contact, size):
+    alone, events = end(kind, a, scheme, contact)
+    beside, told = end(kind, a, scheme, contact, 10.0**size)
+    assert len(told) == len(events)
+    np.testing.assert_allclose(told, events, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(beside, alone, rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("kind", list(ENDS))
+def test_each_kind_is_the_same_beside_one_of_a_million_tons(kind, scheme, contact):
+    alone, events = end(kind, 0.9, scheme, contact)
+    beside, told = end(kind, 0.9, scheme, contact, 1e9)
+    assert len(told) == len(events) or kind == "bounce"
+    np.testing.assert_allclose(beside, alone, rtol=1e-6, atol=1e-8)
