@@ -147,6 +147,23 @@ def test_a_motion_has_its_angles_in_degrees(tmp_path):
         np.testing.assert_array_equal(numbers[:, 3], swing["rod.end.x"])
 
 
+@pytest.mark.parametrize("kind", ["Universal", "Cylindrical", "Planar", "Spherical", "Revolute", "Prismatic"])
+def test_a_joint_has_the_same_units_whether_it_is_cut_or_not(kind):
+    units = []
+    for cut in ("auto", "all"):
+        model, body = (
+            mbd.Model("one joint", gravity=(0.0, 0.0, 0.0), cut=cut),
+            mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.3)),
+        )
+        model.connect(getattr(mbd, kind)("joint", model.ground.origin, body.origin))
+        run = mbd.simulate(model, mbd.assemble(model), dt=0.1, until=0.1, backend="python")
+        named = run.to_dataframe().attrs["units"]
+        units.append({name: named.get(name, "") for name in run.names if name.startswith("joint.")})
+    both = [name for name in units[0] if name in units[1] and name not in ("joint.rate", "joint.acceleration")]
+    assert len(both) >= 6
+    assert {name: units[0][name] for name in both} == {name: units[1][name] for name in both}
+
+
 @pytest.mark.parametrize("cut", ["auto", "all"])
 def test_rates_of_a_motion_are_in_degrees_whichever_joints_are_cut(tmp_path, cut):
     model = mbd.Model("pendulum", cut=cut)

@@ -7,7 +7,8 @@ from mbd.results.facts import Facts
 __all__ = ["EFFORTS", "unit", "unit_of"]
 
 ENDINGS = {
-    "angle": "rad", "displacement": "m", "length": "m", "speed": "m/s", "reaction_force": "N", "reaction_torque": "N m",
+    "angle": "rad", "first": "rad", "second": "rad", "displacement": "m", "length": "m", "speed": "m/s",
+    "reaction_force": "N", "reaction_torque": "N m",
     "force": "N", "friction": "N", "tension": "N", "torque": "N m", "power": "W", "energy": "J",
     "net_moment": "N m", "net_force": "N", "kinetic_energy": "J", "potential_energy": "J", "t": "s",
     "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s²", "ay": "m/s²", "az": "m/s²",
@@ -58,8 +59,6 @@ def unit(name: str, facts: Facts) -> str:
     if contact is not None and last == "force":
         return "N m" if contact.unit.startswith("rad") else "N"
     if last in ("rate", "acceleration"):
-        if last == "acceleration" and stem in dict(facts.velocities):  # of a velocity that is no rate
-            return own[stem].removesuffix("/s") + "/s²"
         power = "/s" if last == "rate" else "/s²"
         base = (
             own.get(stem)
@@ -67,6 +66,7 @@ def unit(name: str, facts: Facts) -> str:
             or next((value for key, value in own.items() if key.rpartition(".")[0] == stem), "")
             or (unit(stem, facts) if "." in stem else "")  # of a cut joint, whose angle is no coordinate
         )
+        base = base.removesuffix("/s") if last == "acceleration" else base  # of a velocity that is no rate
         return base + power if base else ""
     effort = stem.removesuffix(".a").rpartition(".")[2]  # 'mount.force.a.x': in the axes of a frame a
     if last in ("x", "y", "z") and effort in EFFORTS:
