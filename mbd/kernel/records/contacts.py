@@ -96,7 +96,9 @@ class Events(SchemeAbilities):
     inside: Reals = reals(lambda s: 2 * s.n_watched + 2 * s.n_rows + s.n_q + 2 * s.n)  # what substeps began from
     event_place: float = place("detail")  # estimated distance of the event that fired first, part of the step
     event_low: float = place("detail")  # the lower end of its bracket
-    changes_little: float = place("detail")  # 1: rates of the candidate change so little that it needs no other look
+    changes_little: float = place(
+        "detail"
+    )  # 1: rates of the candidate change so little or evenly that no closer look is needed
     event_after: float = place("detail")  # its distance from the start of the step [s]
     event_kind: int = place("state")  # −1: none
     event_index: int = place("state")

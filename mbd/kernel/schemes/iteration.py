@@ -12,9 +12,8 @@ from mbd.kernel.stepping.restart import compose, note_scales
 from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 
 __all__ = [
-    "MAX_CURVATURE", "MAX_RATE_ERROR", "MAX_UNCHECKED_ERROR", "MIN_HALVED_RESIDUAL", "MIN_RATE_SHARE",
-    "MIN_RETRY_SHARE", "finish", "is_below_floors",
-    "is_small", "note_fastest", "overturns",
+    "MAX_CURVATURE", "MAX_RATE_ERROR", "MAX_UNCHECKED_ERROR", "MAX_UNEXPLAINED_CHANGE", "MIN_HALVED_RESIDUAL",
+    "MIN_RATE_SHARE", "MIN_RETRY_SHARE", "finish", "is_below_floors", "is_small", "note_fastest", "overturns",
     "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at", "weigh_by_accelerations",
 ]  # fmt: skip
 
@@ -24,6 +23,8 @@ MAX_RATE_ERROR = 0.2
 """The same above which forces along the way are asked whether it can be the motion [-]."""
 MIN_RETRY_SHARE = 0.1
 """Part of a step below which a failing step is not shortened any further [-]."""
+MAX_UNEXPLAINED_CHANGE = 0.5
+"""Part of a change of velocities by which accelerations miss it that asks for a look along it [-]."""
 MAX_CURVATURE = 0.1
 """Change of accelerations in a step, times its size, over the fastest rate, above which poles are looked for [-]."""
 MIN_RATE_SHARE = 0.01

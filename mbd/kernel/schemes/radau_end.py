@@ -7,6 +7,7 @@ from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import NOT_CONVERGED, SINGULAR
 from mbd.kernel.records import Balance, Kernel, Steps
+from mbd.kernel.schemes.iteration import MAX_UNEXPLAINED_CHANGE
 from mbd.kernel.schemes.stage_layout import (
     A_,
     C_,
@@ -61,6 +62,7 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
         K.y1[i] = K.block[K.o_v + i]
         K.rate1[i] = K.stages[o_W + i]
     K.lam1[: K.n_rows] = K.stages[o_L : o_L + K.n_rows]
+    K.changes_little = 1.0 if is_even(K, h) else 0.0
     estimate_error(K, h, m)
     if twice:
         raise_error(K, h, m)
@@ -83,6 +85,27 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
         K.block[K.o_a + i] = K.rate1[i]
         K.aux1[i] = K.rate1[i]
     return 0
+
+
+def is_even(K: Steps, h: float) -> bool:
+    """Whether accelerations at the start and at all stages would each make about the change of velocities of the step.
+
+    Then forces along it lead from its start to its end, and the look for places between is not needed.
+    """
+    o_W = stage_place(K, STAGE_RATES)
+    for c in range(K.n_clusters):
+        largest = 0.0
+        missed = 0.0
+        for j in range(K.n_v):
+            if K.cluster[j] == c:
+                change = K.y1[j] - K.y[j]
+                largest = max(largest, abs(change))
+                missed = max(missed, abs(h * K.rate[j] - change))
+                for i in range(3):
+                    missed = max(missed, abs(h * K.stages[o_W + i * K.n + j] - change))
+        if missed > MAX_UNEXPLAINED_CHANGE * largest:
+            return False
+    return True
 
 
 def end_rates(K: Balance, t1: float, m: int) -> bool:

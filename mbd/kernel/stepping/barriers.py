@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.records import Guards, Reals, Switching
-from mbd.kernel.schemes.iteration import MIN_RATE_SHARE
+from mbd.kernel.schemes.iteration import MAX_UNEXPLAINED_CHANGE, MIN_RATE_SHARE
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.growth import MAX_GROWTH, leave_rows_alone, take_back
 from mbd.kernel.stepping.restart import consistent, evaluate
@@ -24,8 +24,6 @@ __all__ = ["crosses_barrier"]
 
 PLACES_A_SIDE = 11
 """Places along D on either side of its middle: seven sixteenths, then halves of what is left, and its end."""
-MAX_UNEXPLAINED_CHANGE = 0.5
-"""Part of D by which the mean of the accelerations at both ends misses it that asks for a look along D [-]."""
 
 
 def crosses_barrier(K: Switching, h: float, t1: float, at_y: int, at_D: int) -> bool:

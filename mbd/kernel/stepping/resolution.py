@@ -136,7 +136,8 @@ def look_closer(K: Kernel, h: float, t1: float, stretch: float, rough_enough: bo
         for i in range(K.n_v if status != 0 else 0):
             if K.cluster[i] == c and K.cluster[blocked] != c:
                 blocked = i
-    if status == 0 and K.explicit == 0 and (coarse or K.estimates == 1) and crosses_barrier(K, h, t1, at_y, at_D):
+    uneven = K.explicit == 0 and K.changes_little == 0.0 and (coarse or K.estimates == 1)
+    if status == 0 and uneven and crosses_barrier(K, h, t1, at_y, at_D):
         status = GAINED
     carry(K.q1, K.inside, 0, K.n_q, False)
     carry(K.y1, K.inside, at_y, K.n, False)
