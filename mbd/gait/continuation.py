@@ -16,20 +16,21 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.errors import GaitError, SimulationError
-from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.family import Member, across, floquet
 from mbd.gait.floquet import Multipliers
-from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured, numbers_of
+from mbd.gait.map_derivative import EXACT, MapDerivative, Measured, map_derivative, measured, numbers_of
 from mbd.gait.newton import MAX_CONTRACTION
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart, Section
 from mbd.state import State
 
-__all__ = ["QUICK", "BranchPoint", "Continuation", "Corrected", "Forbidden", "way_of"]
+__all__ = ["NOT_CONVERGED", "QUICK", "BranchPoint", "Continuation", "Corrected", "Forbidden", "way_of"]
 
 CORRECTIONS, QUICK = 10, 4
 """Newton corrections of a point, and how many count as few."""
+NOT_CONVERGED = "does not converge"
+"""Outcome of corrections that tells nothing of the place where they were made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,7 @@ class BranchPoint:
     value : of the parameter; state, period [s], distance [m], steps : see `LimitCycle`
     multipliers : see `mbd.gait.floquet`; tangent (size + 1,): of (c, p/σ) in the chart, of length 1
     matrix (size, size + 1): [P − 1, σ F_p]; events : the sequence of (name, kind) in one application
+    how : the derivatives were found (see `mbd.gait.map_derivative`)
     """
 
     value: float
@@ -51,6 +53,7 @@ class BranchPoint:
     matrix: Matrix
     chart: Chart
     events: tuple[tuple[str, str], ...]
+    how: str = EXACT
 
     @property
     def speed(self) -> float:
@@ -165,8 +168,6 @@ class Continuation:
         if derivative.missing:
             why = next(iter(derivative.missing.values()))
             raise GaitError(f"no derivative at {self.name} = {corrected.value:.9g}: {why}")
-        if levels > 2:
-            derivative = self._exact(derivative, chart, values)
         matrix = self._matrix(derivative, chart.size) + self.member_part(chart, base, derivative, corrected.value)
         tangent = np.asarray(np.linalg.svd(matrix)[2][-1], dtype=float)  # along which the matrix vanishes
         if before is not None:
@@ -175,17 +176,8 @@ class Continuation:
         arrival = corrected.found.arrival
         return BranchPoint(
             corrected.value, corrected.state, arrival.period, way_of(self.map, arrival), arrival.steps,
-            floquet(self.map, chart, derivative, values), tangent, matrix, chart, arrival.events,
+            floquet(self.map, chart, derivative, values), tangent, matrix, chart, arrival.events, derivative.how,
         )  # fmt: skip
-
-    def _exact(self, found: MapDerivative, chart: Chart, values: Mapping[str, float]) -> MapDerivative:
-        """The derivative with P from passes over runs, where they know it; its error is what differences leave."""
-        exact, size = exact_derivative(self.map, chart, np.zeros(chart.size), values), chart.size
-        if exact is None:
-            return found
-        matrix, error = found.matrix.copy(), found.error.copy()
-        matrix[:size, :size], error[:size, :size] = exact, np.abs(exact - found.matrix[:size, :size])
-        return MapDerivative(matrix, error, f"exact; by the parameter {found.how}", found.missing)
 
     def whole(self, point: BranchPoint) -> Vector:
         """The tangent in the coordinates of the mechanism, for the chart of another point."""
@@ -224,18 +216,27 @@ class Continuation:
             left = found.c - u[:size] + self.member_gap(chart, u[:size], found, value)
             gap = np.append(left, float(plane @ u) - ds)
             residual = float(np.max(np.abs(gap)))
+            step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
             if residual <= self.tol:
-                step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
-                uncertain = self.width * abs(float(step[-1]))
+                # beside a limit the state may not follow one more correction: then the parameter alone does
+                alone = residual / (float(np.linalg.norm(matrix[:, -1])) or 1.0)
+                uncertain = self.width * max(abs(float(step[-1])), alone)
                 return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, uncertain, u)
             if residual > MAX_CONTRACTION * before:
                 renewed = self.matrix_at(chart, u, value, found)
-                if renewed is None or residual > 4.0 * before:
+                if renewed is None or self.leaves_smooth_part(point, renewed[1]):
+                    return Outcome("no derivative", "the corrections come to where the map has no derivative")
+                if residual > 4.0 * before:
                     break
-                matrix = renewed
+                matrix = renewed[0]
+                step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
             before = min(residual, before)
-            u = u - np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
-        return Outcome("does not converge", "the corrections do not converge")
+            u = u - step
+        return Outcome(NOT_CONVERGED, "the corrections do not converge")
+
+    def leaves_smooth_part(self, point: BranchPoint, how: str) -> bool:
+        """Whether a pass knows the derivative of the map at a point, and none where one was found in this way."""
+        return point.how == EXACT and how != EXACT
 
     def with_half_steps(self) -> Continuation:
         """The same with half the step of the map: where what it finds differs, that is the error of the steps."""
@@ -253,15 +254,17 @@ class Continuation:
                 allowed = middle
         return allowed + 0.0  # no −0
 
-    def matrix_at(self, chart: Chart, u: Vector, value: float, found: Measured) -> Matrix | None:
-        """[P − 1, σ F_p] beside a point, from where the map gives `found`; None where derivatives are missing."""
+    def matrix_at(self, chart: Chart, u: Vector, value: float, found: Measured) -> tuple[Matrix, str] | None:
+        """[P − 1, σ F_p] beside a point, from where the map gives `found`, and how it was found; None where derivatives
+        are missing."""
         try:
             derivative = self.derived(chart, u[:-1], self.with_value(value), 1, found)
         except SimulationError:
             return None
         if derivative.missing:
             return None
-        return self._matrix(derivative, chart.size) + self.member_part(chart, found, derivative, value)
+        matrix = self._matrix(derivative, chart.size) + self.member_part(chart, found, derivative, value)
+        return matrix, derivative.how
 
 
 def way_of(map_: ReturnMap, arrival: Arrival) -> float:

@@ -18,8 +18,8 @@ from scipy.linalg import eig
 from mbd.arrays import Matrix, Vector
 from mbd.equal import RANK_RTOL
 from mbd.errors import GaitError, ModelError, SimulationError, UnknownNameError, nearest
-from mbd.gait.exact_derivative import exact_derivative
-from mbd.gait.map_derivative import MapDerivative, Measured, extrapolated, map_derivative, measured
+from mbd.gait.extrapolation import extrapolated
+from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured
 from mbd.gait.return_map import Arrival
 from mbd.sensitivity.starts import unknown_name
 
@@ -264,9 +264,6 @@ def _slope_beside(gait: Any, c: Vector, values: Mapping[str, float]) -> Matrix |
             return f"it {map_.against(chart.section, there)}"
         if other := map_.other_events(gait.arrival, there.arrival):
             return f"it {other}"
-        exact = exact_derivative(map_, chart, c, values)
-        if exact is not None:
-            return exact
         found = map_derivative(map_, chart, c, values, base=there)
     except SimulationError as error:
         return str(error)

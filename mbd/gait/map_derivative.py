@@ -1,27 +1,29 @@
-"""Derivatives of a return map by the start and by parameters.
+"""Derivatives of a return map by the start and by parameters: exact where a pass over a run knows them.
 
-Central differences of runs with equal steps, of steps h, 2h, 4h, with two Richardson extrapolations (order 6); the
-entries of least estimated error are taken. Where a run beside the base does not arrive, or has other events, h shrinks.
-Of a parameter, whose unit may be any, h is such that the numbers of the map change by as much as they do for the
-differences of coordinates.
+Elsewhere (resets in Python, two events at one instant, plain Python without compiled code) they are central differences
+of runs with equal steps, of steps h, 2h, 4h, with two Richardson extrapolations (order 6); the entries of least
+estimated error are taken. Where a run beside the base does not arrive, or has other events, h shrinks. Of a parameter,
+whose unit may be any, h is such that the numbers of the map change by as much as they do for the differences of
+coordinates.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-from mbd.equal import HALF_PRECISION_RTOL
+from mbd.equal import HALF_PRECISION_RTOL, ROUND_OFF_RTOL
 from mbd.errors import SimulationError
+from mbd.gait.exact_derivative import exact_derivative
+from mbd.gait.extrapolation import extrapolated
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart
 
-__all__ = ["MapDerivative", "Measured", "extrapolated", "map_derivative", "measured", "numbers_of"]
+__all__ = ["EXACT", "MapDerivative", "Measured", "differences", "map_derivative", "measured", "numbers_of"]
 
 STATE_STEP, PARAMETER_STEP = 2e-4, 2e-3
 """Least of the three differences of coordinates of the section [m, rad, 1/s of them], and the first of parameters that
@@ -30,6 +32,8 @@ NEAR_ENOUGH, UNSEEN = 30.0, 1e-9
 """Factor by which what a parameter changes may differ from `STATE_STEP`, and the share of it that is no change [-]."""
 MAX_RESCALING, MAX_RESCALINGS, WIDEST = 1e5, 12, 1e15
 """Factor by which its difference changes at most at once, how often, and how wide it gets, over it or 1 [-]."""
+EXACT = "exact"
+"""How derivatives were found that a pass over runs knows."""
 MAX_DIFFERENCES = 3
 """Differences of each direction at most: h, 2h, 4h."""
 ENOUGH, CLOSER = 1e-9, 0.125
@@ -60,7 +64,7 @@ class MapDerivative:
     """∂(coordinates, period, travel, steps)/∂(directions).
 
     matrix (n_out, n_directions); error : estimate of that of each entry
-    how : 'differences of order 6', of 4 or of 2
+    how : 'exact', or 'differences of order 6', of 4 or of 2
     missing : why directions have no derivative, by number
     """
 
@@ -94,12 +98,33 @@ def map_derivative(
 ) -> MapDerivative:  # fmt: skip
     """The derivatives at c, by all coordinates of the section (unless `state` is False), then by parameters `names`.
 
-    levels : differences of each direction, 1 to 3: of order 2 for steps of Newton, 4 along branches, 6 of gaits
+    levels : differences of each direction, 1 to 3, where no exact ones are known: of order 2 for steps of Newton, 4
+        along branches, 6 of gaits
     base : what the map gives at c, where that is known
+
+    Raises
+    ------
+    SimulationError
+        where the map does not arrive.
     """
     found = measured(map_, chart, c, values) if base is None else base
     if isinstance(found, Arrival):
         raise SimulationError(f"the base of derivatives {found.outcome}")
+    exact = exact_derivative(map_, chart, c, values, names) if map_.mechanism.backend.name != "python" else None
+    if exact is not None:
+        matrix = exact if state else exact[:, chart.size :]
+        error = np.full_like(matrix, ROUND_OFF_RTOL * np.nanmax(np.abs(matrix), initial=0.0))
+        return MapDerivative(matrix, error, EXACT, {})
+    return differences(map_, chart, c, values, names, levels, state, found)
+
+
+def differences(
+    map_: ReturnMap, chart: Chart, c: Vector, values: Values, names: Sequence[str] = (), levels: int = MAX_DIFFERENCES,
+    state: bool = True, base: Measured | None = None,
+) -> MapDerivative:  # fmt: skip
+    """The derivatives of `map_derivative`, by differences of runs."""
+    found = measured(map_, chart, c, values) if base is None else base
+    assert isinstance(found, Measured)
     scale = 1.0 if levels > 1 else 1e-5 / STATE_STEP  # coarser where two runs must do
     units = np.eye(chart.size) if state else ()
     columns = [_Column(unit, "", scale * STATE_STEP) for unit in units]
@@ -225,21 +250,3 @@ def _beside(
         else map_.other_events(base.arrival, each.arrival) or each.numbers
         for each in results
     ]
-
-
-def extrapolated(slopes: Sequence[Vector], errors: float = 4.0) -> tuple[Vector, Vector]:
-    """Richardson's table of differences of h, 2h, 4h: for each number the entry of least error estimate.
-
-    errors : by which an error of leading order grows from h to 2h: 4 of central differences, 2 of those to one side
-    """
-    if len(slopes) == 1:
-        return slopes[0], np.full(len(slopes[0]), np.nan)
-    best, error = slopes[0], np.abs(slopes[0] - slopes[1])
-    table = list(slopes)
-    for order in range(1, len(slopes)):
-        power = errors**order
-        table = [(power * fine - coarse) / (power - 1.0) for fine, coarse in pairwise(table)]
-        doubt = np.abs(table[0] - best)
-        better = doubt <= error
-        best, error = np.where(better, table[0], best), np.where(better, doubt, error)
-    return best, error

@@ -14,7 +14,7 @@ from mbd.dataclass import dataclass
 from mbd.equal import HALF_PRECISION_RTOL, RANK_RTOL
 from mbd.errors import SimulationError
 from mbd.gait.family import Member, energy_of
-from mbd.gait.map_derivative import Measured, map_derivative, measured, numbers_of
+from mbd.gait.map_derivative import Measured, differences, measured, numbers_of
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart, Section
@@ -242,7 +242,7 @@ def _slope(map_: ReturnMap, point: FixedPoint, found: Measured, values: Values) 
     """1 − P at the last state; None where derivatives are missing."""
     try:
         zero = np.zeros(point.chart.size)
-        derivative = map_derivative(map_, point.chart, zero, values, levels=1, base=found)
+        derivative = differences(map_, point.chart, zero, values, levels=1, base=found)
     except SimulationError:
         return None
     P = derivative.matrix[: point.chart.size]

@@ -24,6 +24,7 @@ from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL
 from mbd.errors import MbdError, ModelError
 from mbd.gait.alike import moves_sides_alike, sides_faults
+from mbd.gait.extrapolation import slopes_of
 from mbd.gait.heading import Heading
 from mbd.gait.machines import counted_from, stored_by
 from mbd.gait.mirror import Mirror
@@ -198,6 +199,12 @@ class ReturnMap:
         if last is None or last[0] != values:
             last = self._last = dict(values), self._vector(self.plain(values))
         return last[1]
+
+    def rates_of(self, name: str, values: Values) -> Mapping[str, float] | None:
+        """Rates of the model's parameters by one of them or by the value of a function; None where they have none."""
+        rates = slopes_of(self.functions[name], float(values[name])) if name in self.functions else {name: 1.0}
+        known = {each.name for each in self.mechanism.equations.parameters}
+        return rates if rates is not None and rates.keys() <= known else None
 
     def _vector(self, plain: Mapping[str, float]) -> Vector:
         return self.mechanism.parameters(plain, self.folded if plain else {})

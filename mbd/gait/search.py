@@ -11,13 +11,11 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.errors import SimulationError
 from mbd.gait.cycle import LimitCycle, residual_by_unit
-from mbd.gait.exact_derivative import exact_derivative
 from mbd.gait.family import Member, floquet
 from mbd.gait.floquet import Multipliers
 from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, measured
 from mbd.gait.newton import FixedPoint, fixed_point
 from mbd.gait.outcome import Outcome
-from mbd.gait.reflection import in_space
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.samples import explain_samples
 from mbd.gait.section import Chart, Section, section_of
@@ -161,7 +159,7 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
     try:
         found = measured(map_, chart, zero, values) if point.found is None else point.found
         if point.outcome.good and isinstance(found, Measured):
-            derivative = _refined(map_, chart, map_derivative(map_, chart, zero, values, base=found), values)
+            derivative = map_derivative(map_, chart, zero, values, base=found)
     except SimulationError as error:
         point.outcome = point.outcome if not point.outcome.good else Outcome("numerical error", str(error))
     multipliers = _multipliers(map_, chart, derivative, values)
@@ -180,19 +178,6 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
         residual, tuple(point.residuals), multipliers, derivative, dict(values), map_.dt, map_.runs, chart, map_, way,
         given,
     )  # fmt: skip
-
-
-def _refined(map_: ReturnMap, chart: Chart, found: MapDerivative, values: Values) -> MapDerivative:
-    """P by the exact derivative of the run, where a pass knows it, of walkers in space and of those that hold values
-    or first-order states; its error is what the differences differ by."""
-    if found.missing or not (in_space(map_.model) or any(chart.counts[2:])):
-        return found
-    exact, size = exact_derivative(map_, chart, np.zeros(chart.size), values), chart.size
-    if exact is None:
-        return found
-    matrix, error = np.vstack([exact, found.matrix[size:]]), np.array(found.error)
-    error[:size] = np.abs(exact - found.matrix[:size])
-    return MapDerivative(matrix, error, f"exact; times and ways by {found.how}", {})
 
 
 def _distance(way: Vector, arrival: Arrival | None) -> float:

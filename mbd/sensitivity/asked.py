@@ -6,9 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 
-import numpy as np
-
-from mbd.arrays import Matrix
 from mbd.bodies.values import among, is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of, tunable_model
 from mbd.dataclass import changed_late, dataclass
@@ -120,24 +117,20 @@ class Table(Asked):
 
 
 class EndState(Asked):
-    """The derivatives of (q, v, z, anchors) and of the time at the end, (n_v + n + A + 1, D); controllers are refused.
+    """What a pass over a run finds, by directions of its start and of parameters; controllers are refused."""
 
-    along : (n_v + n + A, D) those of the start
-    """
-
-    def __init__(self, along: Matrix) -> None:
+    def __init__(self, wanted: Sequence[Direction]) -> None:
         super().__init__(())
-        self.along = along
+        self.wanted = wanted
 
     def _ways(self, known: Mapping[str, float]) -> tuple[list[Any], Sequence[str]]:
-        return [Direction(f"direction {k}", along=column) for k, column in enumerate(self.along.T)], ()
+        return list(self.wanted), ()
 
     def source(self, model: Any, scheme: Integrator) -> Source | None:
         return None
 
     def take(self, run: Trajectory, found: Differentiated, wanted: Sequence[Direction]) -> None:
-        at_end = found.walked.motion.tangent
-        self.found = np.vstack([at_end.q, at_end.y, at_end.anchors, at_end.t])
+        self.found = found.walked
 
 
 class Carried(Table):

@@ -99,6 +99,13 @@ def one_sided(gait: mbd.LimitCycle, c: Any, h: float) -> Any:
     return np.array(columns).T
 
 
+def one_sided_by(gait: mbd.LimitCycle, c: Any, name: str, h: float) -> Any:
+    """∂(numbers of the map)/∂(a parameter) by one-sided differences of order 4."""
+    values = [{**gait.parameters, name: gait.parameters[name] + k * h} for k in range(5)]
+    there = [measured(gait.map, gait.chart, c, each).numbers for each in values]
+    return np.dot([-25.0, 48.0, -36.0, 16.0, -3.0], there) / (12.0 * h)
+
+
 @pytest.mark.parametrize(
     ("section", "strides", "mirror"),
     [
@@ -126,9 +133,13 @@ def test_return_maps_with_remembered_values_have_exact_derivatives(section: str,
     gait = mbd.limit_cycle(model, strike.state, section=section, mirror=mirror, strides=strides, parameters=numbers)
     assert gait.map_derivative.how.startswith("exact")
     for c in (np.zeros(gait.chart.size), 1e-3 * random.uniform(-1.0, 1.0, gait.chart.size)):
-        exact = exact_derivative(gait.map, gait.chart, c, gait.parameters)
+        whole, size = exact_derivative(gait.map, gait.chart, c, gait.parameters, list(numbers)), gait.chart.size
+        exact, by_numbers = whole[:size, :size], whole[:, size:]
         for h in (2e-4, -2e-4):
             np.testing.assert_allclose(exact, one_sided(gait, c, h), atol=1e-7 * np.max(np.abs(exact)))
+            for k, (name, value) in enumerate(numbers.items()):
+                expected = one_sided_by(gait, c, name, 20.0 * h * value)
+                np.testing.assert_allclose(by_numbers[:, k], expected, atol=1e-6 * np.nanmax(np.abs(expected)))
 
 
 def test_what_is_stored_of_other_remembered_values_is_a_part_of_the_gait_where_it_is_stored() -> None:

@@ -475,4 +475,5 @@ def test_a_search_leaves_its_arrays_to_the_next_which_finds_the_same_to_the_bit(
     assert left
     found(others)
     assert found({}) == first
-    assert set(map(id, idle.values())) == left
+    now = set(map(id, idle.values()))
+    assert left <= now and (others or left == now)  # other parameters may have another step
