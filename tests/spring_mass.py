@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-__all__ = ["G", "MASS", "derivative", "runner_apex", "speed_at", "walker_apex"]
+__all__ = ["G", "MASS", "derivative", "runner_apex", "speed_at", "until", "walker_apex"]
 
 MASS, G = 80.0, 9.81
 TIGHT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
@@ -35,7 +35,7 @@ def _rates(feet: Sequence[float], stiffness: float) -> Callable[[float, Numbers]
     return rates
 
 
-def _until(state: Numbers, feet: Sequence[float], stiffness: float, event: Callable[[Numbers], float], sign: float):
+def until(state: Numbers, feet: Sequence[float], stiffness: float, event: Callable[[Numbers], float], sign: float):
     """The state and time as an event crosses zero in a direction, from a state away from it."""
 
     def guard(_: float, s: Numbers) -> float:
@@ -53,7 +53,7 @@ def runner_apex(y: float, v: float, stiffness: float, angle: float) -> tuple[flo
     fall = math.sqrt(2.0 * (y - landing) / G)
     foot = v * fall + math.cos(angle)
     state = np.array([v * fall, landing, v, -G * fall])
-    state, stance = _until(state, [foot], stiffness, lambda s: math.hypot(s[0] - foot, s[1]) - 1.0, 1.0)
+    state, stance = until(state, [foot], stiffness, lambda s: math.hypot(s[0] - foot, s[1]) - 1.0, 1.0)
     rise = state[3] / G
     return state[1] + 0.5 * state[3] * rise, state[2], state[0] + state[2] * rise, fall + stance + rise
 
@@ -65,10 +65,10 @@ def walker_apex(y: float, ahead: float, energy: float, stiffness: float, angle: 
     """
     v = speed_at(y, energy, stiffness, math.hypot(ahead, y))
     foot, landing = -ahead, math.sin(angle)
-    state, first = _until(np.array([0.0, y, v, 0.0]), [foot], stiffness, lambda s: s[1] - landing, -1.0)
+    state, first = until(np.array([0.0, y, v, 0.0]), [foot], stiffness, lambda s: s[1] - landing, -1.0)
     new = float(state[0]) + math.cos(angle)
-    state, second = _until(state, [foot, new], stiffness, lambda s: math.hypot(s[0] - foot, s[1]) - 1.0, 1.0)
-    state, third = _until(state, [new], stiffness, lambda s: s[3], -1.0)
+    state, second = until(state, [foot, new], stiffness, lambda s: math.hypot(s[0] - foot, s[1]) - 1.0, 1.0)
+    state, third = until(state, [new], stiffness, lambda s: s[3], -1.0)
     return float(state[1]), float(state[0]) - new, float(state[2]), float(state[0]), first + second + third
 
 

@@ -229,7 +229,7 @@ def _grown(
             curve += _last(given, last, value, made.value)
             return f"ends at {parameter} = {value:.9g}: beyond it {made}"
         if isinstance(made, str):
-            limit = limit_beyond(given, last)
+            limit = limit_beyond(given, curve)
             special += [] if limit is None else [limit]
             return _ended(given, last, limit, made)
         new, taken, quick = made
@@ -239,7 +239,7 @@ def _grown(
             ds = 0.5 * taken
             continue
         if changed_events(last.events, new.events):
-            limit = limit_between(given, last, taken)
+            limit = limit_between(given, curve, taken)
             between += [] if limit is None else [limit]
         before, margins = margins, _margins(given, watched, new)
         between += margin_points(given, watched, (last, new), (before, margins), taken)
@@ -288,7 +288,7 @@ def _begun(
     if given.follows_member:
         return given, first
     zero = np.zeros(gait.chart.size)
-    by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], levels=1, state=False)
+    by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], levels=2, state=False)
     if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= EFFECT_RTOL:
         raise ModelError(f"parameter: {parameter!r} changes nothing of this gait")
     return given, first
@@ -311,9 +311,12 @@ def _next(given: Continuation, last: BranchPoint, ds: float) -> tuple[BranchPoin
                 ds *= 0.5
                 continue
             cosine = float(given.lifted(given.whole(last), new.chart) @ new.tangent)
-            if cosine >= np.cos(MAX_TURN):
+            if given.leaves_smooth_part(last, new.how):
+                why = "the map has no derivative there"
+            elif cosine >= np.cos(MAX_TURN):
                 return new, ds, corrected.corrections <= QUICK
-            why = "it turns too sharply"
+            else:
+                why = "it turns too sharply"
         elif isinstance(corrected, Forbidden) and last.tangent[-1] * (corrected.value - last.value) > 0.0:
             return corrected
         else:

@@ -71,6 +71,7 @@ class Corrected:
     """A solution near a prediction: the state, the parameter, what the map gave there, corrections that it took.
 
     left : by how much one more correction would change the parameter; u : as in `Continuation.corrected`
+    alone : by how much it would if the state did not follow, as beside a limit
     """
 
     state: State
@@ -79,6 +80,7 @@ class Corrected:
     corrections: int
     left: float = 0.0
     u: Vector | None = None
+    alone: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -218,10 +220,10 @@ class Continuation:
             residual = float(np.max(np.abs(gap)))
             step = np.linalg.lstsq(np.vstack([matrix, plane]), gap, rcond=None)[0]
             if residual <= self.tol:
-                # beside a limit the state may not follow one more correction: then the parameter alone does
-                alone = residual / (float(np.linalg.norm(matrix[:, -1])) or 1.0)
-                uncertain = self.width * max(abs(float(step[-1])), alone)
-                return Corrected(chart.at(u[:size], self.map.vector(values)), value, found, number, uncertain, u)
+                uncertain = self.width * abs(float(step[-1]))
+                alone = self.width * residual / (float(np.linalg.norm(matrix[:, -1])) or 1.0)
+                state = chart.at(u[:size], self.map.vector(values))
+                return Corrected(state, value, found, number, uncertain, u, alone)
             if residual > MAX_CONTRACTION * before:
                 renewed = self.matrix_at(chart, u, value, found)
                 if renewed is None or self.leaves_smooth_part(point, renewed[1]):

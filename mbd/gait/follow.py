@@ -241,7 +241,7 @@ def _limit(given: Continuation, last: SpecialPoint) -> SpecialPoint | None:
         ahead = given.corrected(inside, inside.tangent, ds)
         if isinstance(ahead, Corrected) and not changed_events(inside.events, ahead.found.arrival.events):
             continue
-        limit = limit_between(given, inside, ds, back=LIMIT_DISTANCE)
+        limit = limit_between(given, [inside], ds, back=LIMIT_DISTANCE)
         return limit if limit is not None and (limit.kind, limit.what) == (last.kind, last.what) else None
     return None
 

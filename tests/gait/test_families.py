@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 
 import mbd
 from tests.gait.test_gaits_with_modes import walker as torso_walker
-from tests.spring_mass import MASS, G, derivative, runner_apex, speed_at, walker_apex
+from tests.spring_mass import MASS, G, derivative, runner_apex, speed_at, until, walker_apex
 
 ANGLE, STIFFNESS = math.radians(68.0), 20e3
 SIDES = ("left", "right")
@@ -204,3 +204,34 @@ def test_feet_stand_where_a_start_says() -> None:
         mbd.assemble(legs, {"leg.angle": 2.9}, closed=["foot"], anchors={"foot": (0.7, 0.1)})
     with pytest.raises(mbd.ModelError, match="'knee' stands at no place"):
         mbd.assemble(legs, {"leg.angle": 2.9}, closed=["knee"], anchors={"knee": (0.7, 0.1)})
+
+
+def standing_start(angle: float, speed: float, near: float) -> tuple[float, float]:
+    """Stiffness and speed at the apex of a runner of a mean speed whose flights have just vanished, by hand."""
+    foot = math.cos(angle)
+
+    def left(x: np.ndarray) -> list[float]:
+        state = np.array([0.0, math.sin(angle), x[1], 0.0])
+        middle, time = until(state, [foot], 1e4 * x[0], lambda s: s[0] - foot, 1.0)
+        return [middle[3], foot / time - speed]
+
+    found = fsolve(left, [1e-4 * near, speed], xtol=1e-12)
+    return 1e4 * float(found[0]), float(found[1])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_branch_ends_where_flights_vanish_within_its_error(seed: int) -> None:
+    """There the apex reaches the height of touchdown, and multipliers grow without bound as 1/distance."""
+    random = np.random.default_rng(seed)
+    angle, speed = math.radians(random.uniform(67.0, 69.0)), random.uniform(4.8, 5.4)
+    expected, _ = standing_start(angle, speed, 15e3)
+    model, body = mbd.Model("runner"), mbd.PointMass("body", MASS)
+    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model.constrain(mbd.SpringLeg("leg", body.origin, 1.05 * expected, 1.0, angle))
+    model.constrain(mbd.Event("apex", mbd.measure("place.y.rate"), direction=-1))
+    start = mbd.assemble(model, {"place.y": math.sin(angle) + 1e-3}, {"place.x": speed, "place.y": 0.0})
+    gait = mbd.limit_cycle(model, start, section="apex", speed=speed)
+    (limit,) = mbd.branch(gait, "leg.stiffness", to=0.95 * expected).points("lost event")
+    assert limit.what == "apex"
+    assert abs(limit.value - expected) <= limit.error <= 1e-3 * expected
+    assert abs(limit.value - expected) <= 1e-6 * expected
