@@ -244,3 +244,26 @@ def test_the_force_of_a_compressible_damper_lags_behind_its_rate():
     assert np.max(taken) <= 1e-9
     per_time = 0.5 * (0.02 * w * np.cos(lag)) ** 2 * c
     assert -taken[-1] == pytest.approx(per_time * run.time[-1], rel=0.05)
+
+
+FROM_REST = [
+    mbd.Dahl(3.0, 400.0), mbd.LuGre(3.0, 2.0, 0.5, 400.0, 20.0), mbd.CompressibleDamper(3.0, 0.8, 40.0),
+    mbd.Valves(mbd.CompressibleDamper(3.0, 0.8, 40.0), mbd.CompressibleDamper(1.0, 0.2, 40.0)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RadauIIA(), mbd.RungeKutta4()])
+@pytest.mark.parametrize("loss", FROM_REST)
+@pytest.mark.parametrize("force", [lambda t: 30.0 * mbd.sin(9.0 * t), lambda t: 3.0 * mbd.sin(20.0 * t)])
+def test_what_begins_at_rest_under_no_force_moves_as_one_that_is_hardly_bent(loss, scheme, force):
+    """All terms of the rate of a deflection vanish at the start, beside which any residual is large."""
+    ends = []
+    for bent in (0.0, 1e-9):
+        model, body = mbd.Model("from rest", gravity=(0.0, 0.0, 0.0)), mbd.PointMass("body", mass=1.0)
+        rail = mbd.Prismatic("rail", model.ground.origin, body.origin, loss=loss)
+        model.connect(rail)
+        model.apply(mbd.Motor("drive", rail, force=force))
+        start = mbd.assemble(model, position={"rail loss.deflection": bent}, velocity={"rail.displacement": bent})
+        run = mbd.simulate(model, start, scheme, dt=1e-3, until=1.0)
+        ends.append([run.final[name] for name in ("rail.displacement", "rail.rate", "rail loss.deflection")])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-4, atol=1e-6)

@@ -128,7 +128,31 @@ def measure(K: Equations) -> None:
             K.block[K.o_a + i] = unseen
     refresh_scales(K)
     K.block[K.o_a : K.o_a + K.n_v] = K.work[: K.n_v]
+    measure_rates(K)
     note_extent(K)
+
+
+def measure_rates(K: Equations) -> None:
+    """Magnitudes of rates of first-order states that vanish at rest: those at the speeds that forces make in a step.
+
+    K.work and K.typical are lost, and K.acc where one vanishes.
+    """
+    vanishing = False
+    for i in range(K.n_v, K.n):
+        vanishing = vanishing or K.scale[i] <= 1e-300
+    if not vanishing:
+        return
+    call(K, ACCELERATIONS, K.acc)
+    for i in range(K.n_v):
+        K.typical[i] = K.block[K.o_v + i]
+        mass = abs(K.acc[i * K.n + i])
+        K.block[K.o_v + i] += K.dt * K.scale[i] / mass if mass > 0.0 else 0.0
+    call(K, SCALES, K.work)
+    K.block[K.o_v : K.o_v + K.n_v] = K.typical[: K.n_v]
+    for i in range(K.n_v, K.n):
+        if K.work[i] < 1e300:
+            K.scale[i] = max(K.scale[i], K.work[i])
+    weigh(K)
 
 
 def weigh(K: Model) -> None:
