@@ -49,7 +49,8 @@ def fall_of(run: Trajectory, stance: str) -> Outcome | None:
     """
     points = [name for body, frames in run.facts.segments for frame in frames for name in (f"{body}.{frame}", frame)]
     points = [name for name in dict.fromkeys(points) if f"{name}.x" in run]
-    named = next((event for event in run.events if event.kind == "event" and "fall" in event.name.lower()), None)
+    ending = (event for event in run.events if run.status == 1 and event.time == run.time[-1])
+    named = next((event for event in ending if event.kind == "event" and "fall" in event.name.lower()), None)
     up = -np.array([run.parameters.get(f"gravity.{axis}", 0.0) for axis in "xyz"])
     size = float(np.linalg.norm(up))
     if len(points) < 2 or size == 0.0 or len(run) < 3:

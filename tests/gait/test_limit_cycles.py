@@ -259,6 +259,17 @@ def test_a_walk_that_falls_scuffs_or_never_strikes_says_so():
     assert "does not happen within 0.1 s" in outcome(0.2187, -0.3234, -1.1, -0.4, longest=0.1)
 
 
+@pytest.mark.parametrize(("name", "ends"), [("footfall", False), ("fallen", True)])
+def test_only_an_event_that_ends_the_run_is_a_fall_by_its_name(name, ends):
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", 1.0, length=1.0, center=1.0)
+    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model.constrain(mbd.Event(name, mbd.measure(lambda a: a, "pin.angle"), terminal=ends))
+    run = mbd.simulate(model, mbd.assemble(model, {"pin.angle": 0.4}), dt=0.01, until=1.0)
+    assert len(run.events) == 1 and run.status == ends
+    assert (fall_of(run, "") is not None) == ends
+
+
 def test_a_scuff_is_named():
     sizes = case("f3-kneed-walker-chen").definition
     model = kneed(sizes)
