@@ -21,6 +21,7 @@ from scipy.special import ellipk
 import mbd
 from mbd.analysis.gait import Step, gait
 from mbd.cli import Script, examples
+from tests.problems import case
 
 g = 9.81
 NAMES = (
@@ -184,17 +185,9 @@ def test_a_rod_released_from_the_horizontal_pulls_with_five_halves_of_its_weight
         assert run.at(time)["pin.reaction_force.y"] == pytest.approx(2.5 * 2.0 * g, rel=1e-5)
 
 
-DOUBLE_PENDULUM = {
-    1.0: (-0.47160621901351113, -1.0901105680911731, -3.6855857126485114, -3.3862474280378256),
-    2.0: (-1.3426763197837173, -1.40439309673073, 3.625458697203743, 0.10589871143124531),
-    5.0: (-1.901212129614715, -1.4465524006289008, 1.3090600691838261, 0.43579701365614787),
-}
-"""Angles from the vertical and their rates at some times, released at rest from (2, 1.5) rad."""
-
-
 def _double_pendulum_error(run: mbd.Trajectory) -> float:
-    errors = []
-    for time, (*angles, rate1, rate2) in DOUBLE_PENDULUM.items():
+    errors, reference = [], case("a2-double-pendulum")["[theta1, theta2"]
+    for time, (*angles, rate1, rate2) in zip(reference.t, reference.value, strict=True):
         now = run.at(time)
         upper, elbow = now["pin.angle"], now["elbow.angle"]
         errors += [upper - angles[0], upper + elbow - angles[1]]
@@ -213,14 +206,13 @@ def test_energies_in_sympy_move_like_bodies() -> None:
     bodies, energies = run_of("double-pendulum"), run_of("lagrangian-double-pendulum")
     assert energies["upper"] == pytest.approx(bodies["pin.angle"], abs=1e-8)
     assert energies["lower"] == pytest.approx(bodies["pin.angle"] + bodies["elbow.angle"], abs=1e-8)
-    assert energies.energy.total[0] == pytest.approx(7.470868984694769, abs=1e-12)
+    assert energies.energy.total[0] == pytest.approx(case("a2-double-pendulum")["total energy"].value, abs=1e-12)
 
 
 def test_the_simplest_walker_of_energies_keeps_its_published_step() -> None:
-    """τ = 3.882463752851374 √(L/g), from two solutions that agree to 3e-15."""
     strikes = [event.time for event in run_of("simplest-walker-lagrangian").events]
     assert len(strikes) == 5
-    assert np.diff([0.0, *strikes]) == pytest.approx(3.882463752851374, abs=1e-7)
+    assert np.diff([0.0, *strikes]) == pytest.approx(case("f1-simplest-walker-long")["step period"].value, abs=1e-7)
 
 
 # linkages ---------------------------------------------------------------------------------------------------------
@@ -249,19 +241,10 @@ def test_the_four_bar_stays_closed_and_keeps_its_energy_balance() -> None:
     assert run.energy.change == pytest.approx(turned - lost, abs=2e-3)
 
 
-SLIDER_CRANK = {
-    0.4: (0.4324174548118529, -12.875775861953866, -4364.727697625007, 60.31820361382759),
-    1.9: (0.21580112269151955, -17.385087379231145, 2548.4360268153328, -49.487146191878274),
-    3.3: (0.15094343983420122, 1.79138154584834, 1713.882792380952, 4.60100821015058),
-    5.2: (0.3394223076372372, 25.06808502175862, -626.1501287434143, -21.921348919976737),
-}
-"""Place, speed and acceleration of the slider and torque of the drive at some crank angles."""
-
-
 @pytest.mark.parametrize("turn", [0.0, 2 * math.pi])
-@pytest.mark.parametrize("angle", SLIDER_CRANK)
-def test_the_driven_slider_crank_needs_the_torque_of_inverse_dynamics(angle: float, turn: float) -> None:
-    x, speed, acceleration, torque = SLIDER_CRANK[angle]
+@pytest.mark.parametrize(("place", "angle"), enumerate((0.4, 1.9, 3.3, 5.2)))
+def test_the_driven_slider_crank_needs_the_torque_of_inverse_dynamics(place: int, angle: float, turn: float) -> None:
+    x, speed, acceleration, torque = case("c3-slider-crank-rigid-driven")["[x, xdot"].value[place]
     now = run_of("slider-crank").at((angle + turn) / 150.0)
     assert now["guide.displacement"] == pytest.approx(x, abs=1e-9)
     assert now["guide.rate"] == pytest.approx(speed, abs=1e-6)
@@ -273,50 +256,12 @@ def test_the_driven_slider_crank_needs_the_torque_of_inverse_dynamics(angle: flo
 
 
 def test_the_rimless_wheel_rolls_at_its_steady_speed() -> None:
-    # T. McGeer, IJRR 9 (1990) 62; n = 8, L = 1 m, slope 0.1 rad: 1.22440 rad/s after a strike, steps of 0.75479 s
-    run = run_of("rimless-wheel")
+    run, reference = run_of("rimless-wheel"), case("f4-rimless-wheel")
     hits = strikes(run, "spoke")
-    assert -run["wheel.angle.rate"][hits[-1].row] == pytest.approx(1.2243971128804019, abs=1e-5)
-    assert np.diff([hit.time for hit in hits]) == pytest.approx(0.7547916404769076, abs=2e-6)
+    assert -run["wheel.angle.rate"][hits[-1].row] == pytest.approx(reference["w just after"].value, abs=1e-5)
+    assert np.diff([hit.time for hit in hits]) == pytest.approx(reference["step period"].value, abs=2e-6)
     assert last_step(run).length == pytest.approx(2 * math.sin(math.pi / 8), abs=1e-12)
     assert hits[-1].energy_loss == pytest.approx(g * last_step(run).length * math.sin(0.1), rel=1e-4)
-
-
-@pytest.mark.parametrize("radius", [0.0, 0.4])
-def test_a_disturbed_rimless_wheel_comes_back_by_the_square_of_its_speed_ratio(radius: float) -> None:
-    # about a strike: ω⁺ (L² + r²) = ω⁻ (L² cos 2α + r²), with r the radius of gyration
-    ratio = (math.cos(math.pi / 4) + radius**2) / (1 + radius**2)
-    gain = 4 * g * math.sin(math.pi / 8) * math.sin(0.1) / (1 + radius**2)
-    steady = gain * ratio**2 / (1 - ratio**2)
-    model = script("rimless-wheel")["model"]
-    if radius:
-        model = mbd.Model("heavy wheel", gravity=mbd.on_slope(0.1))
-        hub = mbd.RigidBody("hub", mass=3.0, inertia=(1.0, 1.0, 3.0 * radius**2))
-        model.connect(mbd.Planar("wheel", model.ground.origin, hub.origin))
-        for k in range(8):
-            tip = hub.point(math.sin(k * math.pi / 4), -math.cos(k * math.pi / 4))
-            model.constrain(mbd.Unilateral(f"spoke {k + 1}", mbd.touchdown(tip)))
-    start = mbd.assemble(model, closed="spoke 1", position={"wheel.angle": math.pi / 8}, velocity={"wheel.angle": -1.4})
-    run = mbd.simulate(model, start, mbd.HHT(), dt=1e-3, until=3.0)
-    squares = np.array([run["wheel.angle.rate"][hit.row] ** 2 - steady for hit in strikes(run, "spoke")])
-    assert squares[0] == pytest.approx(ratio**2 * (1.4**2 - steady), abs=1e-4)
-    assert squares[1:] / squares[:-1] == pytest.approx(ratio**2, abs=1e-3)
-
-
-def _wheel_with_speed(speed: float) -> mbd.State:
-    return restarted("rimless-wheel", {"wheel.angle": math.pi / 8}, {"wheel.angle": -speed}, closed="spoke 1")
-
-
-def test_a_slow_rimless_wheel_rocks_between_two_spokes() -> None:
-    # below 0.91349 rad/s it falls back before the apex with the speed it had; each strike leaves cos 45° of it
-    run = again("rimless-wheel", start=_wheel_with_speed(0.9), until=2.7)
-    hits = strikes(run, "spoke")
-    assert {hit.name for hit in hits} == {"spoke 1", "spoke 8"}
-    speeds = np.abs([run["wheel.angle.rate"][hit.row] for hit in hits])
-    assert len(speeds) == 8
-    assert speeds == pytest.approx(0.9 * math.cos(math.pi / 4) ** np.arange(1, len(speeds) + 1), rel=1e-3)
-    faster = again("rimless-wheel", start=_wheel_with_speed(0.92), until=3.0)
-    assert strikes(faster, "spoke")[0].name == "spoke 2"
 
 
 def test_the_shaken_block_sticks_and_slips_as_newmarks_sliding_block() -> None:
@@ -462,19 +407,28 @@ def test_a_runner_and_a_walker_on_springs_repeat_themselves() -> None:
     assert len(humps) >= 2 * (len(stances) - 1)
 
 
-def test_the_compass_gait_is_the_published_one() -> None:
-    # A. Goswami et al., INRIA RR-2996 (1996); angles of the reference are from the vertical
-    run, slope = run_of("compass-gait"), math.radians(3.0)
+@pytest.mark.parametrize(
+    ("name", "published", "slope", "mass", "length_atol"),
+    [("compass-gait", "f2-compass-gait-3deg", math.radians(3.0), 20.0, 3e-6),
+     ("kneed-walker", "f3-kneed-walker-chen", 0.0504, 1.6, 2e-6)],
+)  # fmt: skip
+def test_a_walker_has_the_gait_of_its_published_parameters(
+    name: str, published: str, slope: float, mass: float, length_atol: float
+) -> None:
+    """A. Goswami et al., INRIA RR-2996 (1996); V. F. Hsu Chen, MIT (2007). Angles there are from the vertical."""
+    run, reference = run_of(name), case(published)
     hit = strikes(run, "foot")[-1]
-    stance, swing = ("left", "right") if hit.name == "left foot" else ("right", "left")
-    assert run[f"{stance} hip.angle"][hit.row] - slope == pytest.approx(0.21866880293899055, abs=2e-6)
-    assert run[f"{swing} hip.angle"][hit.row] - slope == pytest.approx(-0.3233885580586503, abs=2e-6)
-    assert run[f"{stance} hip.rate"][hit.row] == pytest.approx(-1.092383589883601, abs=1e-5)
-    assert run[f"{swing} hip.rate"][hit.row] == pytest.approx(-0.37737394890719406, abs=1e-5)
+    sides = ("left", "right") if hit.name == "left foot" else ("right", "left")
+    angles, rates = (np.array([run[f"{side} hip.{what}"][hit.row] for side in sides]) for what in ("angle", "rate"))
+    assert angles - slope == pytest.approx(reference["fixed point"].value[:2], abs=2e-6)
+    assert rates == pytest.approx(reference["fixed point"].value[2:], abs=1e-5)
     step = last_step(run)
-    assert step.period == pytest.approx(0.7343463911587195, abs=3e-6)
-    assert step.length == pytest.approx(0.5354454154300102, abs=3e-6)
-    assert step.loss == pytest.approx(20.0 * g * step.length * math.sin(slope), rel=2e-5)
+    assert step.period == pytest.approx(reference["step period"].value, abs=3e-6)
+    assert step.length == pytest.approx(reference["step length"].value, abs=length_atol)
+    assert step.loss == pytest.approx(mass * g * step.length * math.sin(slope), rel=2e-5)
+    for knee in strikes(run, "knee lock")[-1:]:
+        before = strikes(run, "foot")[-2 if knee.time < hit.time else -1]
+        assert knee.time - before.time == pytest.approx(reference["knee strike time"].value, abs=5e-6)
 
 
 def test_the_swing_foot_of_the_compass_gait_scuffs_unnoticed() -> None:
@@ -482,23 +436,6 @@ def test_the_swing_foot_of_the_compass_gait_scuffs_unnoticed() -> None:
     assert len(strikes(run, "foot")) == 10
     assert -0.005 < run["right foot.gap"].min() < -0.003
     assert sum("below its surface while ignored" in note for note in run.stats["notes"]) == 2
-
-
-def test_the_kneed_walker_has_the_gait_of_its_published_parameters() -> None:
-    # parameters of V. F. Hsu Chen, MIT (2007); their fixed point, from the vertical, recomputed
-    run, slope = run_of("kneed-walker"), 0.0504
-    hit, knee = strikes(run, "foot")[-1], strikes(run, "knee lock")[-1]
-    stance, swing = ("left", "right") if hit.name == "left foot" else ("right", "left")
-    assert run[f"{stance} hip.angle"][hit.row] - slope == pytest.approx(0.18818546025339755, abs=2e-6)
-    assert run[f"{swing} hip.angle"][hit.row] - slope == pytest.approx(-0.28898546025339755, abs=2e-6)
-    assert run[f"{stance} hip.rate"][hit.row] == pytest.approx(-1.1095873311765565, abs=1e-5)
-    assert run[f"{swing} hip.rate"][hit.row] == pytest.approx(-0.05714810633751439, abs=2e-5)
-    before = strikes(run, "foot")[-2 if knee.time < hit.time else -1]
-    assert knee.time - before.time == pytest.approx(0.3486120004842641, abs=5e-6)
-    step = last_step(run)
-    assert step.period == pytest.approx(0.5643281659150426, abs=3e-6)
-    assert step.length == pytest.approx(0.472656785800564, abs=2e-6)
-    assert step.loss == pytest.approx(1.6 * g * step.length * math.sin(slope), rel=2e-5)
 
 
 def test_a_walker_that_starts_too_slowly_falls_by_name() -> None:
@@ -688,16 +625,19 @@ def test_the_users_integrator_keeps_its_promise_of_order() -> None:
 
 def test_the_gait_that_is_found_is_the_published_one_and_walks_on() -> None:
     found, cycle = script("find-a-gait")["found"], script("find-a-gait")["gait"]
-    assert abs(cycle.period - 0.7343463911587195) < 1e-9
-    assert abs(cycle.largest_multiplier - 0.5799523324659684) < 1e-8 and cycle.stability == "stable"
-    assert 1 <= len(found.tries) <= 8 and abs(cycle.derivatives["period", "slope"] - 0.8153966595545352) < 1e-8
+    reference = case("k1-compass-gait-derivatives")
+    period, far, _, multiplier = reference["period, step length"].value
+    assert abs(cycle.period - period) < 1e-9
+    assert abs(cycle.largest_multiplier - multiplier) < 1e-8 and cycle.stability == "stable"
+    slope = reference["d(period) / d(slope angle)"].value
+    assert 1 <= len(found.tries) <= 8 and abs(cycle.derivatives["period", "slope"] - slope) < 1e-8
     lengths = [step.length for step in gait(run_of("find-a-gait")).steps]
-    assert len(lengths) >= 9 and max(abs(length - 0.5354454154300102) for length in lengths) < 1e-9
+    assert len(lengths) >= 9 and max(abs(length - far) for length in lengths) < 1e-9
 
 
 def test_the_walker_survives_small_pushes_falls_back_of_too_slow_ones_and_ahead_of_too_fast_ones() -> None:
     basin, cycle = script("basin-picture")["basin"], script("basin-picture")["gait"]
-    assert abs(cycle.period - 0.7343463911587195) < 1e-9
+    assert abs(cycle.period - case("f2-compass-gait-3deg")["step period"].value) < 1e-9
     stance, swing = (basin.axes[f"{side} hip.rate"] for side in ("left", "right"))
     row, column = (int(np.argmin(np.abs(axis - cycle.state[name]))) for axis, name in (
         (stance, "left hip.rate"), (swing, "right hip.rate")

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
+import mbd
 from mbd import cli
 from mbd.errors import UnknownNameError
-from mbd.hardcases import CASES, case as cases, command, judging
+from mbd.hardcases import CASES, case as cases, command, frictions, judging
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import deviation, second_order
 from mbd.hardcases.judging import Judged, chosen, judged, ratio, short
@@ -40,7 +41,7 @@ LONG |= {("j6", "RadauIIA")}
 """Cases that take seconds with schemes that others judge quickly."""
 
 
-ALONE = {"b4", "h1", "h1b", "j2", "j4", "j5", "j14", "j17"}
+ALONE = {"a4", "a4c", "b4", "h1", "h1b", "j2", "j4", "j5", "j13", "j14", "j17"}
 """Cases whose laws no file of `tests/cases` tries with other numbers or schemes."""
 
 
@@ -110,6 +111,24 @@ def test_a_reference_that_is_off_by_a_thousandth_is_noticed(name: str, monkeypat
     entry = next(each for each in data["quantities"] if each["name"].startswith(SPOILED[name]))
     entry["value"] = nudged(entry["value"], 1e-3)
     assert not judged_with(monkeypatch, case, data).passed
+
+
+@pytest.mark.parametrize(
+    ("number", "wrong", "noticed"),
+    [
+        (0, {"Coulomb": lambda torque, known=mbd.Coulomb: known(1.001 * torque)}, "order"),
+        (1, {"PinFriction": lambda mu, radius, known=mbd.PinFriction: known(1.002 * mu, radius)}, "order"),
+        (2, {"numbers": lambda id, known=frictions.numbers: known(id) | {"mu": 1.2}}, "no impulse stops"),
+    ],
+)
+def test_a_judge_notices_another_law(number, wrong, noticed, monkeypatch):
+    """A torque or coefficient off by a part in a thousand, a rod that does not jam."""
+    for name, replacement in wrong.items():
+        monkeypatch.setattr(frictions if hasattr(frictions, name) else mbd, name, replacement)
+    frictions.pendulum.cache_clear()
+    outcome = frictions.CASES[number].judge(scheme("HHT"))
+    frictions.pendulum.cache_clear()
+    assert any(noticed in figure.what for figure in outcome.figures if not figure.passed)
 
 
 def test_another_ball_is_judged_by_its_own_numbers(monkeypatch):

@@ -15,8 +15,7 @@ from mbd.analysis.amplification import amplification_matrix
 from mbd.analysis.numerical import criteria, plot, spectrum
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
-from mbd.integrators.family import Coefficients
-from tests.cases.oscillators import WBZ
+from mbd.integrators.family import Coefficients, NewmarkFamily
 from tests.cases.schemes import name_of
 from tests.problems import case
 
@@ -24,6 +23,22 @@ I1, I2, I3, I4 = (
     case(name)
     for name in ("i1-spectral-properties", "i2-asymptotic-coefficients", "i3-hht-beta", "i4-discrete-exactness")
 )
+
+
+class WBZ(NewmarkFamily):
+    """The scheme of Wood, Bossak & Zienkiewicz (1980): α_f = 0. A member of the family that a user adds."""
+
+    rho_inf: float
+
+    def __init__(self, rho_inf: float) -> None:
+        super().__init__("ggl", "consistent", 1e-11, rho_inf=rho_inf)
+
+    @property
+    def coefficients(self) -> Coefficients:
+        alpha_m = (self.rho_inf - 1.0) / (self.rho_inf + 1.0)
+        gamma = 0.5 - alpha_m
+        return Coefficients(alpha_m, 0.0, 0.25 * (gamma + 0.5) ** 2, gamma)
+
 
 SCHEMES = {
     "Newmark trapezoidal (beta 1/4, gamma 1/2)": mbd.Newmark(),
@@ -35,7 +50,11 @@ SCHEMES = {
     "generalized-alpha rho_inf 0": mbd.GeneralizedAlpha(0.0),
     "WBZ rho_inf 0.7": WBZ(0.7),
 }
-DAMPED = [(name, xi) for name in SCHEMES for xi in (0.0, 0.05) if any(f"{name}, xi={xi:g}" in q for q in I1.quantities)]
+ALL = SCHEMES | {
+    "HHT alpha = 0.1": mbd.HHT(alpha=0.1), "HHT alpha = 0.3": mbd.HHT(alpha=0.3),
+    "generalized-alpha rho_inf 0.5": mbd.GeneralizedAlpha(0.5),
+}  # fmt: skip
+DAMPED = [(name, xi) for name in ALL for xi in (0.0, 0.05) if any(f"{name}, xi={xi:g}" in q for q in I1.quantities)]
 FEW = (0.1, 1.0)
 
 
@@ -57,26 +76,71 @@ def measured(name):
 
 
 # the published values ---------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", ALL)
+def test_a_scheme_has_the_four_numbers_of_its_family(name):
+    c = ALL[name].coefficients
+    expected = I1[f"parameters (alpha_m, alpha_f, beta, gamma) | {name}"].value
+    assert [c.alpha_m, c.alpha_f, c.beta, c.gamma] == pytest.approx(expected, abs=1e-15)
+    assert c.rho_inf == pytest.approx(I1[f"rho_infinity | {name}"].value, abs=1e-14)
+
+
 @pytest.mark.parametrize(("name", "xi"), DAMPED)
 def test_spectral_radii_are_those_of_the_exact_matrix(name, xi):
-    found = [spectrum(SCHEMES[name], turn, xi).radius for turn in (0.1, 0.5, 1.0, 2.0, 10.0, 1000.0)]
+    turns, k = (0.1, 0.5, 1.0, 2.0, 10.0, 1000.0), ALL[name].coefficients
+    found = [spectrum(ALL[name], turn, xi).radius for turn in turns]
+    exact = [max(abs(np.linalg.eigvals(amplification_in_closed_form(k, turn, xi)))) for turn in turns]
     wanted = I1[f"spectral radius at Omega = w dt = 0.1, 0.5, 1, 2, 10, 1000 | {name}, xi={xi:g}"].value
     assert found == pytest.approx(wanted, abs=1e-8)
+    assert exact == pytest.approx(wanted, abs=1e-10)
 
 
-@pytest.mark.parametrize("name", SCHEMES)
-def test_damping_and_elongation_are_those_of_the_exact_matrix(name):
-    found = [spectrum(SCHEMES[name], turn) for turn in (0.1, 0.5, 1.0, 2.0)]
-    damping = I1[f"algorithmic damping ratio at Omega = [0.1, 0.5, 1.0, 2.0] | {name}, xi=0"].value
-    longer = I1[f"relative period elongation T_bar/T - 1 at Omega = [0.1, 0.5, 1.0, 2.0] | {name}, xi=0"].value
-    assert [each.damping for each in found] == pytest.approx(damping, abs=1e-10)
-    assert [each.elongation for each in found] == pytest.approx(longer, abs=1e-10)
+@pytest.mark.parametrize(("name", "xi"), DAMPED)
+def test_damping_and_elongation_are_those_of_the_exact_matrix(name, xi):
+    turns = (0.1, 0.5, 1.0, 2.0)
+    roots = [spectrum(ALL[name], turn, xi).principal for turn in turns]
+    damping = I1[f"algorithmic damping ratio at Omega = [0.1, 0.5, 1.0, 2.0] | {name}, xi={xi:g}"].value
+    longer = I1[f"relative period elongation T_bar/T - 1 at Omega = [0.1, 0.5, 1.0, 2.0] | {name}, xi={xi:g}"].value
+    angles = np.abs(np.angle(roots))
+    assert -np.log(np.abs(roots)) / angles == pytest.approx(damping, abs=1e-10)
+    assert turns / angles - 1.0 == pytest.approx(longer, abs=1e-10)
+    if xi == 0.0:  # else what is told is that of the scheme, without the oscillator's
+        found = [spectrum(ALL[name], turn) for turn in turns]
+        assert [each.damping for each in found] == pytest.approx(damping, abs=1e-10)
+        assert [each.elongation for each in found] == pytest.approx(longer, abs=1e-10)
 
 
 @pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", SCHEMES)
 def test_the_radius_at_infinity_is_reached_though_roots_are_multiple_there(name):
     assert measured(name).rho_inf == pytest.approx(I1[f"rho_infinity | {name}"].value, abs=2e-5)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_stiff_modes_keep_the_promised_share_per_step(name):
+    """The limit of the radius as ω dt → ∞, by a polynomial in (ω dt)^(−2/3), for a threefold root splits like that."""
+    reference, turns = I1[f"rho_infinity | {name}"], 250.0 * 2.0 ** np.arange(5)
+    radii = [spectrum(ALL[name], turn).radius for turn in turns]
+    limit = np.polynomial.Polynomial.fit(turns ** (-2 / 3), radii, 4)(0.0)
+    assert limit == pytest.approx(reference.value, abs=reference.accuracy)
+
+
+def extrapolated(value):
+    """The limit at zero of a function of Ω², from Ω = 0.08, 0.04, 0.02."""
+    a, b, c = (value(turn) for turn in (0.08, 0.04, 0.02))
+    ab, bc = (4 * b - a) / 3, (4 * c - b) / 3
+    return (16 * bc - ab) / 15
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_errors_of_period_and_damping_have_their_asymptotic_coefficients(name):
+    scheme, power = ALL[name], 1 if "damped" in name else 3
+    longer = I2[f"lim of (T_bar/T - 1)/Omega^2 | {name}"]
+    damping = I2[f"lim of damping ratio/Omega{f'^{power}' if power > 1 else ''} | {name}"]
+    found = extrapolated(lambda turn: spectrum(scheme, turn).elongation / turn**2)
+    assert found == pytest.approx(longer.value, abs=longer.accuracy)
+    found = extrapolated(lambda turn: spectrum(scheme, turn).damping / turn**power)
+    assert found == pytest.approx(damping.value, abs=damping.accuracy)
+    assert scheme.order() == (1 if power == 1 else 2)
 
 
 @pytest.mark.parametrize("name", SCHEMES)
@@ -92,6 +156,18 @@ def test_leading_coefficients_are_those_of_the_series(name):
 @pytest.mark.parametrize("name", SCHEMES)
 def test_the_order_observed_is_the_one_promised(name):
     assert measured(name).order == pytest.approx(measured(name).promised, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    "scheme", [mbd.HHT(0.17), mbd.GeneralizedAlpha(0.33), mbd.GeneralizedAlpha(0.93), WBZ(0.2)], ids=name_of
+)
+def test_any_second_order_member_has_the_coefficients_of_the_general_formulas(scheme):
+    """(12β − 1 + 12 α_f (α_m − α_f))/24 and ½ (α_f − α_m)(β + α_f (α_m − 1)): other parameters than the published."""
+    k = scheme.coefficients
+    elongation = (12 * k.beta - 1 + 12 * k.alpha_f * (k.alpha_m - k.alpha_f)) / 24
+    damping = 0.5 * (k.alpha_f - k.alpha_m) * (k.beta + k.alpha_f * k.alpha_m - k.alpha_f)
+    assert extrapolated(lambda turn: spectrum(scheme, turn).elongation / turn**2) == pytest.approx(elongation, abs=1e-6)
+    assert extrapolated(lambda turn: spectrum(scheme, turn).damping / turn**3) == pytest.approx(damping, abs=2e-6)
 
 
 @pytest.mark.parametrize("name", SCHEMES)
@@ -111,32 +187,95 @@ def test_linear_acceleration_is_stable_up_to_its_critical_step():
     assert measured("HHT alpha = 0.05 (chapter text)").stability_limit == np.inf
 
 
-def test_hht_without_the_square_in_beta_is_unstable():
-    class Unsquared(mbd.HHT):
-        @property
-        def coefficients(self) -> Coefficients:
-            return Coefficients(0.0, self.alpha, 0.25 * (1.0 + self.alpha), 0.5 + self.alpha)
+class Unsquared(mbd.HHT):
+    """HHT with β = (1+α)/4."""
 
+    @property
+    def coefficients(self) -> Coefficients:
+        return Coefficients(0.0, self.alpha, 0.25 * (1.0 + self.alpha), 0.5 + self.alpha)
+
+
+def test_hht_squares_its_beta_for_without_the_square_it_is_unstable():
     unsquared, squared = (quantity.value for quantity in I3.quantities.values())
-    assert spectrum(Unsquared(0.05), 1e4).radius == pytest.approx(unsquared, abs=1e-6)
-    assert spectrum(mbd.HHT(0.05), 1e4).radius == pytest.approx(squared, abs=1e-8)
+    assert spectrum(Unsquared(0.05), 1e4).radius == pytest.approx(unsquared, abs=1e-10)
+    assert spectrum(mbd.HHT(0.05), 1e4).radius == pytest.approx(squared, abs=1e-10)
     found = criteria(Unsquared(0.05), turns=FEW)
     assert 1.0 < found.stability_limit < 100.0 and found.rho_inf > 1.4
+    for alpha in (0.02, 0.12, 0.3):
+        assert mbd.HHT(alpha).coefficients.beta == 0.25 * (1 + alpha) ** 2
+        assert mbd.HHT(alpha).coefficients.rho_inf == pytest.approx((1 - alpha) / (1 + alpha), abs=1e-14)
+        assert spectrum(mbd.HHT(alpha), 1e4).radius < 1.0
+        assert spectrum(Unsquared(alpha), 1e4).radius > 1.05
 
 
-@pytest.mark.parametrize(
-    ("name", "scheme"),
-    [("trapezoidal", mbd.Newmark()), ("HHT 0.05", mbd.HHT(0.05)), ("generalized-alpha 0.6", mbd.GeneralizedAlpha(0.6))],
-)
-def test_powers_of_the_written_out_matrix_are_the_discrete_solution(name, scheme):
+@pytest.mark.parametrize("alpha", [-1e-9, 1 / 3 + 1e-9, 0.5, math.nan])
+def test_hht_refuses_an_alpha_for_which_it_is_unstable_or_of_first_order(alpha):
+    with pytest.raises(mbd.CapabilityError, match="alpha between 0 and 1/3"):
+        mbd.HHT(alpha)
+
+
+# the discrete solution --------------------------------------------------------------------------------------------
+DISCRETE = {
+    "trapezoidal": mbd.Newmark(start="consistent"), "HHT 0.05": mbd.HHT(alpha=0.05, start="consistent"),
+    "generalized-alpha 0.6": mbd.GeneralizedAlpha(0.6, start="consistent"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_powers_of_the_written_out_matrix_are_the_discrete_solution(name):
     w, xi, dt, steps = (I4.definition[each] for each in ("w", "xi", "dt", "steps"))
-    matrix = amplification_in_closed_form(scheme.coefficients, w * dt, xi)
+    matrix = amplification_in_closed_form(DISCRETE[name].coefficients, w * dt, xi)
     found = np.linalg.matrix_power(matrix, int(steps)) @ [1.0, 0.0, -((w * dt) ** 2)]
     assert found / [1.0, dt, dt * dt] == pytest.approx(I4[f"[u, v, a] after 50 steps | {name}"].value, abs=1e-10)
 
 
+def spring_and_dashpot(w: float, xi: float, mass: float) -> mbd.Model:
+    """The same oscillator as a body."""
+    model = mbd.Model("oscillator", gravity=(0.0, 0.0, 0.0))
+    body = mbd.PointMass("mass", mass)
+    loss = mbd.Viscous(2 * xi * w * mass)
+    model.connect(mbd.Prismatic("guide", model.ground.origin, body.origin, loss=loss, stiffness=mass * w * w))
+    return model
+
+
+@pytest.mark.parametrize("backend", ["auto", "python"])
+@pytest.mark.parametrize("name", DISCRETE)
+def test_a_body_on_a_spring_takes_the_same_fifty_steps(name, backend):
+    w, xi, dt, steps = (I4.definition[each] for each in ("w", "xi", "dt", "steps"))
+    model = spring_and_dashpot(w, xi, mass=3.7)
+    start = mbd.assemble(model, position={"guide.displacement": I4.start["u0"]}, backend=backend)
+    run = mbd.simulate(model, start, DISCRETE[name], dt=dt, until=steps * dt, backend=backend)
+    u, v, a = I4[f"[u, v, a] after 50 steps | {name}"].value
+    assert [run["guide.displacement"][-1], run["guide.rate"][-1]] == pytest.approx([u, v], abs=1e-10)
+    true = -2 * xi * w * v - w * w * u  # users see the acceleration of the balance, not the scheme's average
+    assert run["guide.acceleration"][-1] == pytest.approx(true, abs=1e-9)
+    assert (abs(true - a) < 1e-9) == (name == "trapezoidal")
+    assert u == pytest.approx(I4["exact u(t_end)"].value, abs=0.03)
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.2, start="consistent"), mbd.GeneralizedAlpha(0.3)], ids=name_of)
+def test_other_discrete_solutions_are_powers_of_the_written_out_matrix(scheme):
+    """Another oscillator and step; with the jerk start a₀ = v̇₀ + (α_m − α_f) dt j₀."""
+    w, xi, dt, steps = 3.1, 0.11, 0.27, 33
+    model, k = spring_and_dashpot(w, xi, mass=0.9), scheme.coefficients
+    u, v = 0.4, -1.3
+    a = -2 * xi * w * v - w * w * u
+    jerk = -2 * xi * w * a - w * w * v
+    shift = (k.alpha_m - k.alpha_f) * dt if scheme.starting == "jerk" else 0.0
+    matrix = amplification_in_closed_form(k, w * dt, xi)
+    expected = np.linalg.matrix_power(matrix, steps) @ [u, v * dt, (a + shift * jerk) * dt * dt]
+    start = mbd.assemble(model, position={"guide.displacement": u}, velocity={"guide.rate": v})
+    run = mbd.simulate(model, start, scheme, dt=dt, until=steps * dt)
+    tolerance = 1e-10 if scheme.starting == "consistent" else 1e-3  # the jerk is a difference over dt/16
+    found = [run["guide.displacement"][-1], run["guide.rate"][-1] * dt]
+    assert found == pytest.approx(expected[:2], abs=tolerance)
+
+
 # properties -------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("scheme", [mbd.Newmark(0.28, 0.53), mbd.HHT(0.21), mbd.GeneralizedAlpha(0.35)], ids=name_of)
+@pytest.mark.parametrize("scheme", [
+    mbd.Newmark(0.28, 0.53), *map(mbd.HHT, (0.0, 0.02, 0.21, 0.28)),
+    *map(mbd.GeneralizedAlpha, (0.0, 0.15, 0.35, 0.97)),
+], ids=name_of)  # fmt: skip
 @pytest.mark.parametrize("turn", [0.03, 0.7, 5.0, 80.0])
 @pytest.mark.parametrize("xi", [0.0, 0.3])
 def test_the_roots_of_a_step_are_those_of_the_written_out_matrix(scheme, turn, xi):

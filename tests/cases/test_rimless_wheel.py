@@ -28,15 +28,6 @@ def touchdowns(run: mbd.Trajectory) -> list[mbd.results.trajectory.EventRecord]:
     return [event for event in run.events if event.kind == "closed"]
 
 
-@pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
-def test_the_published_speed_returns_after_each_spoke(scheme: NewmarkFamily) -> None:
-    model, after = WHEEL.model(), F4["w just after"].value
-    run = mbd.simulate(model, WHEEL.start(model, after), scheme, dt=1e-3, until=1.0)
-    (touch,) = touchdowns(run)
-    assert touch.name == "spoke 1"
-    assert -run.at(touch.time)["roll.angle.rate"] == pytest.approx(after, abs=2e-5)
-
-
 @pytest.mark.parametrize("wheel", [WHEEL, OTHER], ids=["published", "another"])
 @pytest.mark.parametrize("scheme", WITH_ROWS, ids=name_of)
 def test_period_and_speeds_of_steady_rolling_are_of_second_order(scheme: NewmarkFamily, wheel: RimlessWheel) -> None:

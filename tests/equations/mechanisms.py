@@ -7,6 +7,7 @@ import random
 import mbd
 from mbd.bodies.base import Body, Frame
 from mbd.testing.mechanisms import random_tree
+from tests.simulation.mechanisms import kneed_walker as walker
 
 __all__ = ["four_bar", "furnished", "leg", "random_tree", "walker"]
 
@@ -57,23 +58,6 @@ def leg() -> mbd.Model:
         mbd.Motor("drive", upper, lambda t, angle: 0.3 * mbd.sin(2.0 * t) * angle, arguments=["t", "knee.angle"]),
         mbd.TorsionSpring("ankle-like", upper, stiffness=2.0, rest=0.3),
     )
-    return model
-
-
-def walker() -> mbd.Model:
-    """The kneed walker of the examples."""
-    model = mbd.Model("kneed walker", gravity=mbd.on_slope(0.0504))
-    hip = mbd.PointMass("hip", mass=0.5)
-    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin))
-    for side, other in ("left", "right"), ("right", "left"):
-        thigh = mbd.Link(f"{side} thigh", mass=0.5, length=0.5, center=0.325)
-        shank = mbd.Link(f"{side} shank", mass=0.05, length=0.5, center=0.125)
-        knee = mbd.Revolute(f"{side} knee", thigh.end, shank.start)
-        model.connect(mbd.Revolute(f"{side} hip", hip.origin, thigh.start), knee)
-        model.constrain(
-            mbd.Unilateral(f"{side} foot", mbd.touchdown(shank.end), release=mbd.When(f"{other} foot")),
-            mbd.Unilateral(f"{side} lock", mbd.flexion(knee), release=mbd.When(f"{other} foot", after_impact=True)),
-        )
     return model
 
 

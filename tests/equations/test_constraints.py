@@ -14,7 +14,7 @@ def test_contacts_list_their_rows_normal_first():
     equations = derive(walker())
     parts = {c.name: [(equations.rows[k].owner, equations.rows[k].part) for k in c.rows] for c in equations.contacts}
     assert parts["left foot"] == [("left foot", "normal"), ("left foot", "forward")]
-    assert parts["right lock"] == [("right lock", "normal")]
+    assert parts["right knee lock"] == [("right knee lock", "normal")]
     assert all(equations.rows[k].contact == number for number, c in enumerate(equations.contacts) for k in c.rows)
     foot, lock = equations.contacts[0], equations.contacts[1]
     assert foot.when == (("right foot", False),)

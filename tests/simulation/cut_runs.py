@@ -9,9 +9,9 @@ from functools import cache
 import numpy as np
 
 import mbd
+from mbd.hardcases.redundant_rows import parallel_cranks
 from tests.kernel.test_twin import rubber_ball, served_pendulum
 from tests.simulation.mechanisms import ball, box, falling, kneed_walker, kneed_walker_start, pendulum
-from tests.simulation.test_redundancy import parallel_cranks
 from tests.simulation.test_singular_poses import four_bars
 
 __all__ = ["PARTS", "SCENES", "assert_halves_are_the_whole", "driven_point", "halves", "scene"]

@@ -65,15 +65,15 @@ def pendulum(loss=None) -> mbd.Model:
     return model
 
 
-def kneed_walker(slope: float = 0.0504) -> mbd.Model:
+def kneed_walker(slope: float = 0.0504, cut="auto", loss=None) -> mbd.Model:
     """The kneed walker of Chen: locking knees, McGeer's rule at the feet."""
-    walker = mbd.Model("kneed walker", gravity=mbd.on_slope(slope))
+    walker = mbd.Model("kneed walker", gravity=mbd.on_slope(slope), cut=cut)
     hip = mbd.PointMass("hip", mass=0.5)
     walker.connect(mbd.Translation("trunk", walker.ground.origin, hip.origin))
     for side, other in ("left", "right"), ("right", "left"):
         thigh = mbd.Link(f"{side} thigh", mass=0.5, length=0.5, center=0.325)
         shank = mbd.Link(f"{side} shank", mass=0.05, length=0.5, center=0.125)
-        knee = mbd.Revolute(f"{side} knee", thigh.end, shank.start)
+        knee = mbd.Revolute(f"{side} knee", thigh.end, shank.start, loss=loss)
         walker.connect(mbd.Revolute(f"{side} hip", hip.origin, thigh.start), knee)
         walker.constrain(
             mbd.Unilateral(f"{side} foot", mbd.touchdown(shank.end), release=mbd.When(f"{other} foot")),

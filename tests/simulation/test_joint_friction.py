@@ -110,13 +110,3 @@ def test_friction_is_kept_in_files_tables_and_pictures(tmp_path):
     assert pickle.loads(pickle.dumps(trajectory.final)).mode == trajectory.final.mode
     swing = run(pendulum(mbd.Coulomb(0.3)), {"hinge.angle": 1.0})
     assert swing.plot("hinge.friction").axes[0].get_ylabel().endswith("[N m]")
-
-
-@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RadauIIA()], ids=["HHT", "RadauIIA"])
-def test_a_pin_whose_friction_reaches_the_lever_arm_is_told_to_jam(scheme):
-    model = mbd.Model("pendulum")
-    bob = mbd.Link("bob", mass=1.0, length=0.2, center=0.2)
-    model.connect(mbd.Revolute("hinge", model.ground.origin, bob.start, loss=mbd.PinFriction(1.0, 0.25)))
-    start = mbd.assemble(model, position={"hinge.angle": 0.5}, velocity={"hinge.angle": 3.0})
-    with pytest.raises(mbd.SimulationError, match=r"pin friction of 'hinge' may jam: μ r reaches the lever arm"):
-        mbd.simulate(model, start, scheme, dt=1e-3, until=1.0)

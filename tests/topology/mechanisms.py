@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import mbd
 from mbd.model import Model
+from tests.simulation import mechanisms as simulation
 
 
 def four_bar(cut="auto") -> Model:
@@ -33,23 +36,8 @@ def chain(n: int, cut="auto", reverse: bool = False) -> Model:
     return model
 
 
-def kneed_walker(cut="auto", loss: float = 0.1) -> Model:
-    """A hip, two thighs, two shanks; locking knees, sticking feet."""
-    model = Model("kneed walker", gravity=mbd.on_slope(0.0504), cut=cut)
-    hip = mbd.PointMass("hip", mass=0.5)
-    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin))
-    for side, other in ("left", "right"), ("right", "left"):
-        thigh = mbd.Link(f"{side} thigh", mass=0.5, length=0.5, center=0.325)
-        shank = mbd.Link(f"{side} shank", mass=0.05, length=0.5, center=0.125)
-        knee = mbd.Revolute(f"{side} knee", thigh.end, shank.start, loss=mbd.Viscous(loss))
-        model.connect(mbd.Revolute(f"{side} hip", hip.origin, thigh.start), knee)
-        model.constrain(
-            mbd.Unilateral(f"{side} foot", mbd.touchdown(shank.end), release=mbd.When(f"{other} foot")),
-            mbd.Unilateral(
-                f"{side} knee lock", mbd.flexion(knee), release=mbd.When(f"{other} foot", after_impact=True)
-            ),
-        )
-    return model
+kneed_walker = partial(simulation.kneed_walker, loss=mbd.Viscous(0.1))
+"""With a loss in each knee."""
 
 
 def bricard() -> Model:
