@@ -36,15 +36,6 @@ def test_a_damper_takes_and_a_force_gives():
     assert ledger["push"][0] == 0.0 and ledger["numerical"][0] == 0.0
 
 
-def test_impacts_take_what_their_events_say():
-    run = ball(restitution=0.7)
-    losses = [event.energy_loss for event in run.events if event.kind == "closed"]
-    assert run.energy.sums["floor impact"] == pytest.approx(-sum(losses), rel=1e-12)
-    assert abs(run.energy.sums["numerical"]) < 1e-12
-    steps = np.flatnonzero(np.diff(run.energy["floor impact"]))
-    assert (steps + 1).tolist() == [event.row for event in run.events if event.kind == "closed"]
-
-
 def test_the_work_of_a_prescribed_motion_is_counted():
     """A mass dragged by x(t) = sin t: λ h_t is the power of the drive, and the only cause of its kinetic energy."""
     sheet = Sheet(1)
