@@ -15,7 +15,12 @@ from reprlib import recursive_repr
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeVar
 
-__all__ = ["LateFields", "changed_late", "dataclass", "found_late", "makes_late"]
+__all__ = ["LateFields", "changed_late", "dataclass", "forwarded", "found_late", "makes_late"]
+
+
+def forwarded(path: str) -> Any:
+    """What a class has from one of its fields, 'joint.labels': a value, or a method that is called there."""
+    return property(attrgetter(path))
 
 
 class _Factory:

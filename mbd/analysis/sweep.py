@@ -27,11 +27,11 @@ from mbd.progress import share_bar
 from mbd.results.archive import named_file, write_whole
 from mbd.results.names import scalars
 from mbd.results.tables import text_cell
+from mbd.results.titled import Titled
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
     from xarray import Dataset
 
 __all__ = ["Sweep", "sweep"]
@@ -41,7 +41,7 @@ OUTCOME = ("success", "message")
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(Titled):
     """Runs over all combinations of some values.
 
     Attributes
@@ -53,6 +53,8 @@ class Sweep:
     complete : False where Ctrl-C ended the sweep; runs that it never came to say so in their message
     units : of what was varied and of results, by title, where they are known
     """
+
+    known_as = "sweep"
 
     names: tuple[str, ...]
     cases: tuple[tuple[Any, ...], ...]
@@ -72,19 +74,6 @@ class Sweep:
         varied = {name: [case[k] for case in self.cases] for k, name in enumerate(self.names)}
         return {**varied, **{title: list(found) for title, found in self.results.items()},
                 "success": list(self.success), "message": list(self.messages)}  # fmt: skip
-
-    def __getitem__(self, title: str) -> Any:
-        """A column as an array."""
-        columns = self.columns
-        if title not in columns:
-            raise UnknownNameError(nearest(title, columns, "column", "The sweep has"))
-        return np.array(columns[title])
-
-    def to_dataframe(self) -> DataFrame:
-        """A pandas table with a line for each run."""
-        from mbd.results.tables import library
-
-        return library("pandas", "data", "Sweep.to_dataframe()").DataFrame(self.columns)
 
     def to_xarray(self) -> Dataset:
         """An xarray Dataset with a dimension for everything that was varied by itself.

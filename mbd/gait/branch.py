@@ -23,12 +23,12 @@ from mbd.gait.special_points import KINDS, SpecialPoint, special_points
 from mbd.gait.switching import doubled
 from mbd.later import later
 from mbd.notebook import table
+from mbd.results.titled import Titled
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
 __all__ = ["Branch", "branch"]
 
@@ -43,12 +43,14 @@ EFFECT_RTOL = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Titled):
     """Gaits along a parameter.
 
     parameter : its name; curve : points in order; special : folds, doublings, tori and branch points, located
     stopped : why it ends where it does; complete : False where Ctrl-C ended it
     """
+
+    known_as = "branch"
 
     name: str
     parameter: str
@@ -61,13 +63,6 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.curve)
-
-    def __getitem__(self, title: str) -> Vector:
-        """A column of `columns` as an array."""
-        columns = self.columns
-        if title not in columns:
-            raise UnknownNameError(nearest(title, columns, "column", "The branch has"))
-        return np.array(columns[title])
 
     @property
     def columns(self) -> dict[str, list[Any]]:
@@ -144,12 +139,6 @@ class Branch:
         """A gait of the branch to go on from."""
         values = self.given.with_value(point.value)
         return replace(self.start, state=point.state, chart=point.chart, parameters=values)
-
-    def to_dataframe(self) -> DataFrame:
-        """A pandas table with a line for each point."""
-        from mbd.results.tables import library
-
-        return library("pandas", "data", "Branch.to_dataframe()").DataFrame(self.columns)
 
     def __repr__(self) -> str:
         return "\n".join(self._lines())

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.arrays import Vector
 from mbd.bodies.values import is_finite_number, shown
 from mbd.dataclass import dataclass
-from mbd.errors import GaitError, MbdError, ModelError, UnknownNameError, nearest
+from mbd.errors import GaitError, MbdError, ModelError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.derivatives import parameter_value
 from mbd.gait.limits import changed_events, limit_between
@@ -23,12 +22,12 @@ from mbd.gait.margins import least_margins, watched_feet
 from mbd.gait.special_points import TESTS, SpecialPoint, polished
 from mbd.later import later
 from mbd.notebook import table
+from mbd.results.titled import Titled
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
 __all__ = ["PointCurve", "follow"]
 
@@ -41,12 +40,14 @@ SECANTS, LOCATED = 12, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class PointCurve:
+class PointCurve(Titled):
     """Special points of one kind over a second parameter.
 
     parameters : names of the one that is found and of the other; over : values of the other; points : in order
     stopped : why it ends where it does; complete : False where Ctrl-C ended it
     """
+
+    known_as = "curve"
 
     name: str
     kind: str
@@ -61,13 +62,6 @@ class PointCurve:
     def __len__(self) -> int:
         return len(self.points)
 
-    def __getitem__(self, title: str) -> Vector:
-        """A column of `columns` as an array."""
-        columns = self.columns
-        if title not in columns:
-            raise UnknownNameError(nearest(title, columns, "column", "The curve has"))
-        return np.array(columns[title])
-
     @property
     def columns(self) -> dict[str, list[Any]]:
         """Both parameters, period and speed there, and the error of the first, by title."""
@@ -78,12 +72,6 @@ class PointCurve:
             "speed": [point.point.speed for point in self.points],
             "error": [point.error for point in self.points],
         }
-
-    def to_dataframe(self) -> DataFrame:
-        """A pandas table with a line for each point."""
-        from mbd.results.tables import library
-
-        return library("pandas", "data", "PointCurve.to_dataframe()").DataFrame(self.columns)
 
     def __repr__(self) -> str:
         first, second = self.parameters

@@ -3,51 +3,19 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
 
-from mbd.hardcases import (
-    absent_effects,
-    balls,
-    blocks,
-    clearances,
-    cradles,
-    driven_leg,
-    four_bars,
-    frictions,
-    governor,
-    grazes,
-    hills,
-    knees,
-    light_links,
-    long_run,
-    mass_ratios,
-    mats,
-    pushed_tables,
-    redundant_rows,
-    resting,
-    rods,
-    rotations,
-    shakers,
-    singular_poses,
-    sleighs,
-    starts,
-    straight_slides,
-    tables_and_jumps,
-    tiny_steps,
-    user_force,
-    vanishing_forces,
-    walls,
-    wheel,
-)
 from mbd.hardcases.case import HardCase
 
 __all__ = ["CASES"]
 
-MODULES = (
-    absent_effects, balls, blocks, clearances, cradles, driven_leg, four_bars, frictions, governor, grazes, hills,
-    knees, light_links, long_run, mass_ratios, mats, pushed_tables, redundant_rows, resting, rods, rotations,
-    shakers, singular_poses, sleighs, starts, straight_slides, tables_and_jumps, tiny_steps, user_force,
-    vanishing_forces, walls, wheel,
+NAMES = (
+    "absent_effects", "balls", "blocks", "clearances", "cradles", "driven_leg", "four_bars", "frictions",
+    "governor", "grazes", "hills", "knees", "light_links", "long_run", "mass_ratios", "mats", "pushed_tables",
+    "redundant_rows", "resting", "rods", "rotations", "shakers", "singular_poses", "sleighs", "starts",
+    "straight_slides", "tables_and_jumps", "tiny_steps", "user_force", "vanishing_forces", "walls", "wheel",
 )  # fmt: skip
+"""Of the files of cases."""
 
 
 def _place(case: HardCase) -> tuple[str, int, str]:
@@ -57,5 +25,6 @@ def _place(case: HardCase) -> tuple[str, int, str]:
     return found[1], int(found[2]), found[3]
 
 
-CASES = tuple(sorted((case for module in MODULES for case in module.CASES), key=_place))
+_FILES = [import_module(f"mbd.hardcases.{name}") for name in NAMES]
+CASES: tuple[HardCase, ...] = tuple(sorted((case for file in _FILES for case in file.CASES), key=_place))
 """Every case, in the order of the table."""

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import attrgetter
-from typing import Any
 
 from mbd.bodies import algebra
 from mbd.bodies.algebra import cross, rotate, scaled, transpose
 from mbd.bodies.scope import Rotation, Scope, Triple
-from mbd.dataclass import dataclass
+from mbd.dataclass import dataclass, forwarded
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
 __all__ = ["Reversed"]
-
-
-def _of_joint(name: str) -> Any:
-    """What the joint itself has under a name: a value, or a method of it."""
-    return property(attrgetter(f"joint.{name}"))
 
 
 @dataclass(frozen=True)
@@ -37,16 +30,17 @@ class Reversed(Joint):
 
     is_reversed = True
 
-    parent = _of_joint("child")
-    child = _of_joint("parent")
-    name, labels, velocity_labels = _of_joint("name"), _of_joint("labels"), _of_joint("velocity_labels")
-    loss, stiffness, rest, anatomy = map(_of_joint, ("loss", "stiffness", "rest", "anatomy"))
-    is_planar, is_vector, is_elastic = map(_of_joint, ("is_planar", "is_vector", "is_elastic"))
-    orientation, adding, defaults = map(_of_joint, ("orientation", "adding", "defaults"))
-    compose, difference, normalise = map(_of_joint, ("compose", "difference", "normalise"))
-    coordinate_rates, increment_rates = _of_joint("coordinate_rates"), _of_joint("increment_rates")
-    increment_velocities, elastic_energy = _of_joint("increment_velocities"), _of_joint("elastic_energy")
-    parameters, domains = _of_joint("parameters"), _of_joint("domains")
+    parent = forwarded("joint.child")
+    child = forwarded("joint.parent")
+    name, labels = forwarded("joint.name"), forwarded("joint.labels")
+    loss, stiffness, rest, anatomy = map(forwarded, ("joint.loss", "joint.stiffness", "joint.rest", "joint.anatomy"))
+    is_planar, is_vector, is_elastic = map(forwarded, ("joint.is_planar", "joint.is_vector", "joint.is_elastic"))
+    orientation, adding, defaults = map(forwarded, ("joint.orientation", "joint.adding", "joint.defaults"))
+    velocity_labels = forwarded("joint.velocity_labels")
+    compose, difference, normalise = map(forwarded, ("joint.compose", "joint.difference", "joint.normalise"))
+    coordinate_rates, increment_rates = forwarded("joint.coordinate_rates"), forwarded("joint.increment_rates")
+    increment_velocities, elastic_energy = forwarded("joint.increment_velocities"), forwarded("joint.elastic_energy")
+    parameters, domains = forwarded("joint.parameters"), forwarded("joint.domains")
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """The inverse placement."""

@@ -12,16 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.domains import Domain
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import is_number, named_number_faults, number, shown
 from mbd.compile.mechanisms import mechanism_of
-from mbd.dataclass import dataclass
+from mbd.dataclass import dataclass, forwarded
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.errors import ModelError, UnknownNameError, nearest
-from mbd.forces.base import Action, Force, Result
+from mbd.forces.base import Action, Force
 from mbd.forces.muscles import Muscle
-from mbd.forces.quantities import Mention
 from mbd.forces.samples import Samples
 from mbd.laboratory.balance_result import InverseDynamics
 from mbd.laboratory.force_plate import ForcePlate
@@ -230,31 +228,13 @@ class _Idle(Force):
     name: str
     muscle: Muscle
 
-    @property
-    def kind(self) -> str:
-        """'applied'."""
-        return self.muscle.kind
+    kind, mentions, parameters = map(forwarded, ("muscle.kind", "muscle.mentions", "muscle.parameters"))
+    domains, results = map(forwarded, ("muscle.domains", "muscle.results"))
 
     def act(self, scope: Scope) -> Action:
         """Nothing; what the muscle would do declares its parameters."""
         self.muscle.act(scope)
         return Action()
-
-    def mentions(self) -> list[Mention]:
-        """Those of the muscle."""
-        return self.muscle.mentions()
-
-    def parameters(self) -> dict[str, float]:
-        """Those of the muscle."""
-        return self.muscle.parameters()
-
-    def domains(self) -> dict[str, Domain]:
-        """Those of the muscle."""
-        return self.muscle.domains()
-
-    def results(self) -> dict[str, Result]:
-        """Those of the muscle."""
-        return self.muscle.results()
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
-from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.errors import ModelError
 from mbd.gait.basin.axes import Grid
 from mbd.gait.basin.balls import Ball
 from mbd.gait.basin.kinds import KINDS
 from mbd.gait.basin.walks import Decided
 from mbd.later import later
 from mbd.notebook import table
+from mbd.results.titled import Titled
 from mbd.state import State
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame
     from xarray import Dataset
 
     from mbd.gait.basin.made import Made
@@ -33,7 +33,7 @@ __all__ = ["Basin"]
 
 
 @dataclass(frozen=True, eq=False)
-class Basin:
+class Basin(Titled):
     """What became of every start of a grid.
 
     Attributes
@@ -48,6 +48,8 @@ class Basin:
     step_limit : returns after which a start counts as not decided
     complete : False where Ctrl-C ended the study; starts that it never came to are 'not decided' after 0 steps
     """
+
+    known_as = "basin"
 
     name: str
     grid: Grid
@@ -145,19 +147,6 @@ class Basin:
         decided = self.decided
         return {**values, "outcome": self._words(), "attractor": decided.attractor, "steps": decided.steps,
                 "time": decided.time}  # fmt: skip
-
-    def __getitem__(self, title: str) -> Any:
-        """A column (N,)."""
-        columns = self.columns
-        if title not in columns:
-            raise UnknownNameError(nearest(title, columns, "column", "The basin has"))
-        return columns[title]
-
-    def to_dataframe(self) -> DataFrame:
-        """A pandas table with a line for each start."""
-        from mbd.results.tables import library
-
-        return library("pandas", "data", "Basin.to_dataframe()").DataFrame(self.columns)
 
     def to_xarray(self) -> Dataset:
         """An xarray Dataset over the axes: outcome, attractor, steps, time [s]; axes have their units."""

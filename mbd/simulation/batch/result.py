@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Vector
 from mbd.compile.python import array_function
-from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
+from mbd.errors import ModelError, SimulationError
 from mbd.kernel import codes
 from mbd.notebook import table
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Rows
 from mbd.results.tables import last_number
+from mbd.results.titled import Titled
 from mbd.simulation.batch.alone import NAMES, Alone
 from mbd.simulation.batch.starts import Starts
 from mbd.simulation.many_runs import Ends
@@ -33,7 +34,7 @@ NOT_RUN = "not run"
 """The outcome of runs that an interrupted batch never came to."""
 
 
-class Batch:
+class Batch(Titled):
     """The ends of N runs.
 
     Attributes
@@ -49,6 +50,8 @@ class Batch:
     complete : False where Ctrl-C ended the batch; runs that it never came to have the outcome 'not run'
     how : '' where all runs were made in the kernel, else why they were made one by one
     """
+
+    known_as = "batch"
 
     def __init__(self, runner: Runner, starts: Starts, places: dict[str, int], results: tuple[str, ...]) -> None:
         self._runner, self._starts, self._places, self._names = runner, starts, places, results
@@ -221,19 +224,6 @@ class Batch:
         state |= {each.name: self.z[:, k] for k, each in enumerate(equations.states)}
         ended = {"outcome": self.outcome, "stopped_by": self.stopped_by, "time": self.time}
         return {**varied, **ended, **state, **self.results}
-
-    def __getitem__(self, title: str) -> Any:
-        """A column (N,)."""
-        columns = self.columns
-        if title not in columns:
-            raise UnknownNameError(nearest(title, columns, "column", "The batch has"))
-        return columns[title]
-
-    def to_dataframe(self) -> Any:
-        """A pandas table with a line for each run."""
-        from mbd.results.tables import library
-
-        return library("pandas", "data", "Batch.to_dataframe()").DataFrame(self.columns)
 
     def __repr__(self) -> str:
         counts = Counter(map(str, self._kinds()))
