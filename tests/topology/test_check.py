@@ -15,7 +15,7 @@ def one_fault(model: Model) -> str:
     return fault
 
 
-@pytest.mark.parametrize("model", [chain(3), four_bar(), kneed_walker(), bricard(), kneed_walker("all")], ids=repr)
+@pytest.mark.parametrize("model", [chain(3), four_bar(), kneed_walker(), bricard(), kneed_walker(cut="all")], ids=repr)
 def test_good_models_have_no_fault(model):
     assert model.check() == []
     model.require_valid()

@@ -62,7 +62,7 @@ def test_every_body_is_reached_once_and_each_joint_used_once(cut, reverse):
 
 
 def test_cutting_all_lets_every_body_float():
-    chosen = plan(kneed_walker("all"))
+    chosen = plan(kneed_walker(cut="all"))
     assert names(chosen.cut) == ["trunk", "left hip", "left knee", "right hip", "right knee"]
     assert names(chosen.edges) == names(chosen.floating)
     assert chosen.coordinate_names[:3] == ("hip floating.x", "hip floating.y", "left thigh floating.x")
