@@ -208,7 +208,7 @@ GAITS = {"basin", "find_gait", "limit_cycle"}
 """Words that make so many runs that they take machine code."""
 
 NOTHING = [None, "", [], {}, object(), b"x", 1j, lambda: 0, mbd.PointMass, MODEL, np.array([1.0, math.nan])]
-NUMBERS = [-1.0, 0.0, 90.0, 420.0, 1e300, 10**400, 10**5000, math.nan, math.inf, True]
+NUMBERS = [-1.0, 0.0, 90.0, 420.0, 1e300, 10**400, math.nan, math.inf, True]
 TEXTS = ["1.0", "hinge.angel", "two\nlines", ["hinge.angle", "hinge.angle"], {"hinge.angel": 1.0}, (None, None, None)]
 MANY = [(1.0, 2.0, 3.0, 4.0), [[1.0]], {"a": math.nan}, ["a"], {1: 2}]
 WRONG = [*NOTHING, *NUMBERS, *TEXTS, *MANY]

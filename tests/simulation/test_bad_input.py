@@ -215,12 +215,22 @@ def test_values_that_are_not_finite_are_refused_where_they_are_given(value):
 
 
 HUGE = (10**400, -(10**400), 10**5000)
-"""Integers that no float holds; the last is not even written out. As arguments the corpus of bad input tries them."""
+"""Integers that no float holds; the last is not even written out."""
 PLACES = {
+    "dt": lambda model, start, x: mbd.simulate(model, start, dt=x, until=0.1),
+    "tol": lambda model, start, x: mbd.simulate(model, start, tol=x, until=0.1),
+    "until": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=x),
+    "store": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, store=x),
+    "rest_speed": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, rest_speed=x),
     "a parameter": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, parameters={"rod.length": x}),
     "a start": lambda model, start, x: mbd.assemble(model, {"hinge.angle": x}),
     "the time of a state": lambda model, start, x: mbd.simulate(model, replace(start, time=x), dt=0.01, until=0.1),
     "q of a state": lambda model, start, x: mbd.simulate(model, replace(start, q=[x]), dt=0.01, until=0.1),
+    "Newmark": lambda model, start, x: mbd.Newmark(x, x),
+    "HHT": lambda model, start, x: mbd.HHT(x),
+    "GeneralizedAlpha": lambda model, start, x: mbd.GeneralizedAlpha(x),
+    "a tolerance": lambda model, start, x: mbd.RadauIIA(tolerance=x),
+    "a mass": lambda model, start, x: mbd.PointMass("body", mass=x),
     "samples": lambda model, start, x: mbd.Samples([0.0, 1.0], [0.0, x]),
     "a time of a run": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1).at(x),
 }
