@@ -258,18 +258,29 @@ class _Body:
 
 
 def _clear_at_once(target: Target, outputs: Sequence[Node], places: dict[int, list[int]]) -> None:
-    """Clear a stretch of outputs at the beginning where many runs of zeros are in it, and forget these zeros."""
+    """Clear stretches of outputs at the beginning where many runs of zeros are in one, and forget these zeros."""
     zeros = next((own for own in places.values() if outputs[own[0]].is_zero), [])
-    runs = [(first, number) for first, number in _runs(zeros) if number >= MIN_ZEROS] if zeros else []
-    if len(runs) < MIN_RUNS:
-        return
-    begin, end = runs[0][0], sum(runs[-1])
-    target.clear("out", begin, end - begin)
-    left = [place for place in zeros if not begin <= place < end]
+    left, number = zeros, outputs[zeros[0]].index if zeros else -1
+    for begin, end in _stretches(outputs, zeros):
+        target.clear("out", begin, end - begin)
+        left = [place for place in left if not begin <= place < end]
     if left:
-        places[outputs[begin].index] = left
+        places[number] = left
     else:
-        del places[outputs[begin].index]
+        places.pop(number, None)
+
+
+def _stretches(outputs: Sequence[Node], zeros: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Ends of stretches with many runs of zeros, between which nothing is to be left as it is."""
+    groups, last = list[list[tuple[int, int]]](), -1
+    for first, number in _runs(zeros) if zeros else ():
+        if number < MIN_ZEROS:
+            continue
+        if last < 0 or any(node.is_untouched for node in outputs[last:first]):
+            groups.append([])
+        last = first + number
+        groups[-1].append((first, last))
+    yield from ((group[0][0], group[-1][1]) for group in groups if len(group) >= MIN_RUNS)
 
 
 def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:

@@ -8,7 +8,7 @@ import threading
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, settings, strategies as st
 
 from mbd.compile.cache import ObjectCache
 from mbd.compile.host import host
@@ -67,6 +67,21 @@ def test_values_among_many_runs_of_zeros_keep_their_bits(graph):
         mixed = Graph(tuple(outputs), graph.block, graph.parameters)
         for cut in ({}, {"large": 0, "part": 9}):
             assert np.array_equal(run(by_llvm({"f": outputs}, **cut)["f"], mixed), expected, equal_nan=True)
+
+
+@given(seed=st.integers(0, 2**32 - 1), share=st.sampled_from([0.0, 0.01, 0.1, 0.5]), large=st.booleans())
+@settings(max_examples=25)
+def test_what_is_to_be_left_is_left_among_many_runs_of_zeros(seed, share, large):
+    rng, tape = np.random.default_rng(seed), Tape()
+    nodes = tape.input("t") + 1.0, tape.zero, tape.untouched
+    kinds = [kind for _ in range(4 * MIN_RUNS) for kind in (0, *[1] * rng.integers(MIN_ZEROS - 2, MIN_ZEROS + 9))]
+    kinds = [2 if rng.random() < share / MIN_ZEROS and kind == 1 else kind for kind in kinds]
+    kinds = [k for kind in kinds for k in ([kind] if kind < 2 else [2] * rng.integers(1, 20))]
+    cut = {"large": 0, "part": 9} if large else {}
+    library = by_llvm({"f": [nodes[kind] for kind in kinds]}, **cut)
+    out = np.full(len(kinds), np.nan)
+    library["f"](np.array([2.0, *[0.0] * 20]), np.zeros(20), out)
+    np.testing.assert_array_equal(out, np.array([3.0, 0.0, np.nan])[kinds])
 
 
 @pytest.mark.parametrize("level", [0, 2])
