@@ -35,12 +35,12 @@ from mbd.equations.inputs import Inputs
 from mbd.equations.magnitudes import magnitudes
 from mbd.equations.tangents import Columns, seeded, tangent
 from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
-from mbd.tape.elimination import factors
+from mbd.tape.elimination import Factors, factors
 from mbd.tape.node import Node, Scalar
 
 __all__ = [
     "ActiveSet", "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "constraint_terms",
-    "correction",
+    "correction", "eliminated_tangent", "MAX_OPERATIONS", "MAX_UNKNOWNS",
     "follows_multipliers", "free_rates", "guard_terms", "guards", "increment_rates", "is_judged", "law_forces",
     "loaded_balance", "mass_matrix", "newton", "residual", "row_forces", "scales", "switched_balance", "system",
 ]  # fmt: skip
@@ -98,6 +98,8 @@ class Correction:
 
 MAX_UNKNOWNS = 20
 """Unknowns above which a system is not eliminated on the tape."""
+MAX_OPERATIONS = 1000
+"""Operations of an elimination beyond which making its code takes longer than it is likely to save."""
 MIN_COORDINATES = 24
 """Coordinates of one tree from which on it is eliminated from its tips: matrices of small ones have few entries."""
 
@@ -113,14 +115,10 @@ def correction(equations: Equations, active: ActiveSet) -> Correction | None:
     n, n_v, m = inputs.n, equations.n_v, len(rows)
     if n >= MIN_COORDINATES and m == 0:
         return _from_the_tips(equations, active)
-    if not 0 < n + m <= MAX_UNKNOWNS:
+    eliminated = eliminated_tangent(equations, active)
+    if eliminated is None:
         return None
-    matrix, tail = _whole(equations, *system(equations, active))
-    inertia = substitute([matrix[k][k] for k in range(n)], {inputs.c[0]: 0.0, inputs.c[1]: 0.0})
-    # beyond so many operations making the code takes longer than it is likely to save
-    found = factors(matrix, n, 1000, {k for k in range(n) if inertia[k].is_zero})
-    if found is None:
-        return None
+    matrix, tail, found = eliminated
     r, values = tail[:n], tail[n : n + m]
     by_C, by_K = 1.0 / inputs.c[0], 1.0 / inputs.c[1]
     fast = [equations.rows[k].is_velocity for k in rows]
@@ -139,6 +137,17 @@ def correction(equations: Equations, active: ActiveSet) -> Correction | None:
     if stabilized and not found.weakest.is_zero:
         out += [matrix[j][j] for j in range(n_v)] + [entry for line in matrix[n:] for entry in line[:n_v]]
     return _kept(found, tail, out, n + m)
+
+
+def eliminated_tangent(equations: Equations, active: ActiveSet) -> tuple[list[list[Node]], list[Node], Factors] | None:
+    """K of `newton` line by line, what is behind it there, and the factors of K; None where they do not pay."""
+    inputs = Inputs.of(equations)
+    if not 0 < inputs.n + len(active.rows) <= MAX_UNKNOWNS:
+        return None
+    matrix, tail = _whole(equations, *system(equations, active))
+    inertia = substitute([matrix[k][k] for k in range(inputs.n)], {inputs.c[0]: 0.0, inputs.c[1]: 0.0})
+    found = factors(matrix, inputs.n, MAX_OPERATIONS, {k for k in range(inputs.n) if inertia[k].is_zero})
+    return None if found is None else (matrix, tail, found)
 
 
 def _from_the_tips(equations: Equations, active: ActiveSet) -> Correction | None:

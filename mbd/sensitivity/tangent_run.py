@@ -113,7 +113,8 @@ class TangentStepper(Stepper):
         unknowns = K.n + 2 * K.n_rows  # of `follow_newmark.follow_newton`
         starts = 2 * size + 10 * (K.n + K.n_rows + K.n_v + 1) + K.n_q + K.n_watched + K.n_frictions
         own = {"kkt": unknowns * unknowns, "rhs": unknowns, "pivots": unknowns}
-        own["block"] = size + K.n + K.n_rows + K.n_v  # with W behind it
+        own["block"] = size + K.n + (K.n_rows + 1) * (K.n_v + 1)  # with W and Z behind it
+        own["out"] = K.n + K.n_rows + K.n_v + 1
         more = {name: max(length, given.get(name, 0)) for name, length in own.items()}
         return given | more | {"starts": starts + K.n_rows * (K.n_v + K.n + K.n_rows)}
 
@@ -158,12 +159,13 @@ class TangentStepper(Stepper):
         code, others = self.modes[-1], len(self.functions) - known - 2
         key = code.active
         if key not in self._of_modes:
-            self._of_modes[key] = derivatives_of_modes(self.mechanism, key, self.places or ())
-        tangent, residual, turned = self._of_modes[key]
-        # others run without derivatives only; behind them see `follow_newmark.turned_program`, `derivative_program`
-        self._programs += [tangent, residual, *others * [turned], turned, residual]
-        self.functions += 2 * [no_values(self.mechanism)]
-        self._n_of_modes += 2
+            newton = self.own.programs == "stepping"
+            self._of_modes[key] = derivatives_of_modes(self.mechanism, key, self.places or (), newton)
+        tangent, residual, turned, *solved = self._of_modes[key]
+        # others run without derivatives only; behind them see `words.turned_program` and what follows
+        self._programs += [tangent, residual, *others * [turned], turned, residual, *solved]
+        self.functions += (2 + len(solved)) * [no_values(self.mechanism)]
+        self._n_of_modes += 2 + len(solved)
 
     def _advance_compiled(self) -> int:
         known = self._table is not None and not self._provisional

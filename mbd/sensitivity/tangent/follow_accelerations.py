@@ -6,7 +6,7 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Kernel
 from mbd.kernel.stepping.restart import consistent, evaluate, fill_block
-from mbd.sensitivity.tangent.words import derivative_of, is_differentiated, solve_plain, without_tangent
+from mbd.sensitivity.tangent.words import derivative_of, is_differentiated, solve_plain, solved_program, without_tangent
 
 __all__ = ["follow_factors", "follow_move", "follow_rates", "follow_solution"]
 
@@ -38,7 +38,12 @@ def follow_rates(K: Kernel, t: float) -> int:
         return 0
     n = K.n
     m = K.n_active
-    if K.n_frictions > 0 or K.loaded > 0 or K.loads_act == 1 or K.n_dropped > 0 or prepare_rates(K, t, m) != 0:
+    if K.n_frictions > 0 or K.loaded > 0 or K.loads_act == 1 or K.n_dropped > 0:
+        return consistent(K, t, K.q1, K.y1)
+    fill_block(K, t, K.q1, K.y1)
+    if K.correction_program == 0 and solve_straight_rates(K, m):
+        return 0
+    if prepare_rates(K, t, m) != 0:
         return consistent(K, t, K.q1, K.y1)
     fill_block(K, t, K.q1, K.y1)
     K.block[K.o_lam : K.o_lam + K.n_rows] = 0.0
@@ -60,6 +65,20 @@ def follow_rates(K: Kernel, t: float) -> int:
     for k in range(m):
         K.impulse[K.rows[k]] += K.rhs[n + k]
     return 0
+
+
+def solve_straight_rates(K: Kernel, m: int) -> bool:
+    """The same by straight-line code (`systems.rates`) from the block; false where a pivot is too small."""
+    n = K.n
+    call(K, solved_program(K), K.out)
+    if without_tangent(K.out[n + m]) != 1.0:
+        return False
+    for i in range(n):
+        K.jump[i] = K.out[i]
+    K.impulse[: K.n_rows] = 0.0
+    for k in range(m):
+        K.impulse[K.rows[k]] = K.out[n + k]
+    return True
 
 
 def follow_move(K: Kernel, h: float, weights: int, count: int) -> None:

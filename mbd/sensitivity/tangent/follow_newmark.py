@@ -13,13 +13,16 @@ from mbd.sensitivity.tangent.words import (
     MAX_CORRECTIONS,
     are_corrected,
     derivative_of,
+    derivative_program,
     is_differentiated,
     largest_derivative,
     metric_place,
-    moved,
+    metric_program,
     n_inputs,
     solution_place,
     solve_plain,
+    solved_program,
+    turned_program,
     without_tangent,
 )
 
@@ -37,16 +40,6 @@ def note_solution(K: Kernel) -> None:
     size = n_inputs(K)
     o = solution_place(K)
     K.starts[o : o + size] = K.block[:size]
-
-
-def turned_program(K: Kernel) -> int:
-    """The number of the program whose derivative is that of Newton's matrix times a given W (see `programs`)."""
-    return int(K.residual_program + (3 if K.correction_program > 0 else 1))
-
-
-def derivative_program(K: Kernel) -> int:
-    """The number of the program that has the derivatives of the residual, and no values."""
-    return turned_program(K) + 1
 
 
 def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int:
@@ -74,24 +67,29 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
     if corrects:
         if is_later_matrix(K):
             return NOT_FOLLOWED
-        corrects = begin_corrections(K, m)
+        corrects = begin_corrections(K, m, c_C)
+    exact = K.vector == 1 and K.n_cones == 0  # is the matrix the derivative itself? then 0 is as good a guess as any
+    by_v = without_tangent(c_C)
+    by_x = without_tangent(c_K)
     # values of the solution, derivatives of the prediction
     for i in range(n):
         change = without_tangent(K.starts[o + K.o_a + i]) - without_tangent(K.block[K.o_a + i])
-        K.block[K.o_a + i] += change
-        K.block[K.o_v + i] += c_C * change
+        guess = derivative_of(K.block[K.o_a + i]) if exact else 0.0
+        K.block[K.o_a + i] += change - guess
+        K.block[K.o_v + i] += c_C * change - by_v * guess
         if i < K.n_v:
-            K.block[K.o_x + i] += c_K * change
+            K.block[K.o_x + i] += c_K * change - by_x * guess
     for k in range(m):
         place = K.o_lam + K.rows[k]
-        K.block[place] = moved(K.block[place], K.starts[o + place])
-    by_v = without_tangent(c_C)
-    by_x = without_tangent(c_K)
+        guess = 0.0 if exact else derivative_of(K.block[place])
+        K.block[place] = without_tangent(K.starts[o + place]) + guess
+    if exact and K.correction_program > 0 and solve_straight(K, m, by_v, by_x, corrects):
+        finish(K, h)
+        return 0
     size = n + 2 * m if corrects else n + m
     if prepare_newton(K, m, size, by_v, by_x) != 0:
         return NOT_FOLLOWED
     o_Z = metric_place(K)
-    exact = K.vector == 1 and K.n_cones == 0  # is the matrix the derivative itself?
     before = 1e300
     for _ in range(MAX_CORRECTIONS):
         call(K, derivative_program(K), K.out)
@@ -125,6 +123,32 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
         before = change_of
     finish(K, h)
     return 0
+
+
+def solve_straight(K: Kernel, m: int, c_C: float, c_K: float, corrects: bool) -> bool:
+    """The same by straight-line code (`systems.step`), in the block; false where a pivot is too small."""
+    n = K.n
+    if m > 0 and K.stabilized == 1:
+        o_Z = metric_place(K)
+        o = n_inputs(K) + n + K.n_rows + K.n_v
+        for k in range(m):
+            for j in range(K.n_v):
+                K.block[o + k * K.n_v + j] = without_tangent(K.starts[o_Z + k * (n + m) + j]) if corrects else 0.0
+        K.block[o + m * K.n_v] = 0.0 if corrects else 1.0
+    call(K, solved_program(K), K.out)
+    if without_tangent(K.out[0]) != 1.0:
+        return False
+    for i in range(n):
+        change = derivative_of(K.out[i])
+        K.block[K.o_a + i] += change
+        K.block[K.o_v + i] += c_C * change
+        if i < K.n_v:
+            shift = derivative_of(K.out[n + m + i]) if corrects else 0.0
+            K.shift1[i] += shift
+            K.block[K.o_x + i] += c_K * change + shift
+    for k in range(m):
+        K.block[K.o_lam + K.rows[k]] += derivative_of(K.out[n + k])
+    return True
 
 
 def is_later_matrix(K: Kernel) -> bool:
@@ -222,24 +246,40 @@ def prepare_metric(K: Kernel, m: int) -> int:
     return 0
 
 
-def begin_corrections(K: Kernel, m: int) -> bool:
+def begin_corrections(K: Kernel, m: int, c_C: float) -> bool:
     """The position correction of the solution in the block, with the derivatives −K₀⁻¹ δK₀ W; whether K₀ is regular."""
     size = K.n + m
     at = n_inputs(K)
     shift = solution_place(K) + at - K.n_v
+    if K.correction_program > 0 and K.vector == 1 and largest_derivative(c_C) == 0.0:  # the step is held
+        for i in range(K.n_v):
+            K.block[at + i] = without_tangent(K.starts[shift + i])
+        call(K, metric_program(K), K.out)
+        if without_tangent(K.out[m * K.n_v]) == 1.0:
+            o_Z = metric_place(K)
+            for k in range(m):
+                for i in range(K.n_v):
+                    K.starts[o_Z + k * size + i] = without_tangent(K.out[k * K.n_v + i])
+            take_shift(K, shift)
+            return True
     if prepare_metric(K, m) != 0:
         return False
     for i in range(size + K.n_v):
         K.block[at + i] = without_tangent(K.starts[at + i])
     call(K, turned_program(K), K.spare)
     for i in range(size):
-        K.work[i] = -derivative_of(K.spare[i])
-    solve_plain(K.kkt, size, K.pivots, K.work, 0)
+        K.out[i] = -derivative_of(K.spare[i])
+    solve_plain(K.kkt, size, K.pivots, K.out, 0)
+    take_shift(K, shift)
+    return True
+
+
+def take_shift(K: Kernel, shift: int) -> None:
+    """The position correction of the solution in the block, with the derivatives in K.out."""
     for i in range(K.n_v):
-        found = without_tangent(K.starts[shift + i]) + derivative_of(K.work[i])
+        found = without_tangent(K.starts[shift + i]) + derivative_of(K.out[i])
         K.block[K.o_x + i] += found - K.shift1[i]
         K.shift1[i] = found
-    return True
 
 
 def further_corrections() -> int:

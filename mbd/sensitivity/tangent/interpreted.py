@@ -188,7 +188,7 @@ class Table:
     def evaluate(self, number: int, inputs: Pair | None, out: Pair) -> None:
         """A program with its derivatives."""
         block, parameters = self.pair("block") if inputs is None else inputs, self.pair("params")
-        change = self._programs[number].product(block, parameters)
+        change = self._programs[number].product(block, parameters, out.values)
         self.kernel.code[number](block.values, parameters.values, out.values)
         out.of[: len(change)] = change
 

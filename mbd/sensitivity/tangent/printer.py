@@ -91,7 +91,7 @@ def entry(name: str, number: str, to: str) -> str:
 
 PRODUCT = f"""\
 define internal void @product(
-  ptr %program, ptr %block, ptr %params, ptr %of.block, ptr %of.params, ptr %of.out
+  ptr %program, ptr %block, ptr %params, ptr %out, ptr %of.block, ptr %of.params, ptr %of.out
 ) noinline {{
 entry:
   %code = load ptr, ptr %program
@@ -183,10 +183,31 @@ store:
   %k.next = add i64 %k, 1
   br label %lines
 end:
+  %bytes.at = getelementptr i64, ptr %program, i64 12
+  %bytes = load i64, ptr %bytes.at
+  %solved = icmp ne i64 %bytes, 0
+  br i1 %solved, label %solution, label %done
+solution:
+  %values.at = getelementptr i64, ptr %program, i64 11
+  %values = load ptr, ptr %values.at
+  call void @llvm.memcpy.p0.p0.i64(ptr %out, ptr %values, i64 %bytes, i1 false)
+  %answer.at = getelementptr i64, ptr %program, i64 10
+  %answer = load ptr, ptr %answer.at
+  %known = icmp ne ptr %answer, null
+  br i1 %known, label %answered, label %done
+answered:
+  %factors.at = getelementptr i64, ptr %program, i64 13
+  %factors = load ptr, ptr %factors.at
+  call void %answer(ptr %factors, ptr %of.out)
+  br label %done
+done:
   ret void
 }}
 """
-"""Derivatives of a program at its inputs, entry by entry, times those of the inputs (see `programs.Derivative`)."""
+"""Derivatives of a program at its inputs, entry by entry, times those of the inputs (see `programs.Derivative`).
+
+Where these are residuals of a system, its solution and what it makes of these derivatives take their place.
+"""
 
 
 class Dual(str):
@@ -216,6 +237,7 @@ def tangent_text(functions: Sequence[tree.Function], entry: str, held: Collectio
     needed = _reached(functions[-1].symbol, {_name(each): each.called for each in (*bodies, *plain)})
     texts = [body.text(calls[_name(body)] == 1) for body in (*plain, *bodies) if _name(body) in needed]
     head = HEAD + "declare double @log(double) nounwind nobuiltin willreturn memory(none)\n"
+    head += "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)\n"
     head += f"declare {VECTOR} @llvm.fabs.v{WIDTH}f64({VECTOR})\n"
     whole = f"<{WIDTH} x i64>"
     head += f"declare {whole} @llvm.umax.v{WIDTH}i64({whole}, {whole})\n"
@@ -543,8 +565,8 @@ class TangentBody(Body):
         places = [self.emit(f"getelementptr inbounds ptr, ptr {each}, i64 {number}") for each in code]
         function, program = (self.emit(f"load ptr, ptr {place}") for place in places)
         self.lines.append(
-            f"call void @product(ptr {program}, ptr {block[0]}, ptr {params[0]}, ptr {block[1]}, ptr {params[1]}, "
-            f"ptr {of(out)[0]})"
+            f"call void @product(ptr {program}, ptr {block[0]}, ptr {params[0]}, ptr {out}, ptr {block[1]}, "
+            f"ptr {params[1]}, ptr {of(out)[0]})"
         )
         self.lines.append(f"call void {function}(ptr {block[0]}, ptr {params[0]}, ptr {out})")
         return ""

@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
-from mbd.equations.inputs import Inputs
+from mbd.sensitivity.tangent.answers import Answer, answer_of
 from mbd.sensitivity.tangent.interpreted import Pair
 from mbd.sensitivity.tangent.printer import LANES
+from mbd.sensitivity.tangent.systems import System, balance, metric, plus, rates, step
 from mbd.simulation.run.shelves import CACHE_LINE_BYTES, NUMBER_BYTES
-from mbd.tape.derivatives import jvps, live
+from mbd.tape.derivatives import jvps, live, substitute
 from mbd.tape.node import Node
 
 __all__ = ["Derivative", "derivatives_of_modes", "derivatives_of_programs", "lanes", "no_values"]
@@ -25,6 +26,11 @@ __all__ = ["Derivative", "derivatives_of_modes", "derivatives_of_programs", "lan
 BALANCE, NO_VALUES = "tangent_balance", "tangent_without_values"
 WITHOUT = ("switch",)
 """Inputs that never have derivatives: whether penalties act."""
+OF_STEPS = (*WITHOUT, "a", "s", "lam", "held")
+OF_TURNED = (*WITHOUT, "held", "shift")
+OF_METRICS = (*OF_TURNED, "turned", "c")
+OF_RATES = (*WITHOUT, "a", "s", "lam", "c")
+"""The same of systems that are solved for rates and multipliers, and of what turns with a matrix."""
 
 
 class Derivative:
@@ -39,15 +45,16 @@ class Derivative:
     Attributes
     ----------
     address : of ``[code, outputs, ends of their lines, columns, numbers, inputs, places, second places, room,
-        found]``, with the best code that there is now, as `printer.PRODUCT` reads it: columns are numbers of inputs;
-        where their derivatives are is found first, of sums of two places in the room
+        found, answer, values, their bytes, factors]``, with the best code that there is now, as `printer.PRODUCT` reads
+        it: columns are numbers of inputs; where their derivatives are is found first, of sums of two places in the
+        room; of a program that solves, `answer` turns what was found into the derivatives of its values
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
         name: str,
-        outputs: Callable[[], Sequence[Node]],
+        outputs: Callable[[], Sequence[Node] | System],
         places: Sequence[int],
         first: int = 0,
         without: Sequence[str] = WITHOUT,
@@ -55,17 +62,23 @@ class Derivative:
         symbol = f"tangent_{name}_by_{'_'.join(map(str, places))}"
 
         def made() -> tuple[_Entries, int]:
-            nodes = outputs()
-            return _made(mechanism, f"tangent_{len(mechanism.common)}", nodes, places, without), len(nodes)
+            found = outputs()
+            system = found if isinstance(found, System) else System(found)
+            entries = _made(mechanism, f"tangent_{len(mechanism.common)}", system, places, without)
+            return entries, len(system.lines)
 
         known, count = mechanism.kept((Derivative, symbol), made)
         self._known, self._size, self._lines = known, first + count, known.lines + first
         self._ends = np.searchsorted(self._lines, np.arange(self._size), side="right")
-        self._numbers, self._room = np.zeros(max(len(known.lines), 1)), lanes(len(known.inputs))
+        solved, answer = len(known.lines) + known.values, known.answer
+        self._numbers = np.zeros(max(solved + (0 if answer is None else len(answer.factors)), 1))
+        self._room = lanes(len(known.inputs))
         self._found = np.zeros(max(len(known.inputs), 1), dtype=np.int64)
         arrays = self._ends, known.columns, self._numbers, known.inputs, known.others, self._room, self._found
         ends, columns, numbers, inputs, *others = (each.ctypes.data for each in arrays)
         words = [0, self._size, ends, columns, numbers, len(known.inputs), inputs, *others]
+        words += [0 if answer is None else answer.address, numbers + NUMBER_BYTES * len(known.lines)]
+        words += [NUMBER_BYTES * known.values, numbers + NUMBER_BYTES * solved]
         self._words = np.array(words, dtype=np.int64)
         self._address = int(self._words.ctypes.data)
 
@@ -80,8 +93,8 @@ class Derivative:
         """Whether better code is being made."""
         return self._known.function is not None and self._known.function.provisional
 
-    def product(self, block: Pair, parameters: Pair) -> Matrix:
-        """The derivatives of its outputs, in Python."""
+    def product(self, block: Pair, parameters: Pair, values: Vector) -> Matrix:
+        """The derivatives of its outputs, in Python; values : of outputs that are solved for, which it writes."""
         out = np.zeros((self._size, LANES))
         known = self._known
         if known.function is not None:
@@ -90,7 +103,9 @@ class Derivative:
             inputs[known.inputs < 0] = parameters.of[-1 - known.inputs[known.inputs < 0]]
             inputs[known.others >= 0] += block.of[known.others[known.others >= 0]]
             np.add.at(out, self._lines, self._numbers[: len(known.columns), None] * inputs[known.columns])
-        return out
+        solved = len(known.lines) + known.values
+        values[: known.values] = self._numbers[len(known.lines) : solved]
+        return out if known.answer is None else known.answer.taken(self._numbers[solved:], out)
 
 
 def lanes(count: int) -> Matrix:
@@ -109,21 +124,23 @@ class _Entries:
     """
 
     function: Any
+    values: int
+    answer: Answer | None
     lines: NDArray[np.int64]
     columns: NDArray[np.int64]
     inputs: NDArray[np.int64]
     others: NDArray[np.int64]
 
 
-def _made(
-    mechanism: Mechanism, symbol: str, outputs: Sequence[Node], places: Sequence[int], without: Sequence[str]
-) -> _Entries:
+def _made(mechanism: Mechanism, symbol: str, system: System, places: Sequence[int], without: Sequence[str]) -> _Entries:
     """The derivatives of some outputs that are not always 0."""
+    outputs = system.lines
     layout, wanted = mechanism.layout, set(places)
     inputs = [node for node in live(outputs) if node.op == "input"]
     inputs = [
-        each for each in inputs if each.data[0] not in without and (each.data[0] != "p" or each.data[1] in wanted)
-    ]
+        each for each in inputs
+        if each.data[0] not in without and (each.data[0] != "p" or each.data[1] in wanted) and each not in system.known
+    ]  # fmt: skip
     slopes = jvps(outputs, [{node: 1.0} for node in inputs]) if inputs else []
     found = {node.data: each for node, each in zip(inputs, slopes, strict=True)}
     made, own, others = list[tuple[int, int, Node]](), list[int](), list[int]()
@@ -138,11 +155,17 @@ def _made(
         made += [(line, len(own), entry) for line, entry in enumerate(column) if not entry.is_zero]
         own.append(-1 - index if kind == "p" else layout.place(kind, index))
     made.sort(key=lambda each: each[0])
-    if made:
-        mechanism.common.add({symbol: [entry for _, _, entry in made]}, soon=True)
-    function = mechanism.common[symbol] if made else None
+    numbers, answer = substitute([entry for _, _, entry in made], system.known), None
+    if system.answer is not None:
+        given = [mechanism.equations.tape.input("lane", k) for k in range(len(outputs))]
+        answer = answer_of(system.answer(given), mechanism.backend.name == "llvm")
+        numbers = [*numbers, *system.values, *answer.factors]
+    if numbers:
+        mechanism.common.add({symbol: numbers}, soon=True)
+    function = mechanism.common[symbol] if numbers else None
     lines, columns = ([each[k] for each in made] for k in (0, 1))
-    return _Entries(function, *(np.array(each, dtype=np.int64) for each in (lines, columns, own, others)))
+    arrays = [np.array(each, dtype=np.int64) for each in (lines, columns, own, others)]
+    return _Entries(function, len(system.values), answer, *arrays)
 
 
 def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list[Derivative]:
@@ -160,23 +183,8 @@ def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list
         "chart_motion": none if vector else lambda: chart_motion(equations), "free_rates": none,
     }  # fmt: skip
     found = [Derivative(mechanism, name, outputs, places) for name, outputs in named.items()]
-    held = (*WITHOUT, "a", "s", "lam", "c")
-    return [*found, Derivative(mechanism, BALANCE, lambda: balance(mechanism), places, without=held)]
-
-
-def balance(mechanism: Mechanism) -> list[Node]:
-    """``M v̇ + f + R λ`` (n) and ``B v̇ + γ`` of all rows (R), at any v̇ and λ."""
-    equations, n, rows = mechanism.equations, mechanism.layout.n, mechanism.layout.n_rows
-    inputs, known, one = Inputs.of(equations), mechanism._accelerations, equations.tape.one
-    at_R, at_B = n * n + n, n * n + n + n * rows
-    at_bias = at_B + n * rows + 2 * rows
-    rates = [*inputs.a, *inputs.s, one, *inputs.lam]
-    lines = [
-        [*known[i * n : (i + 1) * n], known[n * n + i], *known[at_R + i * rows : at_R + (i + 1) * rows]]
-        for i in range(n)
-    ]
-    lines += [[*known[at_B + k * n : at_B + (k + 1) * n], known[at_bias + k]] for k in range(rows)]
-    return [_dot(line, rates[: len(line)]) for line in lines]
+    every = range(mechanism.layout.n_rows)
+    return [*found, Derivative(mechanism, BALANCE, lambda: balance(mechanism, every), places, 0, OF_RATES)]
 
 
 def no_values(mechanism: Mechanism) -> Any:
@@ -189,8 +197,12 @@ def no_values(mechanism: Mechanism) -> Any:
     return mechanism.kept(no_values, made)
 
 
-def derivatives_of_modes(mechanism: Mechanism, active: programs.ActiveSet, places: Sequence[int]) -> list[Derivative]:
-    """Of the tangent and the residual of a mode, and of the matrix times a correction W of positions.
+def derivatives_of_modes(
+    mechanism: Mechanism, active: programs.ActiveSet, places: Sequence[int], stepping: bool
+) -> list[Derivative]:
+    """Of the tangent and the residual of a mode, and with `stepping` of the matrix times a correction W of positions.
+
+    The last is that of the system of a step, or else of that of rates (`systems`).
 
     The matrix by itself is held, as Newton's method may take any; where it is a metric, `rules.begin_corrections` asks
     for ``K W`` with W held, which stands behind the block, and of rows on positions the part that is a change.
@@ -207,16 +219,16 @@ def derivatives_of_modes(mechanism: Mechanism, active: programs.ActiveSet, place
         whole = [tape.input("held", layout.size + k) for k in range(n + m)]
         parts = [tape.input("held", layout.size + n + m + k) for k in range(layout.n_v)]
         entire = [*(True for _ in range(n)), *(equations.rows[row].is_velocity for row in active.rows)]
-        return [_dot(entries[k * (n + m) : (k + 1) * (n + m)], whole if entire[k] else parts) for k in range(n + m)]
+        return [
+            plus(tape.zero, entries[k * (n + m) : (k + 1) * (n + m)], whole if entire[k] else parts)
+            for k in range(n + m)
+        ]
 
     found = [Derivative(mechanism, name, residual, places, first) for first in (size, 0)]
-    if not active.stabilized or not m:
-        return [*found, found[-1]]
-    return [*found, Derivative(mechanism, f"turned_{active}", turned, places, without=("switch", "held", "shift"))]
-
-
-def _dot(a: Sequence[Node], b: Sequence[Node]) -> Node:
-    found = a[0] * b[0]
-    for left, right in zip(a[1:], b[1:], strict=False):
-        found = found + left * right
-    return found
+    found += found[-1:]
+    if not stepping:
+        return [*found, Derivative(mechanism, f"rates_{active}", lambda: rates(mechanism, active), places, 0, OF_RATES)]
+    if active.stabilized and m:
+        found[-1] = Derivative(mechanism, f"turned_{active}", turned, places, 0, OF_TURNED)
+    found.append(Derivative(mechanism, f"step_{active}", lambda: step(mechanism, active), places, 0, OF_STEPS))
+    return [*found, Derivative(mechanism, f"metric_{active}", lambda: metric(mechanism, active), places, 0, OF_METRICS)]

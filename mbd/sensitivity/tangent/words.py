@@ -11,9 +11,10 @@ from mbd.kernel.codes import PASSING
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
-    "MAX_CONTRACTION", "MAX_CORRECTIONS", "are_corrected", "at_root", "derivative_of", "every_row_place",
-    "is_differentiated", "largest_derivative", "metric_place", "moved", "n_inputs", "seed_rate", "seeded",
-    "solution_place", "solve_plain", "step_place", "takes_part", "was_near_singular", "without_tangent",
+    "MAX_CONTRACTION", "MAX_CORRECTIONS", "are_corrected", "at_root", "derivative_of", "derivative_program",
+    "every_row_place", "is_differentiated", "largest_derivative", "metric_place", "metric_program", "moved", "n_inputs",
+    "seed_rate", "seeded", "solution_place", "solve_plain", "solved_program", "step_place", "takes_part",
+    "turned_program", "was_near_singular", "without_tangent",
 ]  # fmt: skip
 
 MAX_CONTRACTION = 0.9
@@ -151,3 +152,23 @@ def metric_place(K: Kernel) -> int:
     """Where columns of K₀⁻¹, or stages, begin in K.starts."""
     kept = K.n_q + 4 * K.n + 2 * K.n_rows + 1 + 2 * K.n_v + K.n_watched + K.n_frictions
     return int(every_row_place(K) + 1 + kept)
+
+
+def turned_program(K: Kernel) -> int:
+    """The number of the program whose derivative is that of Newton's matrix times a given W (see `programs`)."""
+    return int(K.residual_program + (3 if K.correction_program > 0 else 1))
+
+
+def derivative_program(K: Kernel) -> int:
+    """The number of the program that has the derivatives of the residual, and no values."""
+    return turned_program(K) + 1
+
+
+def solved_program(K: Kernel) -> int:
+    """The number of the program of the system of a step, or of rates (see `systems`)."""
+    return int(derivative_program(K) + (3 if K.rates_program > 0 else 1))
+
+
+def metric_program(K: Kernel) -> int:
+    """That of a position correction of a step."""
+    return solved_program(K) + 1
