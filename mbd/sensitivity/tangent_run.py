@@ -32,7 +32,7 @@ DIRECTIONS = LANES - 1
 """Directions of one run: the last derivative is that by the size of a step."""
 WITH_DERIVATIVES = frozenset(TABLE.real_arrays) - {"shift1"}
 """Arrays that have derivatives of their own: `shift1` is a part of another."""
-WRITTEN_FIRST = frozenset(("store", "log", "starts", "spare", "out", "kkt", "acc", "rhs", "work"))
+WRITTEN_FIRST = frozenset(("store", "log", "starts", "spare", "out", "kkt", "acc", "rhs", "work", "coupled"))
 """Large arrays whose derivatives are written before they are read: rows, events, and what is computed at once."""
 Lanes = NDArray[np.float64]
 

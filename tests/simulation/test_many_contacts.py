@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import mbd
+from mbd.kernel.contact import nonsmooth, nonsmooth_cones
+from mbd.kernel.stepping import restart
 from tests.integrators.test_order import started
 from tests.kernel.test_twin import served_pendulum
 from tests.simulation.mechanisms import G, run
@@ -105,3 +107,27 @@ def test_a_first_order_state_follows_its_equation_and_can_be_reset():
     model.constrain(mbd.Event("jolt", mbd.measure(lambda t: t - 0.1, "t"), reset=lambda named: {"drive.torque": 3.0}))
     jolted = run(model, {"hinge.angle": 0.3}, dt=1e-3, until=0.2)
     assert jolted.at(0.1, side="right")["drive.torque"] == 3.0
+
+
+@pytest.mark.parametrize("pushed", [0.0, 3.0], ids=["standing", "sliding"])
+def test_steps_in_which_nothing_pulls_or_slips_look_at_no_forces_of_clusters(pushed, monkeypatch):
+    """The round-off of forces is asked for only of a contact that pulls, or friction beyond its limit: not of each."""
+    asked = list[int]()
+
+    def counted(K, row):
+        asked.append(row)
+        return restart.largest_force(K, row)
+
+    for module in (nonsmooth, nonsmooth_cones):
+        monkeypatch.setattr(module, "largest_force", counted, raising=False)
+    model = mbd.Model("points on the ground")
+    for k in range(3):
+        point = mbd.PointMass(f"point {k}", 1.0)
+        model.connect(mbd.Translation(f"place {k}", model.ground.origin, point.origin))
+        model.constrain(mbd.Unilateral(f"contact {k}", mbd.touchdown(point.origin), friction=0.2))
+        model.apply(mbd.Applied(f"push {k}", point.origin, force=(pushed, 0.0, 0.0)))
+    start = mbd.assemble(model, closed=[f"contact {k}" for k in range(3)], velocity={"place 0.x": pushed})
+    found = mbd.simulate(model, start, dt=0.01, until=0.1, contact="nonsmooth", backend="python", progress=False)
+    assert found["contact 2.force"][-1] == pytest.approx(G, rel=1e-9)
+    assert not asked or pushed  # those that begin to slide are beyond their limits once
+    assert len(asked) <= 4

@@ -20,12 +20,12 @@ from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import follows
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
-from mbd.kernel.contact.nonsmooth_cones import hold_together, release, turned_in_plane
+from mbd.kernel.contact.nonsmooth_cones import hold_together, pulls, release, turned_in_plane
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.events.switching import close_by_impact, mark_touching
 from mbd.kernel.records import Balance, ContactForces, ContactRows, Guards, Reals, Switching
 from mbd.kernel.stepping.candidate import accept_candidate, carry
-from mbd.kernel.stepping.restart import consistent, displace, evaluate, is_held, largest_force, take_consistent
+from mbd.kernel.stepping.restart import consistent, displace, evaluate, is_held, take_consistent
 
 __all__ = ["keep", "closes_below_surface", "must_release", "put_back", "rebound", "strike"]
 
@@ -60,7 +60,7 @@ def must_release(K: Switching, t1: float) -> int:
             K.slip[f] = 0.0
             continue
         if not follows(K, f):
-            count += release(K, f, PULL * largest_force(K, K.friction_row[f]))
+            count += release(K, f)
     if count > 0:
         for f in range(K.n_frictions):
             if K.let_go[f] == 1 and K.slip[f] != 0.0:
@@ -68,13 +68,6 @@ def must_release(K: Switching, t1: float) -> int:
         K.restart_due = 2
         K.n_repeats += 1
     return count
-
-
-def pulls(K: ContactRows, c: int, lam: Reals, part: float) -> bool:
-    """Whether contact c, closed, opens on pull and does so by more than this part of the forces."""
-    if K.kind[c] != 0 or K.closed[c] == 0 or K.opens[c] != 0:
-        return False
-    return bool(lam[K.normal[c]] > part * largest_force(K, K.normal[c]))
 
 
 def any_pulls(K: ContactRows, lam: Reals, part: float) -> bool:

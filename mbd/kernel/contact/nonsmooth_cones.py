@@ -25,7 +25,7 @@ from mbd.kernel.contact.cones import (
 from mbd.kernel.records import Balance, ContactRows, Frictions, Guards, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate, evaluate_loaded, largest_force, limit_of
 
-__all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "release", "turned_in_plane"]
+__all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "pulls", "release", "turned_in_plane"]
 
 
 def hold_for_step(K: Switching, h: float) -> None:
@@ -61,9 +61,9 @@ def turned_in_plane(K: Guards, f: int) -> bool:
     return bool(forward <= REST_SPEED or away(K, f, K.guards1, K.at_slip) > NOMINAL_RTOL * forward)
 
 
-def release(K: Switching, f: int, least: float) -> int:
+def release(K: Switching, f: int) -> int:
     """1 if the group of f sticks beyond its limit at the candidate: it slides as it was pulled."""
-    slips = K.sticks[f] == 1 and friction_size(K, f, K.lam1) - K.guards1[K.at_limit + f] > least
+    slips = K.sticks[f] == 1 and is_beyond(K, f, K.lam1, K.guards1[K.at_limit + f])
     for g in range(f, f + K.group_size[f]):
         if slips or K.n_repeats == 0:
             K.let_go[g] = 1 if slips else 0
@@ -102,9 +102,21 @@ def is_within(K: ContactRows, lam: Reals) -> bool:
     """Whether no contact that opens on pull pulls, and no friction sticks beyond its limit, by these multipliers."""
     within = True
     for c in range(K.n_contacts):
-        if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0:
-            within = within and lam[K.normal[c]] <= PULL * largest_force(K, K.normal[c])
+        within = within and not pulls(K, c, lam, PULL)
     for f in range(K.n_frictions):
-        if K.sticks[f] == 1:
-            within = within and friction_size(K, f, lam) - K.limit[f] <= PULL * largest_force(K, K.friction_row[f])
+        within = within and not (K.sticks[f] == 1 and is_beyond(K, f, lam, K.limit[f]))
     return within
+
+
+def pulls(K: ContactRows, c: int, lam: Reals, part: float) -> bool:
+    """Whether contact c, closed, opens on pull and does so by more than this part of the forces."""
+    if K.kind[c] != 0 or K.closed[c] == 0 or K.opens[c] != 0:
+        return False
+    pull = lam[K.normal[c]]
+    return bool(pull > 0.0 and pull > part * largest_force(K, K.normal[c]))
+
+
+def is_beyond(K: ContactRows, f: int, lam: Reals, limit: float) -> bool:
+    """Whether a friction is larger than its limit, by more than the round-off of the forces."""
+    excess = friction_size(K, f, lam) - limit
+    return bool(excess > 0.0 and excess > PULL * largest_force(K, K.friction_row[f]))

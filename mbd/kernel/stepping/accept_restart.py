@@ -62,7 +62,7 @@ def would_pull(K: Balance) -> bool:
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.closed[c] == 1 and K.opens[c] == 0:
             row = K.normal[c]
-            if K.lam[row] <= 0.0 and K.impulse[row] > PULL * largest_force(K, row):
+            if K.lam[row] <= 0.0 < K.impulse[row] and K.impulse[row] > PULL * largest_force(K, row):
                 return True
     return False
 
