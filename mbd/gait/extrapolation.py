@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.equal import EQUAL_RTOL, MIN_DIVISOR
+from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, MIN_DIVISOR
 
 __all__ = ["extrapolated", "slopes_of"]
 
@@ -38,7 +38,8 @@ def extrapolated(slopes: Sequence[Vector], errors: float = 4.0) -> tuple[Vector,
 def slopes_of(function: Callable[[float], Mapping[str, float]], at: float) -> dict[str, float] | None:
     """Derivatives of the parameters that a function of one value gives, which may be any Python.
 
-    None where differences do not agree to `EQUAL_RTOL`.
+    None where differences do not agree to `EQUAL_RTOL`, or what has changed is lost to round-off, as of a parameter
+    beside one that passes zero, which changes by all of itself however short a difference is.
     """
     names = list(function(at))
 
@@ -47,6 +48,7 @@ def slopes_of(function: Callable[[float], Mapping[str, float]], at: float) -> di
 
     try:
         h = abs(at) or 1.0
+        seen = np.not_equal(*ends(h))
         for _ in range(FUNCTION_TRIES):  # whatever the unit of the value
             high, low = ends(h)
             change = float(np.max(np.abs(high - low) / np.maximum(np.maximum(np.abs(high), np.abs(low)), MIN_DIVISOR)))
@@ -56,6 +58,8 @@ def slopes_of(function: Callable[[float], Mapping[str, float]], at: float) -> di
         levels = [h * 2.0 ** (level + 1 - FUNCTION_LEVELS) for level in range(FUNCTION_LEVELS)]
         found = [ends(each) for each in levels]
     except (ArithmeticError, ValueError, KeyError):
+        return None
+    if np.any(seen & (np.abs(np.subtract(*found[0])) <= HALF_PRECISION_RTOL * np.max(np.abs(found[0]), axis=0))):
         return None
     by, error = extrapolated([(high - low) / (2.0 * each) for (high, low), each in zip(found, levels, strict=True)])
     sizes = np.maximum(np.abs(by), np.max(np.abs(found[-1]), axis=0) / h)

@@ -9,6 +9,8 @@ import pytest
 import sympy
 
 import mbd
+from mbd.gait.extrapolation import slopes_of
+from mbd.gait.map_derivative import map_derivative
 from tests.cases.walkers import compass
 from tests.gait.test_branches import mapped
 
@@ -138,3 +140,37 @@ def test_a_branch_ends_where_the_model_allows_no_further_value():
     gait = mbd.limit_cycle(model, start, section="right foot", mirror=("left", "right")).at({"hip.mass": 6.0})
     found = mbd.branch(gait, "hip.mass", to=-30.0)
     assert found["hip.mass"][-1] == 0.0 and "ends at hip.mass = 0: beyond it body 'hip': mass" in found.stopped
+
+
+FUNCTIONS = {
+    "a parameter that passes zero": (lambda s: {"p": 0.1 * (s - 1.0)}, 1.0, (0.1,)),
+    "one beside it": (lambda s: {"p": 0.1 * (s - 1.0), "q": s}, 1.0, (0.1, 1.0)),
+    "one beside it, at zero": (lambda s: {"p": math.sin(s), "q": 1.0 + s}, 0.0, (1.0, 1.0)),
+    "zero up to round-off": (lambda s: {"p": math.sin(math.pi * s), "q": s}, 1.0, (-math.pi, 1.0)),
+    "level ground": (lambda s: {"p": math.sin(s), "q": -math.cos(s)}, 0.0, (1.0, 0.0)),
+    "a slope": (lambda s: {"p": math.sin(s), "q": -math.cos(s)}, 0.05, (math.cos(0.05), math.sin(0.05))),
+    "a tiny unit": (lambda s: {"p": 1.0 + 1e-9 * s}, 1.0, (1e-9,)),
+    "a constant beside": (lambda s: {"p": math.exp(s), "q": 3.0}, 1.0, (math.e, 0.0)),
+}
+
+
+def test_slopes_of_functions_are_right_or_unknown():
+    """Where they are unknown derivatives follow from differences of runs."""
+    known = []
+    for title, (function, at, expected) in FUNCTIONS.items():
+        found = slopes_of(function, at)
+        if found is not None:
+            known.append(title)
+            np.testing.assert_allclose([*found.values()], expected, rtol=1e-8, atol=1e-12, err_msg=title)
+    assert known == ["level ground", "a slope", "a tiny unit", "a constant beside"]
+
+
+def test_a_parameter_that_passes_zero_beside_another_hides_no_derivative():
+    """x = √(p + k) of x' = p + k + x − x², where s gives p = 0.16 s and k = 0.1 (s − 1), at s = 1."""
+    model = mapped("p + k + x - x**2", "0.01*y")
+    start = mbd.assemble(model, {"x": 0.4, "y": 0.0}, {"clock": 1.0})
+    given = {"s": lambda s: {"p": 0.16 * s, "k": 0.1 * (s - 1.0)}}
+    gait = mbd.limit_cycle(model, start, section="tick", parameters={"s": 1.0}, functions=given, dt=0.25)
+    assert math.isclose(gait.derivatives["largest multiplier", "s"], -0.26 / 0.4, rel_tol=1e-6)
+    by = map_derivative(gait.map, gait.chart, np.zeros(gait.chart.size), gait.parameters, ["s"]).matrix[:, -1]
+    assert math.isclose(float(np.max(np.abs(by))), 0.26, rel_tol=1e-6)
