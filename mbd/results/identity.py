@@ -8,13 +8,15 @@ of the list counts by its name. What cannot be read has no digest, and is named.
 
 from __future__ import annotations
 
+import copyreg
 import dis
 import functools
 import importlib
+import os
 import sys
 import types
 from collections.abc import Iterable
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from hashlib import sha256
 from typing import Any
 
@@ -26,13 +28,17 @@ from mbd.compile.same_words import CannotTellError, Reader, codes_of, values_of
 from mbd.errors import ModelError
 from mbd.results.storage import Archive, contents
 from mbd.results.trajectory import Trajectory
-from mbd.state import State
 from mbd.tape.node import Node
 
 __all__ = ["identity", "identity_of_model"]
 
 PACKAGES = {"mbd", "numpy", "scipy", "sympy", "networkx", "pandas", "xarray", "matplotlib"}
 """What is in them is what its name says; packages of users' own change, wherever they are installed."""
+
+LIBRARY = os.path.dirname(os.__file__)
+"""Where the modules of Python are."""
+HISTORY = {"moved", "runs", "manager", "chart"}
+"""Fields of words of mbd that tell how a value was found, or follow from a mechanism and a state beside."""
 
 OF_PYTHON = frozenset({
     "__dict__", "__weakref__", "__doc__", "__module__", "__qualname__", "__annotations__", "__annotate__",
@@ -54,8 +60,10 @@ def identity(*values: Any) -> str:
     try:
         return _Reader().digest(values)[:24]
     except CannotTellError as error:
+        item, *through = error.args
+        why = f", which uses {', '.join(map(repr, through))}" if through else ""
         raise ModelError(
-            f"file: the study depends on {shown(error.args[0]):.120}, of which nobody can tell whether it will be the "
+            f"file: the study depends on {shown(item):.120}{why}, of which nobody can tell whether it will be the "
             "same in another process; let functions refer to numbers, texts, functions and objects that can be "
             "pickled, or leave file= out"
         ) from None
@@ -63,11 +71,15 @@ def identity(*values: Any) -> str:
 
 def identity_of_model(model: Any, mechanism: Mechanism) -> dict[str, str]:
     """Digests of a model: of its words, whatever is written in them, and of the equations that its laws became."""
-    equations = mechanism.equations
-    laws = (equations.balance, equations.rows, equations.contacts, equations.guards, equations.frictions)
     kinds = ("joints", "forces", "constraints", "controllers", "markers", "observations", "gravity", "cut")
     words = [getattr(model, kind, ()) for kind in kinds] if hasattr(model, "joints") else model
-    return {"model": identity(words), "equations": identity(laws)}
+    return {"model": identity(words), "equations": identity(_laws(mechanism))}
+
+
+def _laws(mechanism: Mechanism) -> tuple[Any, ...]:
+    """What the laws of a model became."""
+    equations = mechanism.equations
+    return equations.balance, equations.rows, equations.contacts, equations.guards, equations.frictions
 
 
 class _Reader(Reader):
@@ -92,16 +104,29 @@ class _Reader(Reader):
         if kind is Node:
             return self.of_node(item), ()
         if kind is Trajectory:
-            arrays, words = contents(item.record, Archive.of(item))
-            return "run", [arrays, {name: part for name, part in words.items() if name != "stats"}]
-        if kind is State:
-            return "state", [getattr(item, field.name) for field in fields(item) if field.name != "moved"]
+            return "run", self.of_run(item)
+        if kind is Mechanism:
+            inputs = [(each.name, each.value) for each in item.equations.parameters]
+            return f"mechanism {type(self)().digest((_laws(item), inputs))}", ()  # by itself: models may share it
         try:
             return super().parts(item)
         except CannotTellError:
+            if kind is types.FunctionType:
+                raise
             if isinstance(item, type):
                 return f"class {item.__module__}.{item.__qualname__}", self.of_class(item)
             return kind.__name__, self.of_object(item)
+
+    def of_word(self, item: Any) -> tuple[str, Iterable[Any]]:
+        """A word of `mbd` without what changes no run."""
+        title, names = self.kinds[type(item)]
+        return title, [getattr(item, name, None) for name in names if name not in HISTORY]
+
+    def of_run(self, run: Trajectory) -> list[Any]:
+        """Its rows. Expressions behind them come from the cache or from a derivation, with other numbers of nodes."""
+        arrays, words = contents(run.record, Archive.of(run))
+        rows = {name: each for name, each in arrays.items() if not name.startswith("graph")}
+        return [rows, {name: part for name, part in words.items() if name not in ("stats", "expressions")}]
 
     def of_class(self, item: type) -> list[Any]:
         """All that a class defines, and its bases."""
@@ -120,7 +145,9 @@ class _Reader(Reader):
         try:
             made = item.__reduce_ex__(4)
         except Exception:  # locks, files and objects of users' own raise what they like
-            raise CannotTellError(item) from None
+            if type(item) not in copyreg.dispatch_table:
+                raise CannotTellError(item) from None
+            made = copyreg.dispatch_table[type(item)](item)
         if isinstance(made, str):
             return [type(item), made]
         return [type(item), *made[:3], *(list(each or ()) for each in made[3:5])]
@@ -133,7 +160,7 @@ class _Reader(Reader):
         codes = [*codes_of(function.__code__)]
         names = {name for code in codes for name in code.co_names}
         if names & self.unreadable:
-            raise CannotTellError(function)
+            raise CannotTellError(function, *sorted(names & self.unreadable))
         known = {name: function.__globals__[name] for name in names & function.__globals__.keys()}
         known |= {module.__name__: module for module in _imported(function, codes)}
         return [*held, {name: self.used(known[name], names, set()) for name in sorted(known)}]
@@ -145,6 +172,14 @@ class _Reader(Reader):
         seen = seen | {value.__name__}
         found = {name: getattr(value, name) for name in sorted(names) if hasattr(value, name)}
         return [value.__name__, {name: self.used(each, names, seen) for name, each in found.items()}]
+
+    def is_of_package(self, module: str) -> bool:
+        """Whether a module belongs to one of the packages; a file of the user's may have the name of one of Python."""
+        name = module.partition(".")[0]
+        if name not in sys.stdlib_module_names:
+            return name in self.packages
+        file = getattr(sys.modules.get(name), "__file__", None)
+        return file is None or file.startswith(LIBRARY)
 
     def of_node(self, root: Node) -> str:
         """An expression by its structure."""

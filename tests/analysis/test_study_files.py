@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import subprocess
 import sys
 import threading
 import types
+from collections import OrderedDict
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +18,7 @@ import pytest
 
 import mbd
 from mbd.results.identity import identity
+from tests.gait.test_families import runner
 
 STRENGTH = 1.0
 
@@ -266,3 +269,50 @@ def test_what_cannot_be_read_is_refused_by_name(unknown, tmp_path):
     with pytest.raises(mbd.ModelError, match="file: the study depends on <.*nobody can tell whether .*leave file= out"):
         study(tmp_path / "a", results={"swing": lambda run: unknown})
     study(tmp_path / "b", results={"swing": lambda run: 1.0})
+
+
+def test_runs_count_as_the_same_whether_their_equations_were_derived_or_remembered(monkeypatch):
+    def digest(remembers):
+        monkeypatch.setattr("mbd.compile.remembered.ENABLED", remembers)
+        monkeypatch.setattr("mbd.compile.mechanisms._BY_WORDS", OrderedDict())
+        model = pendulum()
+        return identity(mbd.simulate(model, mbd.assemble(model, {"pin.angle": 0.3}), dt=0.01, until=0.1))
+
+    assert len({digest(remembers) for remembers in (True, True, False)}) == 1
+
+
+def test_gaits_and_mechanisms_that_a_function_has_captured_count_whatever_was_done_with_them():
+    """A start from a gait nearby: `start=lambda p: gait.at(p).state`."""
+
+    def found(energy):
+        return mbd.limit_cycle(*runner(), section="apex", energy=energy)
+
+    def digest(gait):
+        return identity(lambda p: gait.at(p).state)
+
+    one, again, other = map(found, (1800.0, 1800.0, 1860.0))
+    before = digest(one)
+    assert again.at({"leg.stiffness": 20.1e3}).success and again.derivatives["period", "leg.stiffness"]
+    assert digest(again) == digest(one) == before != digest(other)
+    swings = [mbd.linearize(pendulum(loss=loss), mbd.assemble(pendulum())) for loss in (0.3, 0.3, 0.4)]
+    assert identity(swings[0]) == identity(swings[1]) != identity(swings[2])
+
+
+def test_a_module_of_the_user_with_a_name_of_pythons_is_read(tmp_path, monkeypatch):
+    def digest(strength):
+        own = types.ModuleType("profile")
+        own.__file__ = str(tmp_path / "profile.py")
+        monkeypatch.setitem(sys.modules, "profile", own)
+        exec(f"def swing(run): return {strength}", own.__dict__)
+        return identity(own.swing)
+
+    assert digest(1.0) == digest(1.0) != digest(2.0)
+
+
+def test_what_a_table_of_pythons_pickles_is_read():
+    assert identity(re.compile("a")) == identity(re.compile("a")) != identity(re.compile("b"))
+
+
+def test_the_error_names_what_a_function_reaches_others_by():
+    with pytest.raises(mbd.ModelError, match="<function .*uses 'getattr', of which nobody"):
+        identity(lambda run: getattr(run, "time"))  # noqa: B009
