@@ -375,11 +375,15 @@ class Mechanism:
         return later
 
     def order(self, rows: tuple[int, ...]) -> Any | None:
-        """The order in which matrices of accelerations with these rows are eliminated, None where it does not pay."""
+        """The order in which matrices of accelerations with these rows are eliminated, None where it does not pay.
+
+        Rows may depend on others: each is eliminated by its own pivot, which then is round-off of its terms. What a
+        pair of numbers leaves of another row does not show in that one's pivot.
+        """
 
         def make() -> Made:
             places = self._filled.places(self.layout.n, rows)
-            return {}, {"order": self._order(dict.fromkeys(places, True), rows)}
+            return {}, {"order": self._order(dict.fromkeys(places, False), rows)}
 
         question = "order of accelerations", rows
         return self.kept((Mechanism.order, rows), lambda: _numbers(self._compiled(question, make)["order"]))

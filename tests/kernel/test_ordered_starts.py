@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from random import Random
 
 import numpy as np
 import pytest
@@ -56,3 +57,22 @@ def test_mechanisms_cut_everywhere_start_as_by_a_search_for_pivots(seed, spatial
 
 def test_loops_start_as_by_a_search_for_pivots(monkeypatch):
     assert_starts_alike(*four_bars(12).start, monkeypatch)
+
+
+@pytest.mark.parametrize("seed", range(3, 11))
+def test_rows_that_are_multiples_of_each_other_are_found(seed, monkeypatch):
+    """Two angles in a ratio, told twice: of the second row numbers leave round-off alone, or nothing."""
+    draw = Random(seed)
+    model = mbd.Model("chains side by side")
+    for k in range(6):
+        end = model.ground.point(3.0 * k, 0.0)
+        for i in range(7):
+            rod = mbd.Link(f"rod {k} {i}", length=1.0, **mbd.rod(mass=draw.uniform(0.5, 2.0), length=1.0).link)
+            model.connect(mbd.Revolute(f"hinge {k} {i}", end, rod.start))
+            end = rod.end
+    one, other, times = (round(draw.uniform(*bounds), 2) for bounds in ((0.5, 5.0), (0.5, 5.0), (0.3, 0.95)))
+    for name, a, b in (("ratio", one, other), ("again", one * times, other * times)):
+        gear = mbd.measure(lambda x, y, a=a, b=b: a * x - b * y, "hinge 0 0.angle", "hinge 1 0.angle", unit="rad")
+        model.constrain(mbd.Bilateral(name, gear))
+    bent = {f"hinge {k} {i}.angle": 0.3 * np.sin(k + 2 * i) for k in range(6) for i in range(7) if k > 1 or i > 0}
+    assert assert_starts_alike(model, mbd.assemble(model, position=bent), monkeypatch)

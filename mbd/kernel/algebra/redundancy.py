@@ -92,7 +92,7 @@ def find_dependent(K: DependentRows, m: int) -> None:
 
 def are_independent(K: Equations, m: int, lengths: float, angles: float, others: float) -> bool:
     """Whether none of the m rows in K.rows is short and their matrix has an order whose pivots keep much of each."""
-    o = order_at(K, m)
+    o = order_at(K, m) if K.mode_id < 0 else 0  # those of modes eliminate pairs of numbers, and suppose that none does
     if o == 0:
         return False
     for k in range(m):
