@@ -79,3 +79,28 @@ def test_each_kind_is_the_same_beside_one_of_a_million_tons(kind, scheme, contac
     beside, told = end(kind, 0.9, scheme, contact, 1e9)
     assert len(told) == len(events) or kind == "bounce"
     np.testing.assert_allclose(beside, alone, rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+@pytest.mark.parametrize("law", ["newton", "poisson", "sequential"])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_bodies_that_rest_apart_stop_no_impact(restitution, law, contact):
+    """Impulses of what nothing strikes are round-off, and so is their work: no impact creates energy by it."""
+
+    def fallen(count):
+        model, at = mbd.Model("side by side"), range(count)
+        for k in at:
+            body = mbd.PointMass(f"body {k}", mass=1.0 + 0.1 * k)
+            model.connect(mbd.Translation(f"at {k}", model.ground.origin, body.origin))
+            model.constrain(
+                mbd.Unilateral(f"foot {k}", mbd.touchdown(body.origin), friction=0.3, restitution=restitution)
+            )
+        position = {f"at {k}.y": 0.01 + 0.003 * (count - 1 - k) for k in at}  # the one that all have comes last
+        velocity = {f"at {k}.x": 1.0 + 0.01 * (count - 1 - k) for k in at}
+        start = mbd.assemble(model, position=position, velocity=velocity)
+        run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.15, contact=contact, impact=law)
+        return run[f"at {count - 1}.x"][-1], len(run.events)
+
+    alone, events = fallen(1)
+    beside, more = fallen(6)
+    assert beside == pytest.approx(alone, rel=1e-4) and more >= 6 * min(events, 1)

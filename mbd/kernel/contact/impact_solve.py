@@ -133,23 +133,25 @@ def let_rebound(K: ContactForces) -> None:
 
 
 def energy_gain(K: ContactForces) -> float:
-    """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms; the most of any cluster.
+    """Work of all impulses on the mechanism, ½ Σ λ̂ (γ⁻ + γ⁺), relative to its terms; the most of any cluster struck.
 
-    Non-smooth steps in space find friction for the whole step: what the smooth one had of it may be given back.
+    Of a cluster that nothing strikes impulses are round-off: it counts with all others alone. Non-smooth steps in space
+    find friction for the whole step: what the smooth one had of it may be given back.
     """
-    most = -1e300
-    for c in range(K.n_clusters):
-        most = max(most, gain_of_cluster(K, c))
+    most = relative_gain(K, -1)
+    for c in range(K.n_contacts):
+        if K.closing[c] > 0 and abs(row_speed(K, K.normal[c])) > K.rest_speed:
+            most = max(most, relative_gain(K, K.cluster[K.n + K.normal[c]]))
     return most
 
 
-def gain_of_cluster(K: ContactForces, c: int) -> float:
-    """The same of one cluster."""
+def relative_gain(K: ContactForces, cluster: int) -> float:
+    """The same of one cluster, of all with −1."""
     n = K.n
     loss = 0.0
     size = 1e-300
     for k in range(K.n_rows):
-        if K.impulse[k] != 0.0 and K.cluster[n + k] == c:
+        if K.impulse[k] != 0.0 and (cluster < 0 or K.cluster[n + k] == cluster):
             half = 0.0
             for j in range(n):
                 half += 0.5 * K.acc[K.acc_B + k * n + j] * K.jump[j]
