@@ -313,3 +313,24 @@ def test_each_run_of_a_fit_is_asked_once_for_all_columns_of_the_same_times(monke
     search.check()
     search.least(np.array([1.2]), np.array([0.1]), np.array([3.0]))
     assert search.runs > 2 and len(asked) == search.runs
+
+
+def test_small_lengths_beside_angles_are_no_round_off():
+    """A slider that swings by 1e-14 m beside a pendulum: what is in metres is no round-off of radians."""
+
+    def found(unit):
+        model, slider = mbd.Model("slider beside a pendulum"), mbd.PointMass("slider", 1.0)
+        rod = mbd.Link("rod", 1.0, 1.0, 0.5, 0.1)
+        rail = mbd.Prismatic("rail", model.ground.origin, slider.origin, axis=(1.0, 0.0, 0.0), stiffness=9.0)
+        model.connect(rail, mbd.Revolute("pin", model.ground.origin, rod.start))
+        start = mbd.assemble(model, {"rail.displacement": unit, "pin.angle": 0.5})
+        run = mbd.simulate(model, start, mbd.Newmark(), dt=0.02, until=2.0).at(TIMES)
+        noise = 1e-3 * np.random.default_rng(6).standard_normal((2, len(TIMES)))
+        sizes = zip(("rail.displacement", "pin.angle"), (unit, 1.0), noise, strict=True)
+        data = {"time": TIMES} | {name: run[name] + size * own for name, size, own in sizes}
+        return mbd.fit(model, start, data, {"rail spring.stiffness": 9.5, "rod.center": 0.55}, mbd.Newmark(), 0.02)
+
+    large, *others = map(found, (1.0, 1e-14, 1e-100))
+    for small in others:
+        assert small.values == pytest.approx(large.values, rel=1e-6)
+        assert small.errors == pytest.approx(large.errors, rel=1e-4)

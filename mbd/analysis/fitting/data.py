@@ -14,6 +14,7 @@ from mbd.bodies.values import is_number, shown
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.errors import ModelError
+from mbd.results.units import unit_of
 
 __all__ = ["Data"]
 
@@ -68,8 +69,7 @@ class Data:
             faults.append("there is nothing to fit to: data and events have no value")
         if faults:
             raise ModelError(faults)
-        largest = max((float(np.max(np.abs(values))) for _, values in columns.values()), default=0.0)
-        scales = {name: given.get(name, _spread(values, largest)) for name, (_, values) in columns.items()}
+        scales = {name: given.get(name, _spread(name, columns)) for name in columns}
         lengths = max([float(np.ptp(times)) for times, _ in columns.values()], default=0.0)
         scales |= {name: given.get(name, 1e-2 * (lengths or abs(each) or 1.0)) for name, each in instants.items()}
         return cls(columns, instants, scales)
@@ -111,10 +111,13 @@ def _numbers(given: Any, what: str, example: str, faults: list[str]) -> dict[str
     return {name: float(each) for name, each in given.items()}
 
 
-def _spread(values: Vector, largest: float) -> float:
-    """A hundredth of the range of a column; of its size where it is constant, and of the largest of all where it is
-    nothing, up to round-off.
+def _spread(name: str, columns: Mapping[str, tuple[Vector, Vector]]) -> float:
+    """A hundredth of the range of a column; of its size where it is constant, and of the largest that may have its
+    unit where it is nothing, up to round-off.
     """
+    values, known = columns[name][1], unit_of(name)
     swing, size = float(np.ptp(values)), float(np.max(np.abs(values)))
     spread = swing if swing > EQUAL_RTOL * size else size
+    alike = [other for title, (_, other) in columns.items() if not known or unit_of(title) in ("", known)]
+    largest = max(float(np.max(np.abs(other))) for other in alike)
     return 1e-2 * (spread if spread > ROUND_OFF_RTOL * largest else largest or 1.0)
