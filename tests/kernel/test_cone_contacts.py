@@ -118,8 +118,8 @@ def only_cones(monkeypatch):
         found.append(solve_cones(K, level, allowed))
         return found[-1]
 
-    def wrong(K):
-        return int(not found or is_wrong(K))
+    def wrong(K, level):
+        return int(not found or is_wrong(K, level))
 
     monkeypatch.setattr(solver, "solve_cones", counted)
     monkeypatch.setattr(solver, "change_all", wrong)
@@ -127,10 +127,11 @@ def only_cones(monkeypatch):
     return found
 
 
-def is_wrong(K):
+def is_wrong(K, level):
     """Whether the solution breaks a law."""
-    faults = [solver.contact_fault(K, c) for c in range(K.n_contacts) if K.free[c] > 0]
-    faults += [solver.friction_fault(K, f) for f in range(K.n_frictions) if K.loose[f] > 0 and solver.is_on(K, f)]
+    faults = [solver.contact_fault(K, c, level) for c in range(K.n_contacts) if K.free[c] > 0]
+    choosing = [f for f in range(K.n_frictions) if K.loose[f] > 0 and solver.is_on(K, f)]
+    faults += [solver.friction_fault(K, f, level) for f in choosing]
     return max(faults, default=0.0) > 0.0
 
 

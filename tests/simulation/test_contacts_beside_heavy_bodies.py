@@ -104,3 +104,28 @@ def test_bodies_that_rest_apart_stop_no_impact(restitution, law, contact):
     alone, events = fallen(1)
     beside, more = fallen(6)
     assert beside == pytest.approx(alone, rel=1e-4) and more >= 6 * min(events, 1)
+
+
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_feet_of_what_stands_apart_stay_closed_in_an_impact(restitution, contact):
+    """Their impulses are round-off, the sign of which opens no foot and lets none slide."""
+    draw = np.random.default_rng(0).uniform
+    model = mbd.Model("tables beside a ball")
+    ball = mbd.PointMass("ball", 1.0)
+    model.connect(mbd.Translation("at", model.ground.origin, ball.origin))
+    model.constrain(mbd.Unilateral("hit", mbd.touchdown(ball.origin), friction=0.3, restitution=restitution))
+    position, closed = {"at.y": 0.1}, []
+    for k in range(4):
+        center = draw(0.3, 0.7), draw(0.1, 0.5)
+        table = mbd.RigidBody(f"table {k}", mass=draw(0.5, 5.0), inertia=draw(0.1, 1.0), center=center)
+        model.connect(mbd.Planar(f"stands {k}", model.ground.origin, table.origin))
+        for x in (0.0, 1.0):
+            closed.append(f"foot {k} at {x:g}")
+            model.constrain(mbd.Unilateral(closed[-1], mbd.touchdown(table.point(x, 0.0)), friction=draw(0.2, 0.8)))
+        rod = mbd.Link(f"rod {k}", length=0.5, **mbd.rod(mass=draw(0.01, 0.05), length=0.5).link)
+        model.connect(mbd.Revolute(f"hinge {k}", table.point(0.5, 0.6), rod.start))
+        position |= {f"hinge {k}.angle": draw(-1.0, 1.0), f"stands {k}.x": 3.0 * k}
+    start = mbd.assemble(model, closed=closed, position=position)
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=5e-3, until=0.4, contact=contact)
+    assert {event.name for event in run.events} == {"hit"}

@@ -27,7 +27,7 @@ from mbd.kernel.contact.cone_directions import misses, turn_directions
 from mbd.kernel.contact.cone_problem import CONE_RTOL
 from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, ContactForces, Contacts, DependentRows, Motion
-from mbd.kernel.stepping.restart import active_rows, refresh_scales
+from mbd.kernel.stepping.restart import active_rows, largest_force, refresh_scales
 
 __all__ = ["complementarity"]
 
@@ -81,7 +81,7 @@ def change_branches(K: Balance, level: int, single: int) -> int:
             failed = CONFLICT
             if give_way(K) == 0:
                 break
-        elif status != 0 or (change_all(K) if attempt < MAX_NEWTON else change_worst(K)) == 0:
+        elif status != 0 or (change_all(K, level) if attempt < MAX_NEWTON else change_worst(K, level)) == 0:
             return status
     return failed
 
@@ -118,9 +118,9 @@ def is_contradicted(K: ContactForces) -> bool:
     """Whether a contact or friction that may choose breaks its law in the solution."""
     found = False
     for f in range(K.n_frictions):
-        found = found or (K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f) > 0.0)
+        found = found or (K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f, 0) > 0.0)
     for c in range(K.n_contacts):
-        found = found or (K.free[c] > 0 and contact_fault(K, c) > 0.0)
+        found = found or (K.free[c] > 0 and contact_fault(K, c, 0) > 0.0)
     return found
 
 
@@ -153,26 +153,26 @@ def departure(K: ContactForces, row: int, sign: float, tolerance: float) -> floa
     return float(-sign * value - tolerance * size)
 
 
-def contact_fault(K: ContactForces, c: int) -> float:
+def contact_fault(K: ContactForces, c: int, level: int) -> float:
     """How badly contact c breaks its law; ≤ 0 if it does not."""
     if K.active[c] == 1 and K.parting[c] == 0:
-        return float(K.impulse[K.normal[c]] - LAW_RTOL * largest_impulse(K, K.normal[c]))  # λ > 0 would pull
+        return float(K.impulse[K.normal[c]] - LAW_RTOL * largest_impulse(K, K.normal[c], level))  # λ > 0 would pull
     return departure(K, K.normal[c], 1.0, LAW_RTOL)
 
 
-def friction_fault(K: ContactForces, f: int) -> float:
+def friction_fault(K: ContactForces, f: int, level: int) -> float:
     """How badly friction f breaks its law; ≤ 0 if it does not."""
     row = K.friction_row[f]
     if K.group_size[f] > 1:
-        return group_fault(K, f)
+        return group_fault(K, f, level)
     if K.sticks[f] == 1:
-        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - LAW_RTOL * largest_impulse(K, row))
+        return float(abs(K.impulse[row] + K.past[row]) - K.limit[f] - LAW_RTOL * largest_impulse(K, row, level))
     return departure(
         K, row, K.slip[f], NOMINAL_RTOL if K.loose[f] == 2 else LAW_RTOL
     )  # it slides against its own friction
 
 
-def group_fault(K: ContactForces, f: int) -> float:
+def group_fault(K: ContactForces, f: int, level: int) -> float:
     """How badly frictions that slide together break their law; all but the first of them never do."""
     if follows(K, f):
         return -1.0
@@ -181,7 +181,7 @@ def group_fault(K: ContactForces, f: int) -> float:
         for g in range(f, f + K.group_size[f]):
             pull = K.impulse[K.friction_row[g]] + K.past[K.friction_row[g]]
             square += pull * pull
-        return float(sqrt(square) - K.limit[f] - LAW_RTOL * largest_impulse(K, K.friction_row[f]))
+        return float(sqrt(square) - K.limit[f] - LAW_RTOL * largest_impulse(K, K.friction_row[f], level))
     return misses(K, f, NOMINAL_RTOL if K.loose[f] == 2 else LAW_RTOL)
 
 
@@ -209,9 +209,12 @@ def give_way(K: DependentRows) -> int:
     return 0
 
 
-def largest_impulse(K: ContactForces, row: int) -> float:
-    """Size of the multipliers of the cluster of a row."""
-    largest = 0.0
+def largest_impulse(K: ContactForces, row: int, level: int) -> float:
+    """Size of the multipliers of the cluster of a row; impulses where nothing strikes are round-off beside its forces.
+
+    Those have the time of a step to act.
+    """
+    largest = K.dt * largest_force(K, row) if level == 1 else 0.0
     for k in range(K.n_rows):
         if K.cluster[K.n + k] == K.cluster[K.n + row]:
             largest = max(largest, abs(K.impulse[k]))
@@ -236,21 +239,21 @@ def turn(K: ContactForces, f: int) -> None:
         aim(K, f)
 
 
-def change_all(K: ContactForces) -> int:
+def change_all(K: ContactForces, level: int) -> int:
     """Every contact and friction takes the branch that the solution asks for; how many changed."""
     count = 0
     for f in range(K.n_frictions):
-        if K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f) > 0.0:
+        if K.loose[f] > 0 and is_on(K, f) and friction_fault(K, f, level) > 0.0:
             turn(K, f)
             count += 1
     for c in range(K.n_contacts):
-        if K.free[c] > 0 and contact_fault(K, c) > 0.0:
+        if K.free[c] > 0 and contact_fault(K, c, level) > 0.0:
             toggle(K, c)
             count += 1
     return count
 
 
-def change_worst(K: ContactForces) -> int:
+def change_worst(K: ContactForces, level: int) -> int:
     """The contact or friction that breaks its law most takes its other branch; 0 if none breaks it."""
     found = -1
     most = 0.0
@@ -258,9 +261,9 @@ def change_worst(K: ContactForces) -> int:
         f = place - K.n_contacts
         fault = 0.0
         if f < 0:
-            fault = contact_fault(K, place) if K.free[place] > 0 else 0.0
+            fault = contact_fault(K, place, level) if K.free[place] > 0 else 0.0
         elif K.loose[f] > 0 and is_on(K, f):
-            fault = friction_fault(K, f)
+            fault = friction_fault(K, f, level)
         if fault > most:
             found = place
             most = fault
