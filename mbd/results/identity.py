@@ -159,8 +159,9 @@ class _Reader(Reader):
             return held
         codes = [*codes_of(function.__code__)]
         names = {name for code in codes for name in code.co_names}
-        if names & self.unreadable:
-            raise CannotTellError(function, *sorted(names & self.unreadable))
+        used = {step.argval for code in codes for step in dis.get_instructions(code) if step.opname == "LOAD_GLOBAL"}
+        if unreadable := self.unreadable & (names if "builtins" in used else used):
+            raise CannotTellError(function, *sorted(unreadable))
         known = {name: function.__globals__[name] for name in names & function.__globals__.keys()}
         known |= {module.__name__: module for module in _imported(function, codes)}
         return [*held, {name: self.used(known[name], names, set()) for name in sorted(known)}]

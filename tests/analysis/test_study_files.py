@@ -316,3 +316,4 @@ def test_what_a_table_of_pythons_pickles_is_read():
 def test_the_error_names_what_a_function_reaches_others_by():
     with pytest.raises(mbd.ModelError, match="<function .*uses 'getattr', of which nobody"):
         identity(lambda run: getattr(run, "time"))  # noqa: B009
+    assert identity(lambda run: run.dir) != identity(lambda run: run.open)  # attributes of these names are read
