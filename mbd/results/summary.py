@@ -60,7 +60,7 @@ def outcome(run: Trajectory) -> str:
 
     An event that was asked for ends a run as it was meant to, but a fall is no success.
     """
-    if run.success and run.message.startswith("ended by"):
+    if run.status == 1:
         return run.message
     return ("success" if run.success else "failure") + (f": {run.message}" if run.message else "")
 

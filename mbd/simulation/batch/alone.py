@@ -64,7 +64,7 @@ def made_alone(model: Any, start: State, arguments: dict[str, Any], terminal: fr
             f"{arguments['until']!r} did not happen"
         )
         return Alone("no event" if waited else "failed", run.final, "", run.message, run)
-    if not run.message.startswith("ended by"):
+    if run.status != 1:
         return Alone("end", run.final, "", run.message, run)
     last = [e.name for e in run.events if e.kind in ("closed", "event") and e.name in terminal]
     return Alone("event", run.final, last[-1] if last else "", run.message, run)

@@ -325,8 +325,8 @@ CAUSES = (
     ),
     Cause(
         (codes.NO_DERIVATIVE,),
-        "the run goes on, but the derivatives of this step by wrt= do not converge{x.closed}: forces change too much "
-        "within it", "use a smaller dt, tol= or a smoother force",
+        "the step converges, but its derivatives by wrt= do not{x.closed}: forces change too much within it",
+        "use a smaller dt, tol= or a smoother force",
     ),
     # steps whose change cannot be that of the motion
     Cause(
