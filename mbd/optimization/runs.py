@@ -89,17 +89,16 @@ class RunSource(Source):
 
     def _ended(self, run: Trajectory) -> str:
         """'' for a run that came to its end; else what ended it."""
-        last = run.events[-1] if run.events else None
         if is_number(self.until):
             if run.time[-1] >= self.until - 1e-9 * max(1.0, abs(self.until)):
                 return ""
         else:
             name = self.until if isinstance(self.until, str) else self.until[0]
-            if last is not None and last.name == name and last.time == run.time[-1]:
-                return ""
-            if last is None or last.time != run.time[-1]:
+            if run.status == 0:
                 return f"{name!r} does not happen by {run.time[-1]:.3g} s"
-        return f"ends by {last.name!r} at {run.time[-1]:.3g} s" if last else f"ends at {run.time[-1]:.3g} s"
+            if run.message.startswith(f"ended by {name!r} "):  # others may happen at the same instant
+                return ""
+        return run.message.replace("ended", "ends", 1)
 
     def _moved(self, name: str, value: float) -> dict[str, tuple[float, float]]:
         """(value, rate) of each parameter that a quantity moves."""

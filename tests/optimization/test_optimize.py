@@ -13,6 +13,7 @@ from mbd.optimization.formula import formula
 from mbd.optimization.points import FunctionSource, GaitSource, slope_by_differences
 from mbd.optimization.runs import RunSource
 from tests.gait.walkers import simplest
+from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
 
 @cache
@@ -235,3 +236,17 @@ def test_faults_have_names(change, text):
     }  # fmt: skip
     with pytest.raises(mbd.MbdError, match=text):
         mbd.optimize(**given)
+
+
+def test_runs_end_with_the_event_that_was_asked_for_whatever_else_happens_then():
+    """The strike of a kneed walker's right foot releases the left foot and knee at the same instant."""
+    model = kneed_walker()
+    start, begin = kneed_walker_start(model), {"hip.mass": (0.5, 0.4, 0.6)}
+    found = mbd.optimize(
+        model, begin, start, mbd.RungeKutta853(), 0.005, until=("right foot", 2.0), minimize="time", most=3
+    )
+    first = found.trials[0]
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.005, until=("right foot", 2.0))
+    assert run.events[-1].name != "right foot" and first.objective == pytest.approx(run.time[-1], rel=1e-9)
+    with pytest.raises(mbd.GaitError, match=r"'right foot' does not happen by 0\.4 s"):
+        mbd.optimize(model, begin, start, mbd.RungeKutta853(), 0.005, until=("right foot", 0.4), minimize="time")
