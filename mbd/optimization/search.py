@@ -108,12 +108,12 @@ def _squares(problem: Problem, box: tuple[Vector, Vector], accuracy: float) -> t
 
     def residuals(u: Vector) -> Vector:
         try:
-            return problem.at(u).parts
+            return problem.at(u).parts / problem.size
         except FailedTrial:
             return np.full(len(problem.parts), np.inf)
 
     def slopes(u: Vector) -> Any:
-        return problem.slopes(_known(problem, u))[0]
+        return problem.slopes(_known(problem, u))[0] / problem.size
 
     found = least_squares(
         residuals, problem.best.u, slopes, box, xtol=accuracy,

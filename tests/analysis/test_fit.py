@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -334,3 +336,43 @@ def test_small_lengths_beside_angles_are_no_round_off():
     for small in others:
         assert small.values == pytest.approx(large.values, rel=1e-6)
         assert small.errors == pytest.approx(large.errors, rel=1e-4)
+
+
+def test_fits_do_not_depend_on_when_the_clock_was_started_nor_on_the_size_of_all_sigma():
+    """A damped ball that bounces: instants, or heights with errors, of runs that begin at other times."""
+    model, ball = mbd.Model("ball"), mbd.PointMass("ball", 1.0)
+    rail = mbd.Prismatic("rail", model.ground.origin, ball.origin, axis=(0.0, 1.0, 0.0), loss=mbd.Viscous(0.3))
+    model.connect(rail)
+    model.constrain(mbd.Unilateral("floor", mbd.touchdown(ball.origin), restitution=0.8))
+    start, guess = mbd.assemble(model, {"rail.displacement": 1.0}), {"gravity.y": -8.5, "rail loss.coefficient": 0.1}
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.02, until=2.0)
+    instants = instants_of(run)
+    heights = run.at(TIMES)["rail.displacement"] + 1e-3 * np.random.default_rng(2).standard_normal(len(TIMES))
+
+    def found(begin, events, sigma=None):
+        data = None if events else {"time": begin + TIMES, "rail.displacement": heights}
+        given = {name: begin + time for name, time in instants.items() if events and not name.endswith("3")}
+        scales = sigma and {"rail.displacement": sigma}
+        settings = {"events": given or None, "sigma": scales}
+        return mbd.fit(model, replace(start, time=begin), data, guess, mbd.RungeKutta853(), 0.02, **settings)
+
+    for begin in (0.0, 64.0, 8192.0, -64.0):
+        fitted = found(begin, events=True)
+        assert fitted.converged and fitted.run.time[-1] - begin < 1.5
+        assert fitted.values == pytest.approx({"gravity.y": -9.81, "rail loss.coefficient": 0.3}, rel=1e-9)
+    usual = found(0.0, events=False)
+    for begin, sigma in ((-64.0, None), (0.0, 1e-3), (0.0, 1e9), (0.0, 1e-12)):
+        other = found(begin, events=False, sigma=sigma)
+        assert other.values == pytest.approx(usual.values, rel=1e-8)
+        assert other.errors == pytest.approx(usual.errors, rel=1e-6)
+
+
+def test_memory_of_a_fit_grows_with_its_values_not_with_their_square():
+    model, start = pendulum()
+    run, many = mbd.simulate(model, start, mbd.Newmark(), dt=0.02, until=2.0), np.linspace(0.0, 2.0, 6000)
+    data = {"time": many, "pin.angle": run.at(many)["pin.angle"]}
+    tracemalloc.start()
+    mbd.fit(model, start, data, {"rod.center": 1.29}, mbd.Newmark(), 0.02)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 1000 * 8 * len(many)

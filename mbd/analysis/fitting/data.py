@@ -50,8 +50,8 @@ class Data:
         return replace(self, columns=columns, events={n: each for n, each in self.events.items() if each <= time})
 
     @classmethod
-    def read(cls, table: Any, events: Any, sigma: Any) -> Data:
-        """Checked data.
+    def read(cls, table: Any, events: Any, sigma: Any, begin: float = 0.0) -> Data:
+        """Checked data of runs that begin at a time [s], from which alone instants have their scale.
 
         Raises
         ------
@@ -71,7 +71,9 @@ class Data:
             raise ModelError(faults)
         scales = {name: given.get(name, _spread(name, columns)) for name in columns}
         lengths = max([float(np.ptp(times)) for times, _ in columns.values()], default=0.0)
-        scales |= {name: given.get(name, 1e-2 * (lengths or abs(each) or 1.0)) for name, each in instants.items()}
+        scales |= {
+            name: given.get(name, 1e-2 * (lengths or abs(each - begin) or 1.0)) for name, each in instants.items()
+        }
         return cls(columns, instants, scales)
 
 

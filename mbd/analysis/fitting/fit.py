@@ -183,10 +183,13 @@ def fit(
     >>> print({name: round(value, 6) for name, value in found.values.items()})
     {'rod.center': 1.3, 'pin loss.coefficient': 0.2}
     """
-    known = Data.read(data, events, sigma)
+    if not isinstance(start, State):
+        raise ModelError(f"start must be a State from mbd.assemble(model, …), not {shown(start)}")
+    known = Data.read(data, events, sigma, start.time)
     guess, low, high = bounds(parameters)
     dt = 1e-3 if dt is None and tol is None else dt
-    search = _Search(model, start, known, tuple(parameters), integrator, dt, tol, _end(known, until, dt, tol), backend)
+    end = _end(known, start.time, until, dt, tol)
+    search = _Search(model, start, known, tuple(parameters), integrator, dt, tol, end, backend)
     search.check()
     first = search.residuals(guess)
     if not np.all(np.isfinite(first)):
@@ -226,12 +229,12 @@ def bounds(parameters: Any) -> tuple[Vector, Vector, Vector]:
     return guess, low, high
 
 
-def _end(data: Data, until: Any, dt: Any, tol: Any) -> float:
+def _end(data: Data, begin: float, until: Any, dt: Any, tol: Any) -> float:
     for name, value, what in (("dt", dt, "step [s]"), ("tol", tol, "tolerance")):
         if value is not None and (not is_number(value) or not 0.0 < value < math.inf):
             raise ModelError(f"{name} must be a positive {what}, not {shown(value)}")
     if until is None:
-        return float(data.last + (max(2.0 * (dt or 0.0), 0.2 * data.last) if data.events else 0.0))
+        return float(data.last + (max(2.0 * (dt or 0.0), 0.2 * (data.last - begin)) if data.events else 0.0))
     if not is_number(until) or not data.last <= until < math.inf:
         raise ModelError(f"until must be a time [s] not before the last value at {data.last:g} s, not {shown(until)}")
     return float(until)
@@ -272,8 +275,6 @@ class _Search:
 
     def check(self) -> None:
         """Names that the model does not have, all at once; parameters that are 0 or ±1 become inputs."""
-        if not isinstance(self.start, State):
-            raise ModelError(f"start must be a State from mbd.assemble(model, …), not {shown(self.start)}")
         mechanism = mechanism_of(self.model, self.backend, self.start.parameters)
         equations = mechanism.equations
         inputs = {parameter.name for parameter in equations.parameters}
@@ -317,7 +318,7 @@ class _Search:
         return self.left.copy()
 
     def _left(self, run: Trajectory | None) -> Vector:
-        if run is None or run.time[-1] < max((times[-1] for times, _ in self.data.columns.values()), default=0.0):
+        if run is None or run.time[-1] < max((times[-1] for times, _ in self.data.columns.values()), default=-math.inf):
             self.problem = self.problem if run is None else run.message
             return np.full(self.data.count, np.inf)
         alike = dict[bytes, list[str]]()
@@ -338,13 +339,23 @@ class _Search:
         return np.concatenate(parts)
 
     def least(self, guess: Vector, low: Vector, high: Vector, most: int = 200) -> Any:
-        """The search from a guess within bounds, of at most so many steps."""
+        """The search from a guess within bounds, of at most so many steps.
+
+        Estimates are sought over powers of two near their guesses, residuals over the size that they have there: then
+        a search ends at the same estimates whatever units and `sigma` are.
+        """
         from scipy.optimize import least_squares
 
-        return least_squares(
-            self.residuals, guess, self.slopes, (low, high), x_scale="jac", xtol=1e-9, ftol=1e-12, gtol=1e-12,
-            max_nfev=most,
+        scale = 2.0 ** np.round(np.log2(np.abs(np.where(guess == 0.0, 1.0, guess))))
+        size = float(np.linalg.norm(self.residuals(guess))) or 1.0
+        found: Any = least_squares(
+            lambda u: self.residuals(scale * u) / size, guess / scale, lambda u: self.slopes(scale * u) * scale / size,
+            (low / scale, high / scale), x_scale="jac", xtol=1e-9, ftol=1e-12, gtol=1e-12, max_nfev=most,
         )  # fmt: skip
+        found.x, found.fun, found.jac, found.cost = (
+            scale * found.x, size * found.fun, size / scale * found.jac, size**2 * found.cost
+        )  # fmt: skip
+        return found
 
     def least_over_growing_spans(self, guess: Vector, low: Vector, high: Vector) -> Any:
         """The search from where those over the first parts of the time have ended, one after another."""
@@ -354,7 +365,7 @@ class _Search:
             known = self.data.until(end)
             if not known.count:
                 continue
-            search = replace(self, data=known, until=_end(known, None, self.dt, self.tol), runs=0, at=None)
+            search = replace(self, data=known, until=_end(known, begin, None, self.dt, self.tol), runs=0, at=None)
             if np.all(np.isfinite(search.residuals(values))):
                 values = search.least(values, low, high, MAX_STEPS_OF_SPAN).x
             self.runs += search.runs
@@ -385,7 +396,8 @@ class _Search:
         assert run is not None
         sizes = np.linalg.norm(found.jac, axis=0)
         scaled = found.jac / np.where(sizes > 0.0, sizes, 1.0)
-        _, strengths, directions = np.linalg.svd(scaled)
+        # all directions among the parameters, but none of the many among the values
+        _, strengths, directions = np.linalg.svd(scaled, full_matrices=len(scaled) < len(self.names))
         strengths = np.pad(strengths, (0, len(directions) - len(strengths)))
         weak = strengths <= HALF_PRECISION_RTOL * max(strengths[0], 1e-300)
         degrees = len(found.fun) - int(np.count_nonzero(~weak))
