@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 import mbd
 from mbd.kernel.codes import NO_IMPACT
 from mbd.kernel.events import handling as kernel_events
-from tests.simulation.mechanisms import G
+from tests.simulation.mechanisms import G, kneed_walker, kneed_walker_start
 
 DT = 2e-3
 
@@ -152,3 +153,18 @@ def test_where_no_impulses_are_found_the_run_goes_on_from_before_that_blow(monke
     same(pieces(model, start, cuts_of(run, 0.4, since - 1.5 * DT, since + DT, 0.9), backend="python"), run)
     with pytest.raises(mbd.SimulationError, match="no forces or impulses"):
         mbd.simulate(model, start, dt=DT, until=1.2, backend="python", contact="events")
+
+
+@pytest.mark.parametrize("integrator", [mbd.HHT(0.05), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
+@pytest.mark.parametrize("begin", [-64.0, -1.0, 64.0])
+def test_instants_do_not_crowd_because_the_clock_is_below_zero(integrator, begin):
+    """No impact was counted before the first one, whatever the time; a walker makes the same steps at any time."""
+    walker = kneed_walker()
+    start = kneed_walker_start(walker)
+    usual, other = (
+        mbd.simulate(walker, replace(start, time=time), integrator, dt=4e-3, until=time + 2.0) for time in (0.0, begin)
+    )
+    assert [(event.kind, event.name) for event in other.events] == [(event.kind, event.name) for event in usual.events]
+    assert len(other) == len(usual) and len(usual.events) > 10
+    np.testing.assert_allclose([event.time - begin for event in other.events], [event.time for event in usual.events])
+    np.testing.assert_allclose(other.final.v, usual.final.v, rtol=1e-9, atol=1e-9)

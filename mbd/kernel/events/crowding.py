@@ -22,7 +22,8 @@ MIN_CONTACTS = 2
 
 def crowd(K: Guards) -> float:
     """Impacts through several contacts, less one for each dt since."""
-    return float(max(K.crowding - (K.time - K.crowding_time) / K.dt, 0.0))
+    since = K.time - K.crowding_time if K.crowding > 0.0 else 0.0  # nothing was counted before the first impact
+    return float(max(K.crowding - since / K.dt, 0.0))
 
 
 def count_impact(K: Switching) -> None:
