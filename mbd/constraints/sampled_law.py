@@ -43,8 +43,9 @@ class SampledLaw(Machine):
         frames, joints, or (label, number) for a parameter
     states : functions x_{k+1} by label; their values are the quantities 'name.label'
     start : the x_0 of states by label; 0 where they are left out
-    delay : time from a sample to its outputs [s], of any length; the parameter 'name.delay'. Until the first outputs a
-        parameter has its own value, an output of its own is 0
+    delay : time from a sample to its outputs [s], of any length. Until the first outputs a parameter has its own value,
+        an output of its own is 0. A whole number of periods is a number of samples, also where the period is changed;
+        any other delay is the parameter 'name.delay', with the same number of samples between it and the period
     resolution : steps to which values are rounded, of outputs and of arguments by their names: {'knee.angle': 1e-3}
     restart_on : names of contacts, events or states of modes: a sample is taken as they happen, and the next one a
         period later, so that the samples of each step are the same. A gait without it lasts a whole number of samples
@@ -240,12 +241,26 @@ class SampledLaw(Machine):
         return f", every {self.period:g} s, sets {', '.join(map(repr, self.outputs))}"
 
     def parameters(self) -> dict[str, float]:
-        """'name.period', 'name.delay' where there is one, and arguments given as numbers."""
+        """'name.period', 'name.delay' of outputs between samples, and arguments given as numbers."""
         found = {f"{self.name}.period": self.period}
-        found |= {f"{self.name}.delay": self.delay} if self.waits else {}
+        found |= {f"{self.name}.delay": self.delay} if self.puts_out_late else {}
         return found | {f"{self.name}.{label}": x for label, x in self.arguments if isinstance(x, float)}
 
     def domains(self) -> dict[str, Domain]:
         """Periods are positive."""
         return {f"{self.name}.period": positive("is not positive; give a time > 0", "s"),
                 f"{self.name}.delay": at_least_zero("is negative; give a time ≥ 0", "s")}  # fmt: skip
+
+    def value_faults(self, values: Mapping[str, float]) -> list[str]:
+        """Those of its numbers, and a delay of more or fewer samples than it was made for."""
+        found = super().value_faults(values)
+        if found or not self.puts_out_late:
+            return found
+        period, delay = values[f"{self.name}.period"], values[f"{self.name}.delay"]
+        if self.waits - 1 - 1e-9 <= delay / period <= self.waits + 1e-9:
+            return []
+        return [
+            f"SampledLaw '{self.name}': '{self.name}.delay' must be {self.waits - 1} to {self.waits} periods, as in "
+            f"the model, got {delay:g} s with '{self.name}.period' {period:g} s; make a model with a SampledLaw of "
+            "these values"
+        ]

@@ -286,7 +286,7 @@ class _Times:
             time, at_left = exact
             times = np.full(len(times), time)
             rights = np.nextafter(times, np.inf) if at_left else times
-        elif node.op == "table" and switch.expression.op == "input":  # a table of t itself
+        elif node.op == "table" and node.args[0].op == "input":  # a table of t itself
             times = rights = values
         else:
             margins = np.maximum(ROUND_OFF * np.maximum(np.abs(times), self.dt), self._margins(switch, times))
@@ -313,6 +313,8 @@ class _Times:
         node, shift = switch.node, 1e-6 * np.maximum(np.abs(times), self.dt)
         parts = node.args if node.op in ("lt", "le", "min", "max") else _terms(switch.expression)
         size = sum(np.abs(self.at(part, times)) for part in parts)
+        if node.op == "table" and (phase := node.tape.phases.get(node.args[0].index)):
+            size = size + abs(phase[1]) + phase[2]
         change = np.abs(self.at(switch.expression, times + shift) - self.at(switch.expression, times - shift))
         with np.errstate(all="ignore"):
             margin = ROUND_OFF * size * 2.0 * shift / change

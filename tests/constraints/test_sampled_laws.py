@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,37 @@ def test_derivatives_go_through_samples() -> None:
         near, far = (ends(name, step) - ends(name, -step) for step in (h, 2.0 * h))
         wanted = (8.0 * near - far) / (12.0 * h)
         np.testing.assert_allclose([found[each, name] for each in of], wanted, rtol=2e-7, atol=1e-8)
+
+
+@pytest.mark.parametrize("made", [0.004, 0.01, 0.013, 0.02])
+@pytest.mark.parametrize(("name", "value"), [
+    *(("delay", value) for value in (0.0, 0.0035, 0.01, 0.0125, 0.02, 0.023)),
+    *(("period", value) for value in (0.002, 0.005, 0.012, 0.03)),
+])  # fmt: skip
+def test_a_delay_or_period_of_a_run_is_that_of_a_model_made_with_it_or_an_error(
+    made: float, name: str, value: float
+) -> None:
+    model, _ = arm(delay=made)
+    late = made % PERIOD > 1e-9
+    if name == "delay" and not late:  # a number of samples
+        assert "PID.delay" not in model.parameters
+        return
+    period, delay = (value, made) if name == "period" else (PERIOD, value)
+    if not late:
+        delay = made / PERIOD * period
+    if late and not np.ceil(made / PERIOD) - 1.0 <= delay / period <= np.ceil(made / PERIOD):
+        with pytest.raises(ModelError, match="make a model with a SampledLaw of these values"):
+            mbd.assemble(model, parameters={f"PID.{name}": value})
+        return
+    other = model.without("PID")
+    word = next(each for each in model.constraints if each.name == "PID")
+    other.apply(replace(word, period=period, delay=delay))
+    ends = []
+    for each, values in (model, {f"PID.{name}": value}), (other, {}):
+        begun = mbd.assemble(each, {"hinge.angle": 0.2}, parameters=values)
+        run = mbd.simulate(each, begun, mbd.RungeKutta853(), dt=PERIOD, until=0.2031)
+        ends.append([run[result][-1] for result in ("hinge.angle", "hinge.rate", "motor.torque")])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
 
 
 def test_an_output_of_its_own_is_a_quantity_and_samples_restart_with_a_contact() -> None:

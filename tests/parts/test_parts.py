@@ -109,6 +109,9 @@ def test_a_keel_is_as_stiff_at_its_toe_as_was_asked():
     parts.keel_foot(model, "left", foot.point(-0.05, -0.1), foot.point(0.0, -0.08), **how)
     reach = 0.85 * 0.2
     assert model.parameters["left keel spring.stiffness"] / reach**2 == pytest.approx(4e4)
+    moments = [model.parameters[f"left blade.inertia.{axis}"] for axis in ("xx", "yy", "zz")]
+    rod = model.parameters["left blade.mass"] * reach**2 / 12.0  # along x
+    assert moments == pytest.approx([0.0, rod, rod])
     assert model.parameters["left blade.toe.x"] == pytest.approx(reach)
 
 

@@ -62,7 +62,8 @@ def keel_foot(
     span, k, m = sizes(f"keel_foot '{name}'", length=length, stiffness=stiffness, mass=mass)
     reach = CHARACTERISTIC_RADIUS * span
     solid = rod(m, reach)
-    blade = RigidBody(f"{name} blade", m, solid.inertia[::-1], center=(0.5 * reach, 0.0, 0.0))
+    across, along, _ = solid.inertia
+    blade = RigidBody(f"{name} blade", m, (along, across, across), center=(0.5 * reach, 0.0, 0.0))
     x_axis = (1.0, 0.0, 0.0) if root.rotation is None else tuple(row[0] for row in root.rotation)
     x, y, z = (place + (span - reach) * along for place, along in zip(root.offset, x_axis, strict=True))
     hinge = replace(root, name=f"{name} keel", offset=(x, y, z), landmark=None)
