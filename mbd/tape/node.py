@@ -8,6 +8,7 @@ found again as ``-(s*x + c*y)``. An effect whose factor is an exact zero therefo
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Sequence
+from numbers import Number
 from threading import RLock
 from typing import Any, NoReturn, TypeAlias
 
@@ -114,7 +115,7 @@ class Node:
     __hash__ = object.__hash__
 
     def __eq__(self, other: object) -> bool:
-        if self is not other and isinstance(other, Node | int | float):
+        if self is not other and (isinstance(other, Node | Number) or hasattr(other, "ndim")):
             raise TraceError("'==' on a traced value is not recorded; write mbd.where(abs(a - b) < tolerance, x, y)")
         if isinstance(other, str):
             raise TraceError(

@@ -163,6 +163,12 @@ def _log_of(expression: Callable[[Node, Tape], Node]) -> Rule:
     return lambda tape, args: tape.unary("log", expression(args[0], tape))
 
 
+def _asinh(tape: Tape, args: list[Node]) -> Node:
+    """log(|x| + √(x² + 1)) with the sign of x: x + √(x² + 1) loses its digits far below 0."""
+    x, root = args[0], tape.unary("sqrt", args[0] * args[0] + 1.0)
+    return tape.where(x < 0.0, -tape.unary("log", root - x), tape.unary("log", root + x))
+
+
 _SAME = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sign", "floor")
 """Functions that have one name in sympy and on the tape."""
 
@@ -186,7 +192,7 @@ _FUNCTIONS: dict[str, Rule] = {
     "sec": lambda tape, args: tape.div(1.0, tape.unary("cos", args[0])),
     "csc": lambda tape, args: tape.div(1.0, tape.unary("sin", args[0])),
     "cot": lambda tape, args: tape.div(1.0, tape.unary("tan", args[0])),
-    "asinh": _log_of(lambda x, tape: x + tape.unary("sqrt", x * x + 1.0)),
+    "asinh": _asinh,
     "acosh": _log_of(lambda x, tape: x + tape.unary("sqrt", x * x - 1.0)),
     "atanh": lambda tape, args: 0.5 * tape.unary("log", (1.0 + args[0]) / (1.0 - args[0])),
 }

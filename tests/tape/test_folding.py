@@ -1,6 +1,8 @@
 """The graph: equal expressions are one node, and folding changes no value."""
 
 import math
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -97,6 +99,18 @@ def test_products_of_constants_that_would_underflow_are_left_to_run_time():
 def test_a_traced_value_has_no_number(function):
     with pytest.raises(TraceError):
         function(Tape().input("q", 0))
+
+
+NUMBERS = [2, 2.0, True, np.int64(2), np.float32(2.0), np.bool_(True), np.array(2.0), Fraction(1, 2), Decimal(2), 2j]
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=repr)
+def test_a_traced_value_is_compared_with_no_number_of_any_kind(number):
+    x = Tape().input("q", 0)
+    for compared in (lambda: x == number, lambda: number == x, lambda: x != number, lambda: x in [number]):
+        with pytest.raises(TraceError):
+            compared()
+    assert (x == x) is True and (x == None) is False  # noqa: E711
 
 
 def test_an_exact_division_by_zero_is_an_error_but_not_in_a_branch_not_taken():

@@ -6,6 +6,7 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 
+from mbd.tape.derivatives import gradient
 from mbd.tape.evaluate import evaluate
 from mbd.tape.functions import where
 from mbd.tape.node import Tape
@@ -35,6 +36,19 @@ def test_a_lowered_expression_has_its_value(expression):
     node = lower(expression, {x: a, y: b}, tape)
     expected = float(expression.subs({x: sp.Float(0.7, 30), y: sp.Float(1.9, 30)}).evalf(20))
     assert evaluate([node], {a: 0.7, b: 1.9})[0] == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("function", [sp.asinh, sp.atanh, sp.acosh])
+def test_inverse_hyperbolic_functions_keep_their_digits_and_slopes_at_every_size(function):
+    tape = Tape()
+    a = tape.input("q", 0)
+    node = lower(function(x), {x: a}, tape)
+    for size in (0.0, 1e-9, 0.3, 0.9, 1.1, 40.0, 1e5, 1e9, 1e100):
+        for at in (size, -size):
+            known = [each.subs(x, sp.Float(at, 60)).evalf(30) for each in (function(x), function(x).diff(x))]
+            if all(each.is_real and each.is_finite for each in known):
+                found = evaluate([node, *gradient(node, [a])], {a: at})
+                assert found == pytest.approx([float(each) for each in known], rel=1e-13, abs=1e-15)
 
 
 def test_shared_subexpressions_are_lowered_once():
