@@ -25,7 +25,7 @@ from mbd.configuration import Configuration
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.gait.return_map import Arrival, ReturnMap, Values
-from mbd.gait.section import Chart, Section
+from mbd.gait.section import Chart
 from mbd.sensitivity.asked import EndState
 from mbd.sensitivity.motion import Mode, Motion, Tangent
 from mbd.sensitivity.passed import Passed
@@ -37,7 +37,7 @@ from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
-__all__ = ["exact_derivative"]
+__all__ = ["exact_derivative", "motion_on_section"]
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ def exact_derivative(
     programs = programs_of(map_.mechanism, wanted, parameters)
     chosen = [every[place] for place in programs.places]
     p = np.array([[each.get(name, 0.0) for each in rates] for name in chosen]).reshape(len(chosen), len(rates))
-    along = _tangent(chart, state, programs, p)
+    begun = motion_on_section(chart, state, programs, p)[0].tangent
+    along = np.vstack([begun.q, begun.y, begun.anchors])
     period, travel, steps = np.zeros(len(rates)), np.zeros((len(map_.fixed), len(rates))), list[Matrix]()
     for number in range(map_.strides):
         starts = [replace(each, along=along[:, k]) for k, each in enumerate(wanted)]
@@ -147,7 +148,7 @@ def _steps(
 ) -> Matrix:  # fmt: skip
     """The derivatives of times and lengths of the steps of one return, as `ReturnMap` tells them; NaN as they are."""
     by = np.full((2 * len(arrival.steps), travel.shape[1]), np.nan)
-    instants = [(each.before.t, each.before.tangent.t) for each in passed.instants]
+    instants = [(each.time, each.of_time) for each in passed.instants]
     instants.append((arrival.period, passed.motion.tangent.t))
     for k, (_, time, _) in enumerate(arrival.steps):
         by[2 * k] = min(instants, key=lambda instant: abs(instant[0] - time))[1]
@@ -205,8 +206,8 @@ def _tangents(configuration: Configuration, move: Vector, increments: Matrix) ->
     return configuration.increment_velocities(np.broadcast_to(move, increments.T.shape), increments.T).T
 
 
-def _tangent(chart: Chart, state: State, programs: Programs, p: Matrix) -> Matrix:
-    """T (n_v + n + A, D) at a state of the section, by its coordinates and then by parameters of rates p (P, D)."""
+def motion_on_section(chart: Chart, state: State, programs: Programs, p: Matrix) -> tuple[Motion, Mode]:
+    """A state of the section with T, by its coordinates and then by parameters of rates p (P, D); what acts there."""
     section, mechanism = chart.section, chart.section.mechanism
     layout, equations = mechanism.layout, mechanism.equations
     columns, y = programs.columns, np.concatenate([state.v, state.z])
@@ -231,11 +232,11 @@ def _tangent(chart: Chart, state: State, programs: Programs, p: Matrix) -> Matri
     configuration = equations.configuration
     move = configuration.difference(chart.state.q, state.q)
     free, off = (_tangents(configuration, move, part) for part in (chart.places, chart.off_places))
-    gaps = [_watched_line(section, value) for value, _ in section.gaps]
+    gaps = [section.watched_line(value) for value, _ in section.gaps]
     G = np.vstack([of_h[list(section.places)], *watched[gaps]])
     motion = motion.with_tangent(q=with_rows(free @ parts[0], off, G, columns.x, tangent))
     own = slice(columns.y.start, columns.y.start + layout.n_v)
-    speeds = [_watched_line(section, value) for value in section.speeds]
+    speeds = [section.watched_line(value) for value in section.speeds]
     B = np.vstack([of_rate[list(section.rates)], *watched[speeds]])
     of_y[: layout.n_v] = with_rows(chart.rates @ parts[1], chart.off_rates, B, own, motion.tangent)
     motion = motion.with_tangent(y=of_y)
@@ -246,10 +247,4 @@ def _tangent(chart: Chart, state: State, programs: Programs, p: Matrix) -> Matri
         stored, found = list(section.stored), motion.tangent.anchors.copy()
         found[stored] = programs.stored(motion.at(mode, *none))[1][stored] @ motion.tangent.stacked(columns)
         motion = motion.with_tangent(anchors=found)
-    return np.vstack([motion.tangent.q, motion.tangent.y, motion.tangent.anchors])
-
-
-def _watched_line(section: Section, place: int) -> int:
-    """Where `Programs.watched` lists the value of a gap or of what an event watches, from its place in `guards`."""
-    contacts = len(section.manager.contacts)
-    return place if place < contacts else place - 2 * contacts
+    return motion, mode

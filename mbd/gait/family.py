@@ -19,18 +19,20 @@ from mbd.bodies.values import is_finite_number, shown
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
+from mbd.gait.exact_derivative import motion_on_section
 from mbd.gait.floquet import Multipliers, multipliers_of
 from mbd.gait.map_derivative import MapDerivative, Measured
 from mbd.gait.return_map import ReturnMap, Values
 from mbd.gait.section import Chart
+from mbd.sensitivity.starts import Direction, programs_of
 from mbd.state import State
 
 __all__ = ["Member", "across", "energy_of", "energy_slope", "floquet", "member_of"]
 
+DIFFERENCE_STEP = 1e-5
+"""Difference of a value, relative to 1 or it, whose function of parameters has no slopes [-]."""
 UNIT_MULTIPLIER_ATOL = 1e-3
 """Distance of a multiplier from 1 within which it may be that of energy that nothing takes [-]."""
-DIFFERENCE_STEP = 1e-5
-"""Distance [m, rad, m/s, rad/s] of the states from whose energies the slope of energy follows."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +73,7 @@ class Member:
         """∂g/∂p/size by a parameter, of which the numbers of the map have the derivative `column`."""
         if self.kind == "speed":
             return float(self.by_numbers(map_, found, column[:, np.newaxis])[0] / self.size)
-        value = float(values[name])
-        h = DIFFERENCE_STEP * max(1.0, abs(value))
-        ends = [{**values, name: value + sign * h} for sign in (1.0, -1.0)]
-        high, low = (energy_of(map_, [chart.at(np.zeros(chart.size), map_.vector(end))], end)[0] for end in ends)
-        return float((high - low) / (2.0 * h) / self.size)
+        return float(energy_slope(map_, chart, values, name)[-1] / self.size)
 
     def by_numbers(self, map_: ReturnMap, found: Measured, derivative: Matrix) -> Vector:
         """The derivative of the speed from that of the numbers of the map."""
@@ -122,14 +120,28 @@ def energy_of(map_: ReturnMap, states: Sequence[State], values: Values) -> Vecto
     return total
 
 
-def energy_slope(map_: ReturnMap, chart: Chart, values: Values) -> Vector:
-    """∇(T + V) along the section."""
-    parameters = map_.vector(values)
-    states = [
-        chart.at(sign * DIFFERENCE_STEP * unit, parameters) for unit in np.eye(chart.size) for sign in (1.0, -1.0)
-    ]
-    total = energy_of(map_, states, values).reshape(-1, 2)
-    return np.asarray((total[:, 0] - total[:, 1]) / (2.0 * DIFFERENCE_STEP))
+def energy_slope(map_: ReturnMap, chart: Chart, values: Values, name: str = "") -> Vector:
+    """∇(T + V) along the section, and its derivative by a parameter, with which the state keeps on the section."""
+    mechanism, parameters, section = map_.mechanism, map_.vector(values), chart.section
+    rates = map_.rates_of(name, values) if name else {}
+    if rates is None:  # of a function whose slopes are lost to round-off beside a parameter that passes zero
+        h = DIFFERENCE_STEP * max(1.0, abs(values[name]))
+        high, low = (map_.vector({**values, name: values[name] + sign * h}) for sign in (1.0, -1.0))
+        every = [each.name for each in mechanism.equations.parameters]
+        rates = {every[k]: float(high[k] - low[k]) / (2.0 * h) for k in np.flatnonzero(high != low)}
+    programs = programs_of(mechanism, [Direction(name, parameters=rates)], parameters)
+    p = np.zeros((len(rates), chart.size + int(bool(name))))
+    p[:, chart.size :] = np.array(list(rates.values())).reshape(len(rates), int(bool(name)))
+    motion, mode = motion_on_section(chart, chart.at(np.zeros(chart.size), parameters), programs, p)
+    equations, closed = mechanism.equations, section.mode.closed
+    with equations.tape.lock:
+        energy = equations.kinetic + equations.potential
+        for effect in equations.effects:
+            if effect.elastic is not None and equations.contacts[effect.contact].name in closed:
+                energy = energy + effect.elastic
+    still = np.zeros(programs.columns.n), np.zeros(programs.columns.rows)
+    slopes = programs.derivatives_of(f"energy with {sorted(closed)}", [energy], motion.at(mode, *still))
+    return np.asarray(slopes[0] @ motion.tangent.stacked(programs.columns))
 
 
 def across(map_: ReturnMap, chart: Chart, values: Values) -> Vector:

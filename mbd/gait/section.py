@@ -34,6 +34,7 @@ from mbd.gait.heading import Heading
 from mbd.gait.machines import remembered, state_anchors
 from mbd.gait.whole_turns import unwound
 from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.sensitivity.programs import Programs, State as At
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
@@ -41,8 +42,6 @@ __all__ = ["Chart", "Section", "section_of"]
 
 GAP_ATOL = 1e-7
 """Gap of the section's event [m, rad] after a reset up to which it still holds."""
-DIFFERENCE_STEP = 1e-6
-"""Difference of velocities, relative to 1 or them, from which the gradient of what an event watches follows [-]."""
 CORRECTIONS, FINE = 12, 1e-14
 """Newton corrections of positions onto the section, and the residual [m, rad] at which they end."""
 
@@ -135,13 +134,18 @@ class Section:
         n_v, (_, picked), speeds = self.mechanism.layout.n_v, self._picked, list(self.speeds)
         if not speeds:
             return terms.rate[picked], terms.B[picked][:, :n_v]
-        v, z = y[:n_v], y[n_v:]
-        steps = DIFFERENCE_STEP * np.maximum(1.0, np.abs(v)) * np.eye(n_v)
-        guards = self._guards(q, z, parameters, anchors)
-        ends = [[guards(v + sign * step)[speeds] for sign in (1.0, -1.0)] for step in steps]
-        slopes = np.array([(high - low) / (2.0 * np.max(step)) for (high, low), step in zip(ends, steps, strict=True)])
-        here = guards(v)[speeds]
-        return np.append(terms.rate[picked], here), np.vstack([terms.B[picked][:, :n_v], slopes.T])
+        programs = Programs(self.mechanism, (), parameters)
+        still = np.zeros(len(y)), np.zeros(programs.columns.rows)
+        switches, slips = self.flags.astype(float), np.zeros(len(self.mechanism.equations.frictions))
+        here, slopes = programs.watched(At(0.0, q, y, *still, anchors, switches, slips))
+        lines = [self.watched_line(place) for place in speeds]
+        B = np.vstack([terms.B[picked][:, :n_v], slopes[lines, programs.columns.y][:, :n_v]])
+        return np.append(terms.rate[picked], here[lines]), B
+
+    def watched_line(self, place: int) -> int:
+        """Where `Programs.watched` lists the value of a gap or of what an event watches, from its place in `guards`."""
+        contacts = len(self.manager.contacts)
+        return place if place < contacts else place - 2 * contacts
 
     def anchored(self, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> Vector:
         """The anchors with what closed unilateral contacts hold at q, and machines have just stored."""

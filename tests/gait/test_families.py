@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
 import mbd
+from mbd.gait.family import energy_of, energy_slope
 from tests.gait.test_gaits_with_modes import walker as torso_walker
 from tests.spring_mass import MASS, G, derivative, runner_apex, speed_at, until, walker_apex
 
@@ -41,6 +43,34 @@ def walker(stiffness: float = 14e3, angle: float = math.radians(69.0)) -> tuple[
 def at_energy(energy: float, y: float) -> np.ndarray:
     """What the apex map by hand leaves of the height, where the energy gives the speed."""
     return runner_apex(float(y), speed_at(float(y), energy), STIFFNESS, ANGLE)[0] - y
+
+
+def differences(gait: mbd.LimitCycle, name: str, value: float) -> list[float]:
+    """Slopes of the energy along the section, and by a parameter, with an error of fourth order."""
+
+    def energy(c: np.ndarray, change: float = 0.0) -> float:
+        now = {**gait.parameters, name: value + change}
+        return float(energy_of(gait.map, [gait.chart.at(c, gait.map.vector(now))], now)[0])
+
+    def slope(along: Callable[[float], float]) -> float:
+        return sum(w * (along(k * 1e-3) - along(-k * 1e-3)) for k, w in ((1, 8.0), (2, -1.0))) / 12e-3
+
+    units, zero = np.eye(gait.chart.size), np.zeros(gait.chart.size)
+    by = [slope(lambda h, unit=unit: energy(h * unit)) for unit in units]
+    return [*by, slope(lambda h: energy(zero, h * abs(value))) / abs(value)]
+
+
+@pytest.mark.parametrize(("made", "energy", "how"), [
+    (runner, 1860.0, {"section": "apex"}), (walker, 816.0, {"section": "highest", "mirror": SIDES}),
+])  # fmt: skip
+def test_slopes_of_energy_along_the_section_and_by_parameters_are_exact(made, energy, how) -> None:
+    """The walker stands on a compressed leg on its section."""
+    gait = mbd.limit_cycle(*made(), energy=energy, **how)
+    known = dict(zip(gait.run.record.parameter_names, gait.run.record.parameters, strict=False))
+    for name in {"body.mass", "gravity.y", "left leg.stiffness", "leg.stiffness"} & known.keys():
+        values = {**gait.parameters, name: known[name]}
+        found = energy_slope(gait.map, gait.chart, values, name)
+        np.testing.assert_allclose(found, differences(gait, name, known[name]), rtol=1e-7, atol=1e-7)
 
 
 @pytest.mark.parametrize("energy", [1800.0, 1860.0])
