@@ -13,7 +13,7 @@ import mbd
 model, body = mbd.Model("SLIP runner"), mbd.PointMass("body", mass=80.0)
 model.connect(mbd.Translation("place", model.ground.origin, body.origin))
 leg = mbd.SpringLeg("leg", body.origin, stiffness=20e3, length=1.0, touchdown_angle=math.radians(68.0))
-model.constrain(leg, mbd.Event("apex", mbd.measure("place.y.rate"), direction=-1))
+model.constrain(leg, mbd.Event("apex", "place.y.rate", direction=-1))
 near = mbd.assemble(model, {"place.y": 1.0}, {"place.x": 5.0, "place.y": 0.0})
 gait = mbd.limit_cycle(model, near, section="apex", speed=5.0)
 start, integrator, dt, until = gait.state, mbd.RungeKutta853(), 2e-3, 3.0

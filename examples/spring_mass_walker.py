@@ -15,7 +15,7 @@ model, body = mbd.Model("spring-mass walker"), mbd.PointMass("body", mass=80.0)
 model.connect(mbd.Translation("place", model.ground.origin, body.origin))
 for side in ("left", "right"):
     model.constrain(mbd.SpringLeg(f"{side} leg", body.origin, 14e3, 1.0, math.radians(69.0)))
-model.constrain(mbd.Event("highest", mbd.measure("place.y.rate"), direction=-1))
+model.constrain(mbd.Event("highest", "place.y.rate", direction=-1))
 near = mbd.assemble(
     model,
     {"place.x": 0.0, "place.y": 0.97},

@@ -13,7 +13,7 @@ from mbd.bodies.values import among, flag, name_of, names_of
 from mbd.constraints.expressions import is_expression, plain
 from mbd.constraints.machine import Change, Machine
 from mbd.constraints.measure import Measure
-from mbd.constraints.unilateral import measure_of
+from mbd.constraints.user_measure import measured
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -29,7 +29,8 @@ class Event(Machine):
     Parameters
     ----------
     name : its name, under which it stands in the run
-    guard : the measure; None: it happens `on` something
+    guard : what crosses zero as it happens: a measure, the name of a quantity ('trunk.y.rate'), a function of named
+        quantities, an expression; None: it happens `on` something
     reset : named values to set, {'hip.rate': 0.0}, or a function that makes them from named values; None for no change.
         A value may be a function of named values, ``{'hip.rate': lambda named: -0.5 * named['hip.rate']}``, or a sympy
         expression: ``{theta.q: -theta.q, phi.v: 0}``
@@ -41,7 +42,7 @@ class Event(Machine):
     """
 
     name: str
-    guard: Measure | None = None
+    guard: Any = None
     reset: Any = field(default=None, hash=False)
     terminal: bool = False
     direction: int = 0
@@ -60,7 +61,7 @@ class Event(Machine):
         if self.on is not None and self.direction:
             raise ModelError(f"direction of Event '{self.name}' is that of a guard; leave it out beside on=")
         if self.guard is not None:
-            object.__setattr__(self, "guard", measure_of(self.guard, f"Event '{self.name}'"))
+            object.__setattr__(self, "guard", measured(self.guard, f"guard of Event '{self.name}'"))
         if not (self.reset is None or isinstance(self.reset, Mapping) or callable(self.reset)):
             raise ModelError(f"reset of Event '{self.name}' maps names to values, got {self.reset!r}")
         if isinstance(self.reset, Mapping):

@@ -9,10 +9,9 @@ from typing import Any
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import among, is_number, name_of, number
-from mbd.constraints.expressions import is_expression
 from mbd.constraints.machine import SEPARATOR, Change, Machine
 from mbd.constraints.measure import Measure, gap_of
-from mbd.constraints.user_measure import measure
+from mbd.constraints.user_measure import measured
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.forces.quantities import Mention
@@ -71,7 +70,7 @@ class Transition:
         if self.on is not None and (not isinstance(self.on, str) or not self.on):
             raise ModelError(f"{title}: on is the name of a contact, an event or a mode, got {self.on!r}")
         if self.when is not None:
-            put(self, "when", _measured(self.when, f"{title}: when"))
+            put(self, "when", measured(self.when, f"{title}: when"))
         if is_number(self.after):
             put(self, "after", number(self.after, f"{title}: after"))
             if self.after <= 0.0:
@@ -79,23 +78,11 @@ class Transition:
         elif self.after is not None and not isinstance(self.after, str):
             raise ModelError(f"{title}: after is a time [s] or the name of a parameter, got {self.after!r}")
         if self.only_while is not None and not isinstance(self.only_while, str):
-            put(self, "only_while", _measured(self.only_while, f"{title}: only_while"))
+            put(self, "only_while", measured(self.only_while, f"{title}: only_while", "a contact"))
         if not among(self.direction, (-1, 0, 1)):
             raise ModelError(f"{title}: direction is -1, 0 or 1, got {self.direction!r}")
         if self.direction and self.when is None:
             raise ModelError(f"{title}: direction is that of when=; leave it out")
-
-
-def _measured(value: Any, what: str) -> Measure:
-    """A measure as users may give it: a measure, the name of a quantity, a function or an expression of such names."""
-    if isinstance(value, Measure):
-        return value
-    if isinstance(value, str) or is_expression(value) or callable(value):
-        try:
-            return measure(value)
-        except ModelError as error:
-            raise ModelError(f"{what}: {error}") from error
-    raise ModelError(f"{what} is a measure, the name of a quantity, or a function of quantities, got {value!r}")
 
 
 @dataclass(frozen=True)
@@ -390,8 +377,8 @@ def _stored(value: Any, mode: Mode, label: str) -> tuple[Measure, tuple[str, ...
     if isinstance(value, Mapping):
         if len({id(each) for each in value.values()}) != 1 and len(set(map(str, value.values()))) != 1:
             raise ModelError(f"{what}: give one quantity, for one state or several; remember others under other names")
-        return _measured(next(iter(value.values())), what), tuple(value)
-    return _measured(value, what), ()
+        return measured(next(iter(value.values())), what), tuple(value)
+    return measured(value, what), ()
 
 
 def _numbers(values: Any, mode: Mode, name: str) -> dict[str, float]:

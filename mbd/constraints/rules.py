@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mbd.bodies.values import flag
-from mbd.constraints.expressions import is_expression
 from mbd.constraints.measure import Measure
-from mbd.constraints.user_measure import measure
+from mbd.constraints.user_measure import measured
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
@@ -57,12 +56,8 @@ def releases_of(value: Any, what: str) -> tuple[When, ...]:
 
 
 def condition_of(value: Any, what: str) -> str | Measure | None:
-    """The `only_while=` of a contact: a name, a measure or expression that must be positive, or None."""
-    if is_expression(value):
-        return measure(value)
-    if value is None or isinstance(value, str | Measure):
-        return value
-    raise ModelError(f"only_while of '{what}' is the name of a contact, or a measure, got {value!r}")
+    """The `only_while=` of a contact: a name, what must be positive (a measure, a function, an expression), or None."""
+    return value if value is None or isinstance(value, str) else measured(value, f"only_while of '{what}'", "a contact")
 
 
 def contacts_of(condition: str | Measure | None) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import among
-from mbd.constraints.expressions import plain, quantities_in
+from mbd.constraints.expressions import is_expression, plain, quantities_in
 from mbd.constraints.measure import Measure
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
@@ -15,7 +15,7 @@ from mbd.forces.quantities import ArgumentSpec, Mention, arguments_of, mentioned
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import traced_scalar
 
-__all__ = ["UserMeasure", "measure"]
+__all__ = ["UserMeasure", "measure", "measured"]
 
 
 @dataclass(frozen=True)
@@ -101,3 +101,21 @@ def measure(function: Any, *arguments: Any, unit: str = "m", tangents: Any = Non
         unit,
         tuple(quantity_of(tangent, "tangent of a measure") for tangent in several),
     )
+
+
+def measured(value: Any, what: str, name: str = "a quantity") -> Measure:
+    """What a condition watches, checked at the border: a measure, or what `measure` makes one of without arguments.
+
+    Parameters
+    ----------
+    value : a measure, the name of a quantity, a function or an expression of such names
+    what, name : for errors, what it is, "guard of Event 'apex'", and what a name stands for
+    """
+    if isinstance(value, Measure):
+        return value
+    if isinstance(value, str) or is_expression(value) or callable(value):
+        try:
+            return measure(value)
+        except ModelError as error:
+            raise ModelError(f"{what}: {error}") from error
+    raise ModelError(f"{what} is a measure, the name of {name}, or a function of quantities, got {value!r}")

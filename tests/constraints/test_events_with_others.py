@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
 import mbd
 from mbd.errors import ModelError, SimulationError
@@ -87,9 +88,34 @@ def test_a_reset_against_a_contact_that_stays_closed_is_refused_by_name() -> Non
         mbd.simulate(*ball(KICK, restitution=0.0), RK, dt=0.02, until=1.0)
 
 
+def _rate(rate: Any) -> Any:
+    return rate
+
+
+CONDITIONS = [
+    "place.y.rate", mbd.measure("place.y.rate"), mbd.measure(_rate, "place.y.rate"),
+    sympy.Symbol("place.y.rate", real=True),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_events_and_transitions_take_conditions_in_the_same_forms(condition: Any) -> None:
+    turns = mbd.Mode("phase", ("rise", "fall"), transitions=[
+        mbd.Transition("rise", "fall", when=condition, direction=-1), mbd.Transition("fall", "rise", on="floor"),
+    ])  # fmt: skip
+    run = mbd.simulate(*ball(mbd.Event("apex", condition, direction=-1), turns), RK, dt=0.02, until=1.0)
+    times = {name: [each.time for each in run.events if each.name == name] for name in ("apex", "phase: rise to fall")}
+    hop = math.sqrt(2.0 * 0.5 / G) * (1.0 + 0.8)
+    np.testing.assert_allclose(times["apex"], hop, atol=1e-12)
+    np.testing.assert_allclose(times["phase: rise to fall"][-1], hop, atol=1e-12)
+
+
 @pytest.mark.parametrize(("make", "told"), [
     (lambda: mbd.Event("kick"), "takes one cause, a guard or on="),
     (lambda: mbd.Event("kick", mbd.measure("place.y"), on="floor"), "takes one cause"),
+    (lambda: mbd.Event("kick", 5), "guard of Event 'kick' is a measure, the name of a quantity, or a function"),
+    (lambda: mbd.Unilateral("wall", mbd.height(mbd.PointMass("p", 1.0).origin), only_while=5), "name of a contact"),
+    (lambda: ball(mbd.Event("kick", "place.yy")), "no quantity named 'place.yy'; did you mean"),
     (lambda: mbd.Event("kick", on="kick"), "the name of something else"),
     (lambda: mbd.Event("kick", on="floor", direction=1), "leave it out beside on="),
     (lambda: ball(mbd.Event("kick", on="flor")), "on: no contact, event or mode named 'flor'; did you mean 'floor'"),
