@@ -72,8 +72,8 @@ class Along:
             where another event at the same instant made it happen.
         """
         for each in self.walked.instants:
-            if each.fired.name == name and each.before.t == time:
-                return each.before.tangent.t
+            if each.name == name and each.time == time and not np.any(np.isnan(each.of_time)):
+                return each.of_time
         raise refused(f"{name!r} happened at t = {time:.9g} s because of another event there")
 
 

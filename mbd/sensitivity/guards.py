@@ -7,7 +7,7 @@ name.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
@@ -45,11 +45,9 @@ def trigger(
         where several did at one instant, with their names.
     """
     numbers = {contact.name: c for c, contact in enumerate(equations.contacts)}
-    guards = {guard.name: e for e, guard in enumerate(equations.guards)}
     frictions = {friction.name: f for f, friction in enumerate(equations.frictions)}
     closed = {event.name for event in events if event.kind == "closed"}
-    crossed = [guards[event.name] for event in events if event.kind == "event"]
-    found = [Trigger("event", e, equations.guards[e].name) for e in crossed if _fires(equations, e)]
+    found = [Trigger("event", e, equations.guards[e].name) for e in firing(equations, events)]
     for name in sorted(closed):
         c = numbers[name]
         if equations.contacts[c].kind == "penalty" or gap_rates[c] < -REST_SPEED:
@@ -75,10 +73,24 @@ def trigger(
     return found[0]
 
 
-def _fires(equations: Equations, e: int) -> bool:
-    """Whether an event happens by its own guard: transitions that others cause follow from these."""
-    taken = equations.guards[e].transition
-    return taken is None or ("event", e) in taken.causes
+def firing(equations: Equations, events: Sequence[EventRecord]) -> list[int]:
+    """Numbers of the guards by which some of these events happen: transitions that others cause follow from them."""
+    happened = {event.name for event in events if event.kind == "event"}
+    return [
+        e for e, guard in enumerate(equations.guards)
+        if guard.name in happened and (guard.transition is None or ("event", e) in guard.transition.causes)
+    ]  # fmt: skip
+
+
+def acts(equations: Equations, e: int, until: Any) -> bool:
+    """Whether the motion depends on the event of a guard: it resets or ends something, or a machine knows it.
+
+    until : what ends the run
+    """
+    guard, stop = equations.guards[e], until[0] if isinstance(until, tuple | list) else until
+    taken = [other.transition.causes for other in equations.guards if other.transition is not None]
+    named = any(("event", e) in causes or ("taken", e) in causes for causes in taken)
+    return guard.reset is not None or guard.terminal or guard.transition is not None or named or guard.name == stop
 
 
 def refused_graze(fired: Trigger, time: float, rate: float, terms: float) -> CapabilityError:

@@ -20,6 +20,7 @@ from mbd.equal import EQUAL_RTOL, INSTANT_RTOL, NOMINAL_RTOL
 from mbd.errors import MbdError, OneSidedError
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode, Motion, Rates
+from mbd.sensitivity.passed import Instant
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, sided
 from mbd.sensitivity.starts import directions, programs_of, start_tangent
@@ -147,18 +148,18 @@ def refuse_sided_grip(
 
 
 def refuse_sided_end(
-    rows: RunRows, programs: Programs, motion: Motion, mode: Mode, rates: Rates, instants: Sequence[tuple[str, Motion]]
+    rows: RunRows, programs: Programs, motion: Motion, mode: Mode, rates: Rates, instants: Sequence[Instant]
 ) -> None:  # fmt: skip
     """Raise a `OneSidedError` where an event happens at the given or latest time of a run, or would just after it.
 
-    motion, mode, rates : at the last row; instants : (name, motion before it) of the events of the run
+    motion, mode, rates : at the last row; instants : the events of the run
     """
     until, end = rows.record.settings.get("until"), float(rows.record.time[-1])
     latest: Any = until[-1] if isinstance(until, tuple | list) else until
     within = INSTANT_RTOL * _duration(rows)
     if not is_number(latest) or end < float(latest) - within or not _is_any(programs):
         return
-    names = [name for name, before in instants if end - before.t <= within and np.any(before.tangent.t != 0.0)]
+    names = [each.name for each in instants if end - each.time <= within and np.any(each.of_time != 0.0)]
     if not names:
         watched = _Watched(programs, motion, mode, rates)
         names = [*watched.firing(within), *watched.stopping(within)]

@@ -14,7 +14,7 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.run_data import RunRows, refused
+from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.tape.node import Node
 
 __all__ = ["Lines", "lines_of", "taken_apart", "usual"]
@@ -58,11 +58,13 @@ def instant_of(name: str, found: Passed) -> tuple[float, Vector] | None:
         number, stem, last = int(last), *stem.rpartition(".")[::2]
     if last != "time" or not stem:
         return None
-    mine = [each for each in found.instants if each.fired.name == stem]
+    mine = [each for each in found.instants if each.name == stem]
     if not 0 < number <= len(mine):
         return None
     chosen = mine[number - 1]
-    return chosen.before.t, chosen.before.tangent.t
+    if np.any(np.isnan(chosen.of_time)):
+        raise sided(f"of: {name!r} is the instant of an event that happens together with another by chance")
+    return chosen.time, chosen.of_time
 
 
 def lines_of(rows: RunRows, programs: Programs, found: Passed, of: Sequence[str]) -> Lines:
@@ -100,7 +102,7 @@ def _places(rows: RunRows, found: Passed, names: Sequence[str]) -> tuple[NDArray
         try:
             parts = columns.components(name)
         except UnknownNameError:
-            times = [f"{each.fired.name}.time" for each in found.instants]
+            times = [f"{each.name}.time" for each in found.instants]
             known = {*columns.names, *times, "time"}
             raise UnknownNameError("of: " + nearest(name, known, "result", "The run has")) from None
         if len(parts) > 1:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import field
 
+from mbd.arrays import Vector
 from mbd.dataclass import dataclass
-from mbd.sensitivity.guards import Trigger
 from mbd.sensitivity.motion import Mode, Motion, Rates
 
 __all__ = ["Instant", "Passed"]
@@ -13,12 +13,11 @@ __all__ = ["Instant", "Passed"]
 
 @dataclass(frozen=True)
 class Instant:
-    """An event with its derivatives: the rows before and after it, and the motions there."""
+    """An event: its name, its time [s], and the derivatives (D,) of this, NaN where they have one side only."""
 
-    row: int
-    fired: Trigger
-    before: Motion
-    after: Motion
+    name: str
+    time: float
+    of_time: Vector
 
 
 @dataclass

@@ -21,7 +21,7 @@ from mbd.kernel.records import TABLE
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.sensitivity.motion import Motion, Rates, Tangent
 from mbd.sensitivity.one_sided import sided_end
-from mbd.sensitivity.passed import Instant, Passed
+from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.resets import after_reset
 from mbd.sensitivity.run_data import RunRows, refused, sided
@@ -147,12 +147,7 @@ def tangent_run(
             visit(row, motion, rows.mode(row), rates)
     if not located:
         return Passed(end[0], last, end[1])
-    fired = refuse_turning_points(rows, programs, at_row, end)
-    instants = [
-        Instant(row, trigger, at_row(row - 1)[0], at_row(row - 1)[0])
-        for row, trigger in zip(sorted(rows.events), fired, strict=True)
-    ]  # fmt: skip
-    return Passed(end[0], last, end[1], instants)
+    return Passed(end[0], last, end[1], refuse_turning_points(rows, programs, at_row, end))
 
 
 def seed(

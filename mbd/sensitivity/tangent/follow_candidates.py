@@ -5,6 +5,8 @@ from __future__ import annotations
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, STICK
 from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents
 from mbd.kernel.contact.cone_steps import keeps_direction
+from mbd.kernel.events.guard_round_off import guard_round_off
+from mbd.kernel.events.guard_sides import RESET_ROUND_OFFS
 from mbd.kernel.events.guards import guard_value, watch
 from mbd.kernel.events.transitions import is_due
 from mbd.kernel.records import Kernel
@@ -90,7 +92,8 @@ def follow_event(K: Kernel) -> int:
     """
     h = without_tangent(K.event_after)
     kind = K.event_kind
-    if h <= 0.0 and kind != CLOSE and kind != CROSS and kind != CROSS_BACK and kind != STICK:
+    moves = kind == CLOSE or kind == CROSS or kind == CROSS_BACK or kind == STICK
+    if h <= 0.0 and (not moves or (kind != CLOSE and kind != STICK and has_jumped(K, K.event_index))):
         event_at_start(K)
         K.event_after = h
         return 0
@@ -110,6 +113,12 @@ def follow_event(K: Kernel) -> int:
     status = candidate_after(K, K.event_after)
     restore_candidate(K)
     return status
+
+
+def has_jumped(K: Kernel, e: int) -> bool:
+    """Whether user guard e is beyond zero since the last event, with whose instant its own moves."""
+    value = without_tangent(K.guards0[K.at_user + e])
+    return abs(value) > RESET_ROUND_OFFS * without_tangent(guard_round_off(K, e, K.time, K.q, K.y))
 
 
 def follow_rest(K: Kernel, h: float) -> int:

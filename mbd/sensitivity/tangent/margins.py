@@ -6,20 +6,23 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mbd.sensitivity.guards import GRAZING_RTOL, Trigger, refused_graze, trigger
+from mbd.arrays import Vector
+from mbd.equal import HALF_PRECISION_RTOL
+from mbd.sensitivity.guards import GRAZING_RTOL, Trigger, acts, firing, refused_graze, trigger
 from mbd.sensitivity.motion import Motion, Rates
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_grip, refuse_sided_start
+from mbd.sensitivity.passed import Instant
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, sided
 from mbd.sensitivity.strikes import refuse_sided_impact
 
 __all__ = ["refuse_turning_points"]
 
+AtRow = Callable[[int], tuple[Motion, Rates]]
 
-def refuse_turning_points(
-    rows: RunRows, programs: Programs, at_row: Callable[[int], tuple[Motion, Rates]], end: tuple[Motion, Rates]
-) -> list[Trigger]:
-    """What ended the step before each event.
+
+def refuse_turning_points(rows: RunRows, programs: Programs, at_row: AtRow, end: tuple[Motion, Rates]) -> list[Instant]:
+    """The events, each with the derivatives of its instant.
 
     Parameters
     ----------
@@ -32,8 +35,7 @@ def refuse_turning_points(
     OneSidedError, CapabilityError
         where a run has derivatives on one side only, or none.
     """
-    found = list[Trigger]()
-    instants = list[tuple[str, Motion]]()
+    found, lead = list[Instant](), 0
     refuse_sided_start(rows, programs, at_row)
     time = rows.record.time
     for row in (0, *(row for row in sorted(rows.events) if row < len(time) - 1)):
@@ -44,34 +46,56 @@ def refuse_turning_points(
         again = before in rows.events or (
             prior >= 0 and time[prior] == time[before] and (prior in rows.events or prior == 0)
         )
-        if again and (own := _of_own_gap(rows, programs, row)) is not None:
-            found.append(own)
-            instants.append((own.name, at_row(before)[0]))
-            continue
         if again:
-            raise sided(
-                f"{rows.events[row][0].name!r} happens at t = {time[before]:.9g} s right after another event or the "
-                "start, with no time between"
-            )
+            found.append(_beside(rows, programs, at_row, lead, row))
+            continue
+        lead, motion = row, at_row(before)[0]
         fired = _fired(rows, programs, row, *at_row(before))
-        found.append(fired)
-        instants.append((fired.name, at_row(before)[0]))
+        found.append(Instant(fired.name, motion.t, motion.tangent.t))
     last = len(time) - 1
-    refuse_sided_end(rows, programs, end[0], rows.mode(last), end[1], instants)
+    refuse_sided_end(rows, programs, end[0], rows.mode(last), end[1], found)
     return found
 
 
-def _of_own_gap(rows: RunRows, programs: Programs, row: int) -> Trigger | None:
-    """The event of a row whose guard is the gap of a contact that has just closed: it always happens with that."""
-    equations, now = programs.equations, rows.record.time[row]
-    gaps = [
-        contact.gap for contact in equations.contacts
-        if any(e.name == contact.name and e.kind == "closed" and e.time == now for e in rows.run.events)
-    ]  # fmt: skip
-    for number, guard in enumerate(equations.guards):
-        if guard.name == rows.events[row][0].name and any(guard.value is gap for gap in gaps):
-            return Trigger("event", number, guard.name)
-    return None
+def _beside(rows: RunRows, programs: Programs, at_row: AtRow, lead: int, row: int) -> Instant:
+    """The event of a row right after that of row `lead`, at one instant with it.
+
+    It moves with it where its guard is the gap of a contact that has just closed, or has jumped over zero there. One
+    that changes nothing may come by chance: its own instant is not known then, unless both move alike.
+    """
+    equations, event, time = programs.equations, rows.events[row][0], float(rows.record.time[row])
+    numbers = [e for e, guard in enumerate(equations.guards) if guard.name == event.name]
+    if lead and event.kind == "event" and numbers and len(firing(equations, rows.events[row])) == 1:
+        before, place = at_row(lead - 1), 2 * len(equations.contacts) + numbers[0]
+        closed = [each.name for each in rows.run.events if each.kind == "closed" and each.time == time]
+        gaps = [contact.gap for contact in equations.contacts if contact.name in closed]
+        of_time = before[0].tangent.t
+        if any(equations.guards[numbers[0]].value is gap for gap in gaps):
+            return Instant(event.name, time, of_time)
+        values = [_guard(rows, programs, each, at_row(each), place) for each in (lead - 1, row - 1)]
+        if all(abs(value) > noise for value, noise, _, _ in values):
+            return Instant(event.name, time, of_time)
+        if not rows.controllers and not acts(equations, numbers[0], rows.record.settings["until"]):
+            _, _, change, growth = values[0]
+            size = np.max(np.maximum(np.abs(change - growth * of_time), np.abs(growth * of_time)))
+            moves_alike = np.all(np.abs(change) <= HALF_PRECISION_RTOL * size)
+            return Instant(event.name, time, of_time if moves_alike else np.full(len(of_time), np.nan))
+    raise sided(
+        f"{event.name!r} happens at t = {time:.9g} s right after another event or the start, with no time between"
+    )
+
+
+def _guard(
+    rows: RunRows, programs: Programs, row: int, at: tuple[Motion, Rates], place: int
+) -> tuple[float, float, Vector, float]:
+    """The value that is watched at a place, up to which one is zero, its derivatives (D,) and its rate."""
+    (motion, rates), c = at, programs.columns
+    values, slopes = programs.watched(motion.at(rows.mode(row), rates.rate, rates.lam))
+    flow = np.zeros(c.count)
+    flow[c.x], flow[c.y], flow[c.t] = motion.y[: c.n_v], rates.rate, 1.0
+    size = float(np.abs(slopes[place, c.y]) @ np.abs(motion.y) + np.abs(slopes[place]) @ np.abs(flow) * rows.full)
+    change = slopes[place] @ motion.tangent.stacked(c, rates.of_rate, rates.of_lam)
+    return values[place], HALF_PRECISION_RTOL * size, change, float(slopes[place] @ flow)
 
 
 def _fired(rows: RunRows, programs: Programs, row: int, motion: Motion, rates: Rates) -> Trigger:
