@@ -27,33 +27,37 @@ LIMIT = 60.0
 """Wall time after which a scene counts as one without end [s]."""
 
 
-def in_order(numbers: Iterable[int], workers: int, place: int) -> list[int]:
+def in_order(numbers: Iterable[int], workers: int, place: int, structures: int = STRUCTURES) -> list[int]:
     """The scenes of one worker, those of one mechanism together."""
-    return sorted((n for n in numbers if n % STRUCTURES % workers == place), key=lambda n: (n % STRUCTURES, n))
+    return sorted((n for n in numbers if n % structures % workers == place), key=lambda n: (n % structures, n))
 
 
 def run_batch(
-    numbers: Sequence[int], limit: float = LIMIT, hear: Callable[[dict[str, Any]], None] | None = None
+    numbers: Sequence[int],
+    limit: float = LIMIT,
+    hear: Callable[[dict[str, Any]], None] | None = None,
+    structures: int = STRUCTURES,
 ) -> list[dict[str, Any]]:
     """Verdicts of scenes, made in another process; one that dies or takes longer than `limit` seconds is 'bad'.
 
     Parameters
     ----------
     hear : called with each verdict
+    structures : how many mechanisms the scenes are drawn from
     """
     left, found = list(numbers), []
     while left:
-        done = _until_lost(left, limit, hear)
+        done = _until_lost(left, limit, hear, structures)
         found += done
         left = left[len(done) :]
     return found
 
 
 def _until_lost(
-    numbers: Sequence[int], limit: float, hear: Callable[[dict[str, Any]], None] | None
+    numbers: Sequence[int], limit: float, hear: Callable[[dict[str, Any]], None] | None, structures: int
 ) -> list[dict[str, Any]]:
     process = subprocess.Popen(
-        COMMAND,
+        [*COMMAND, f"--structures={structures}"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -112,12 +116,12 @@ def summary(verdicts: Iterable[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _work() -> None:
+def _work(structures: int) -> None:
     """A worker: numbers come as one list, verdicts go out line by line."""
     from tests.fuzz.verdict import verdict
 
     for number in json.load(sys.stdin):
-        print(json.dumps(verdict(number)), flush=True)
+        print(json.dumps(verdict(number, structures)), flush=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -126,13 +130,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--scenes", default="0:200", help="numbers of scenes, first:end")
     parser.add_argument("--space", action="store_true", help="scenes with joints that turn freely")
     parser.add_argument("--driven", action="store_true", help="driven and held mechanisms, exact zeros, curved ground")
+    parser.add_argument("--structures", type=int, default=STRUCTURES, help="how many mechanisms, shared by numbers")
     parser.add_argument("--workers", type=int, default=1, help="processes side by side")
     parser.add_argument("--seconds", type=float, default=0.0, help="wall time after which no scene is begun")
     parser.add_argument("--out", default="", help="a file for all verdicts, one a line")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.worker:
-        _work()
+        _work(given.structures)
         return
     base, above = (DRIVEN, None) if given.driven else (SPACE, DRIVEN) if given.space else (0, SPACE)
     first, end = (int(part) + base for part in given.scenes.split(":"))
@@ -148,11 +153,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
                     file.write(json.dumps(told) + "\n")
 
     def serve(place: int) -> None:
-        mine = in_order(range(first, end), given.workers, place)
+        mine = in_order(range(first, end), given.workers, place, given.structures)
         for k in range(0, len(mine), 250):
             if given.seconds and time.perf_counter() - began > given.seconds:
                 return
-            run_batch(mine[k : k + 250], hear=hear)
+            run_batch(mine[k : k + 250], hear=hear, structures=given.structures)
 
     threads = [threading.Thread(target=serve, args=(place,)) for place in range(given.workers)]
     for thread in threads:

@@ -14,7 +14,7 @@ from tests.fuzz.structures import DRIVEN, SPACE, Structure, structure
 __all__ = ["STRUCTURES", "Scene", "scene"]
 
 STRUCTURES = 160
-"""How many mechanisms there are; scenes with numbers equal modulo this share one."""
+"""How many mechanisms there are if nothing else is said; scenes with numbers equal modulo this share one."""
 
 SCHEMES: tuple[Any, ...] = (
     mbd.HHT(0.05), mbd.HHT(0.3), mbd.GeneralizedAlpha(0.9), mbd.GeneralizedAlpha(0.0), mbd.GeneralizedAlpha(0.5),
@@ -49,6 +49,7 @@ class Scene:
     options : arguments of `mbd.simulate` besides model and start
     check : what is compared beside the laws: '', 'restart', 'file', 'cut', 'twin', 'between', 'step there', 'one ulp',
         'tolerance', 'schemes'
+    structures : how many mechanisms scenes were drawn from
     """
 
     number: int
@@ -57,6 +58,7 @@ class Scene:
     start: Mapping[str, Any]
     options: Mapping[str, Any]
     check: str
+    structures: int = STRUCTURES
 
     @property
     def model(self) -> mbd.Model:
@@ -106,8 +108,8 @@ def scene(number: int, structures: int = STRUCTURES) -> Scene:
     if rng.random() < 0.02:
         check = "twin"
     if number >= DRIVEN:
-        return _driven(rng, Scene(number, form, cut, {}, options, check))
-    return Scene(number, form, cut, _start(rng, form), options, check)
+        return _driven(rng, Scene(number, form, cut, {}, options, check, structures))
+    return Scene(number, form, cut, _start(rng, form), options, check, structures)
 
 
 def _driven(rng: random.Random, made: Scene) -> Scene:

@@ -15,13 +15,13 @@ import numpy as np
 import mbd
 from mbd.errors import MbdError
 from tests.fuzz.judge import SHARE, between, judge
-from tests.fuzz.scenes import Scene, scene
+from tests.fuzz.scenes import STRUCTURES, Scene, scene
 
 __all__ = ["verdict"]
 
 
-def verdict(number: int) -> dict[str, Any]:
-    """How the scene of a number ended.
+def verdict(number: int, structures: int = STRUCTURES) -> dict[str, Any]:
+    """How the scene of a number ended, of so many mechanisms.
 
     Returns
     -------
@@ -30,7 +30,7 @@ def verdict(number: int) -> dict[str, Any]:
     began = time.perf_counter()
     told: dict[str, Any] = {"number": number, "kind": "ok", "reasons": [], "message": "", "scene": "", "check": ""}
     try:
-        made = scene(number)
+        made = scene(number, structures)
         told |= {"scene": str(made), "check": made.check}
         told |= _judged(made)
     except MbdError as error:
@@ -49,14 +49,14 @@ def run_of(made: Scene, **changes: Any) -> mbd.Trajectory:
     model = options.pop("model", made.model)
     start = options.pop("start", None)
     if start is None:
-        start = _assembled(made.number, model)
+        start = _assembled(made.number, made.structures, model)
     return mbd.simulate(model, start, on_failure="return", **options)
 
 
 @lru_cache(maxsize=4)
-def _assembled(number: int, model: mbd.Model) -> mbd.State:
+def _assembled(number: int, structures: int, model: mbd.Model) -> mbd.State:
     """The start of a scene, which its comparisons share."""
-    return mbd.assemble(model, **scene(number).start)
+    return mbd.assemble(model, **scene(number, structures).start)
 
 
 def _judged(made: Scene) -> dict[str, Any]:
@@ -254,7 +254,7 @@ def _one_ulp(made: Scene, run: mbd.Trajectory) -> list[str]:
     """
     if made.form.loops:
         return []
-    start = _assembled(made.number, made.model)
+    start = _assembled(made.number, made.structures, made.model)
     ends = []
     for q, v in (
         (np.nextafter(start.q, np.inf), np.nextafter(start.v, np.inf)),

@@ -155,6 +155,7 @@ def test_a_scene_is_made_again_from_its_number():
     one, two = scene(25), scene(25)
     assert str(one) == str(two) and one.start == two.start and one.model is two.model
     assert scene(25 + STRUCTURES).form is one.form
+    assert scene(25 + STRUCTURES, structures=100_000).form.number == 25 + STRUCTURES
 
 
 @pytest.mark.slow
