@@ -10,7 +10,7 @@ from mbd.kernel.records import Equations, Integers, Kernel, Reals, Steps
 __all__ = [
     "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
     "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections", "held_at_end",
-    "is_differentiated", "note_matrix", "note_solution", "note_step", "solve_plain", "takes_part",
+    "is_differentiated", "note_matrix", "note_solution", "solve_plain", "takes_part",
 ]  # fmt: skip
 
 NOT_FOLLOWED = -3
@@ -20,10 +20,6 @@ NOT_FOLLOWED = -3
 def is_differentiated() -> bool:
     """Whether this code carries derivatives."""
     return False
-
-
-def note_step(K: Kernel) -> None:
-    """A step begins: what `follow_candidate` needs to take it once more."""
 
 
 def held_at_end(K: Kernel, t1: float) -> float:

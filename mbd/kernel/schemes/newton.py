@@ -140,7 +140,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
             shifting = right_hand_sides(K, o_r, m, c_C, c_K, tangent, straight)
         if tangent and not straight and not factorize(K, K.n + m, tangents):
             return no_candidate(K, h, t1, SINGULAR)
-        if iteration == 0 and m > 0 and K.stabilized == 1:
+        if iteration == 0 and m > 0 and K.stabilized == 1 and not is_differentiated():
             status = pass_singularity(K, h, t1, m, c_C, c_K, straight)
             if status >= 0:
                 return status

@@ -34,6 +34,7 @@ from mbd.kernel.stepping.restart import (
     share_loads,
 )
 from mbd.kernel.stepping.scales import still_speed
+from mbd.kernel.tangent_rules import further_corrections, is_differentiated
 
 __all__ = ["misses", "singular_newmark_step", "steps_by_pivot", "steps_to_singularity"]
 
@@ -153,7 +154,8 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     tolerance = 4.0 * EPS if K.exact == 1 else 1e-3 * K.tolerance
     before = 1e300
     away = 0.0
-    for iteration in range(K.max_iterations):
+    further = 0
+    for iteration in range(K.max_iterations + further_corrections()):
         # tangent and residual at the iterate
         if sharing(K):
             share_loads(K, m)
@@ -176,7 +178,9 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
                 return SINGULAR
         # the candidate, or the next iterate
         if error <= 1.0:
-            return conclude_singular_step(K, h, away)
+            if further == further_corrections():
+                return conclude_singular_step(K, h, away)
+            further += 1
         before = error
         if not correct_positions(K, m, c_C, c_K):
             return SINGULAR
@@ -224,7 +228,8 @@ def conclude_singular_step(K: SingularSteps, h: float, away: float) -> int:
     if overturns(K, h):
         K.failure_size = -1.0
         return NOT_CONVERGED
-    K.n_singular_steps += 1
+    if not is_differentiated():  # which takes the same step once more
+        K.n_singular_steps += 1
     K.near_singular = PASSING if away < MAX_STEPS_AWAY else LEFT
     return 0
 

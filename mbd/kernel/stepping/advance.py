@@ -28,7 +28,7 @@ from mbd.kernel.stepping.judge_step import MAX_SHORTENINGS, end_timer, judge_ste
 from mbd.kernel.stepping.observe import is_awaited, store_row
 from mbd.kernel.stepping.starting import find_mode, restart
 from mbd.kernel.stepping.step_retry import is_shortened, part_end, step_end, tried_step
-from mbd.kernel.tangent_rules import held_at_end, note_step
+from mbd.kernel.tangent_rules import held_at_end
 
 __all__ = ["advance"]
 
@@ -110,7 +110,6 @@ def take_step(K: Kernel) -> int:
         within = True
         cut = False
     # the candidate
-    note_step(K)
     h = t1 - t
     if K.halvings > 0:
         h *= 0.5**K.halvings

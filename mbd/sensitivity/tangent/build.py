@@ -33,7 +33,7 @@ HELD = (
     "schemes.explicit_error.explicit_error", "schemes.radau_end.estimate_error", "singular.step_size.note_row_norms",
     "stepping.conditioning.known_error", "stepping.contact_step.find_pace", "stepping.control.first_step",
     "events.guard_round_off.guard_round_off", "singular.newmark_step.steps_to_singularity",
-    "schemes.iteration.overturns", "schemes.iteration.is_small", "rules.note_step", "rules.keep_candidate",
+    "schemes.iteration.overturns", "schemes.iteration.is_small", "rules.keep_candidate",
     "rules.restore_candidate", "rules.take_again", "rules.keep_stages", "rules.restore_stages", "rules.prepare_metric",
     "rules.prepare_rates", "schemes.explicit_rates.explicit_rates",
     "schemes.explicit_rates.rates_at_end", "schemes.runge_kutta.find_sizes", "schemes.runge_kutta.note_uneven",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, STICK
+from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, PASSING, STICK
 from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents
 from mbd.kernel.contact.cone_steps import keeps_direction
 from mbd.kernel.events.guard_round_off import guard_round_off
@@ -21,20 +21,16 @@ from mbd.sensitivity.tangent.words import (
     seed_rate,
     seeded,
     step_place,
+    was_near_singular,
     without_tangent,
 )
 
-__all__ = ["follow_candidate", "follow_event", "follows_rows", "held_at_end", "note_step"]
+__all__ = ["follow_candidate", "follow_event", "follows_rows", "held_at_end"]
 
 
 def follows_rows(K: Kernel) -> bool:
     """Whether rows between events are stored with their derivatives; those at events are in any case."""
     return bool(K.starts[every_row_place(K)] == 1.0)
-
-
-def note_step(K: Kernel) -> None:
-    """Whether a singular configuration is near as the step begins."""
-    K.starts[step_place(K)] = float(K.near_singular)
 
 
 def held_at_end(K: Kernel, t1: float) -> float:
@@ -44,13 +40,13 @@ def held_at_end(K: Kernel, t1: float) -> float:
 
 def keep_candidate(K: Kernel) -> None:
     """The values of the candidate into K.starts."""
-    K.starts[step_place(K) + 1] = float(K.near_singular)
+    K.starts[step_place(K)] = float(K.near_singular)
     carry_candidate(K, True)
 
 
 def restore_candidate(K: Kernel) -> None:
     """The values that the candidate had, which those of `follow_candidate` differ from by round-off."""
-    K.near_singular = int(K.starts[step_place(K) + 1])
+    K.near_singular = int(K.starts[step_place(K)])
     carry_candidate(K, False)
 
 
@@ -74,7 +70,7 @@ def follow_candidate(K: Kernel, h: float, t1: float) -> int:
         t1 = without_tangent(t1) + derivative_of(K.due_time)
         h = without_tangent(h) + derivative_of(K.due_time - K.time)
     keep_candidate(K)
-    K.near_singular = int(without_tangent(K.starts[step_place(K)]))
+    K.near_singular = PASSING if was_near_singular(K) else 0
     status = try_step(K, h, t1)
     restore_candidate(K)
     return status

@@ -7,7 +7,6 @@ Numbers in K.starts: inputs of the last of Newton's matrices | W | the block of 
 from __future__ import annotations
 
 from mbd.equal import ROUND_OFF_RTOL
-from mbd.kernel.codes import PASSING
 from mbd.kernel.records import Integers, Kernel, Reals
 
 __all__ = [
@@ -139,13 +138,13 @@ def step_place(K: Kernel) -> int:
 
 
 def was_near_singular(K: Kernel) -> bool:
-    """Whether the candidate was made with stages on both sides of a singular configuration."""
-    return bool(K.starts[step_place(K) + 1] == PASSING)
+    """Whether the candidate was made as one next to a singular configuration, or over it."""
+    return bool(K.starts[step_place(K)] > 0.0)
 
 
 def every_row_place(K: Kernel) -> int:
     """Where K.starts says whether all rows are stored with their derivatives."""
-    return int(step_place(K) + 2)
+    return int(step_place(K) + 1)
 
 
 def metric_place(K: Kernel) -> int:
