@@ -1,4 +1,4 @@
-"""Machine code of sums of functions: one loop for all, and jumps to it that know their tables."""
+"""Machine code of loops over tables, each made once, and jumps to it that know their tables."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ __all__ = ["Jump"]
 AT_ONCE = 64
 """Jumps that are made together."""
 
-LOOP = """
-define internal void @compose(ptr %block, ptr %parameters, ptr %out, ptr %plan) {
+SUM = """
+define internal void @loop(ptr %block, ptr %parameters, ptr %out, ptr %plan) {
 enter:
   %cleared = load i64, ptr %plan
   %at.count = getelementptr i64, ptr %plan, i64 1
@@ -123,50 +123,54 @@ leave:
 declare ptr @memset(ptr, i32, i64)
 declare ptr @malloc(i64)
 declare void @free(ptr)
-@plans = internal global [NUMBER x ptr] zeroinitializer
-define ptr @mbd.plans() {
-  ret ptr @plans
-}
-""".replace("NUMBER", str(AT_ONCE))
+"""
 """Clears the output, gives each part its inputs, calls it, and adds what it writes; the plan is that of `Composed`."""
 
+PLANS = """
+@plans = internal global [{number} x ptr] zeroinitializer
+define ptr @mbd.plans() {{
+  ret ptr @plans
+}}
+"""
 JUMP = """
 define void @mbd.jump.{k}(ptr %block, ptr %parameters, ptr %out) {{
   %at = getelementptr ptr, ptr @plans, i64 {k}
   %plan = load ptr, ptr %at
-  tail call void @compose(ptr %block, ptr %parameters, ptr %out, ptr %plan)
+  tail call void @loop(ptr %block, ptr %parameters, ptr %out, ptr %plan)
   ret void
 }}
 """
 
 
 class Jump:
-    """A function (block, parameters, out) by the plan of a `Composed`.
+    """A function (block, parameters, out) by a plan.
 
     Parameters
     ----------
-    plan : address of the plan, which lives as long as this does
+    plan : its address; it lives as long as this does
+    loop : text of the function ``loop(block, parameters, out, plan)``, by default that of `Composed`
     """
 
-    def __init__(self, plan: int) -> None:
-        if not _FREE:
-            _make_more()
-        self.address, slot = _FREE.pop()
+    def __init__(self, plan: int, loop: str = SUM) -> None:
+        free = _FREE.setdefault(loop, [])
+        if not free:
+            _make_more(loop, free)
+        self.address, slot = free.pop()
         slot.value = plan
-        weakref.finalize(self, _FREE.append, (self.address, slot))
+        weakref.finalize(self, free.append, (self.address, slot))
 
 
-_FREE: list[tuple[int, ctypes.c_uint64]] = []
-"""Jumps that nobody has, with the places of their plans."""
+_FREE: dict[str, list[tuple[int, ctypes.c_uint64]]] = {}
+"""Jumps that nobody has, with the places of their plans, by the loop."""
 _MACHINES: list[Machine] = []
 """What holds all jumps until the process ends."""
 
 
-def _make_more() -> None:
-    text = LOOP + "".join(JUMP.format(k=k) for k in range(AT_ONCE))
+def _make_more(loop: str, free: list[tuple[int, ctypes.c_uint64]]) -> None:
+    text = loop + PLANS.format(number=AT_ONCE) + "".join(JUMP.format(k=k) for k in range(AT_ONCE))
     machine = Machine()
     names = ["mbd.plans", *(f"mbd.jump.{k}" for k in range(AT_ONCE))]
     plans, *jumps = machine.load(cached_object(text, lambda: emit_object(text), lasting=True), names)
     _MACHINES.append(machine)
     first = ctypes.CFUNCTYPE(ctypes.c_uint64)(plans)()
-    _FREE.extend((jump, ctypes.c_uint64.from_address(first + 8 * k)) for k, jump in enumerate(jumps))
+    free.extend((jump, ctypes.c_uint64.from_address(first + 8 * k)) for k, jump in enumerate(jumps))

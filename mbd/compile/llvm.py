@@ -217,11 +217,15 @@ class MachineFunction:
             self._run, self.address = call(address), address
         self._provisional = False
 
-    def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None:
+    def require_room(self, block: Vector, parameters: Vector, out: Vector) -> None:
+        """Raise where an array is too short."""
         sizes = self._sizes
         if block.size < sizes[0] or parameters.size < sizes[1] or out.size < sizes[2]:
             came = block.size, parameters.size, out.size
             raise ValueError(f"{self.name}: (block, parameters, out) need {sizes} numbers, these arrays have {came}")
+
+    def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None:
+        self.require_room(block, parameters, out)
         self._run(block, parameters, out)
 
 

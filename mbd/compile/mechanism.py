@@ -18,18 +18,21 @@ from mbd.compile.cache import key_of
 from mbd.compile.composed import Composed, Shape, Term
 from mbd.compile.energies import Energies
 from mbd.compile.layout import Layout
+from mbd.compile.mass_loop import WithMasses
 from mbd.compile.orders import Filled, elimination_order, is_unit, may_pay, pattern, written
 from mbd.compile.postponed import Postponed
 from mbd.compile.remembered import Facts, Remembered
 from mbd.dataclass import dataclass
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
+from mbd.equations.composite_mass import MassLoop
 from mbd.equations.composition import Part, composes, own_program
 from mbd.equations.equations import Equations
 from mbd.equations.explicit_solution import explicit_solution
 from mbd.equations.programs import ActiveSet
 from mbd.equations.sizes import require_room_for_tangent, tangent_refused
 from mbd.errors import MemoryLimitError, ModelError, UnknownNameError, nearest
+from mbd.free_memory import no_collection
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
@@ -118,7 +121,10 @@ class Mechanism:
         self.common: Functions = self.backend.functions(self.layout)
         self._remembered, self._unmade = Remembered(equations, self.common), list[Callable[[], Made]]()
         self.vector, self.judged = equations.compose is None, programs.is_judged(equations)
-        self._compiled("common", self._made_at_once)
+        facts = self._compiled("common", self._made_at_once)
+        self.accelerations: Function = self.common["accelerations"]
+        if facts["bodies of M"]:
+            self.accelerations = WithMasses(self.accelerations, self.layout.n, facts["bodies of M"])
         if not self.vector:
             self._compiled("charts", self._charts, rarely=True)
         rare = {"scales": programs.scales} | ({"terms": programs.guard_terms} if self.judged else {})
@@ -146,11 +152,12 @@ class Mechanism:
         if facts is not None:
             self._unmade.append(make)
             return facts
-        while self._unmade:
-            self._unmade.pop(0)()
-        made, facts = make()
-        if made:
-            self.common.add(made, rarely)
+        with no_collection():
+            while self._unmade:
+                self._unmade.pop(0)()
+            made, facts = make()
+            if made:
+                self.common.add(made, rarely)
         self._remembered.keep(question, facts, bool(made))
         return facts
 
@@ -165,14 +172,24 @@ class Mechanism:
         composed = programs.compose(self.equations)
         if composed is not None:
             made |= {"compose": composed, "increment_rates": programs.increment_rates(self.equations)}
-        return made, {}
+        return made, {"bodies of M": [] if self._mass_loop is None else list(self._mass_loop.bodies)}
 
     def _charts(self) -> Made:
         return {"chart_end": chart_end(self.equations), "chart_motion": chart_motion(self.equations)}, {}
 
     @cached_property
+    def _mass_loop(self) -> MassLoop | None:
+        return None if self.equations.geometry is None else self.equations.geometry.mass_loop()
+
+    @cached_property
     def _accelerations(self) -> list[Node]:
-        return programs.accelerations(self.equations)
+        """What straight-line code writes; a loop may fill M."""
+        return programs.accelerations(self.equations, loop=self._mass_loop)
+
+    @cached_property
+    def acceleration_nodes(self) -> list[Node]:
+        """The program `accelerations` with every entry of M."""
+        return self._accelerations if self._mass_loop is None else programs.accelerations(self.equations)
 
     @cached_property
     def _composes(self) -> bool:
@@ -440,7 +457,7 @@ class Mechanism:
     @cached_property
     def energies(self) -> Energies:
         """T and V [J] at many states at once."""
-        machine = self.machine_code if self.common["accelerations"].address else None
+        machine = self.machine_code if self.accelerations.address else None
         return Energies(self.equations, self.layout, machine)
 
     def machine_code(self, name: str, outputs: Sequence[Node]) -> Function:
@@ -527,8 +544,8 @@ class Mechanism:
 
     def terms_of(self, block: Vector, parameters: Vector) -> AccelerationTerms:
         """The same at the inputs in a block; its accelerations and multipliers enter no more than R and the limits."""
-        out = np.zeros(self.sizes["accelerations"])
-        self.common["accelerations"](block, parameters, out)
+        out = np.zeros(self.accelerations.size)
+        self.accelerations(block, parameters, out)
         return AccelerationTerms(out, self._parts)
 
     @cached_property
@@ -550,14 +567,7 @@ class Mechanism:
         layout = self.layout
         n, rows = layout.n, layout.n_rows
         return {
-            "accelerations": n * n
-            + n
-            + 2 * n * rows
-            + 3 * rows
-            + layout.n_anchors
-            + 1
-            + layout.n_frictions
-            + layout.n_v * len(self.equations.impulses),
+            "accelerations": self.accelerations.size,
             "guards": 4 * layout.n_contacts
             + (3 if self.equations.machines else 2) * len(self.equations.guards)
             + 3 * layout.n_frictions,

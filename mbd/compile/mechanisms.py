@@ -20,6 +20,7 @@ from mbd.constraints.base import Constraint
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
 from mbd.forces.base import Force
+from mbd.free_memory import no_collection
 from mbd.joints.base import Joint
 from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
@@ -168,7 +169,9 @@ def _words(model: Any) -> str | None:
 
 
 def _derived(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
-    made = Mechanism(derive(model.with_tunable(*sorted(tunable)) if tunable else model), backend)
+    with no_collection():
+        equations = derive(model.with_tunable(*sorted(tunable)) if tunable else model)
+    made = Mechanism(equations, backend)
     if made.backend.note:
         doubt(made.backend.note, of=PROCESS)
     if tunable:

@@ -10,6 +10,7 @@ from mbd.bodies.algebra import dot
 from mbd.bodies.domains import ParameterCheck
 from mbd.dataclass import dataclass
 from mbd.equations.changes import partials, rates
+from mbd.equations.composite_mass import MassLoop
 from mbd.equations.contacts import anchors_held, laws
 from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.dynamics import Dynamics, Work
@@ -307,6 +308,10 @@ class TreeGeometry:
     def mass_matrix(self) -> list[list[Node]] | None:
         """M of the bodies, where no force and no state depends on accelerations."""
         return self.dynamics.mass_matrix() if self._inertia_alone else None
+
+    def mass_loop(self) -> MassLoop | None:
+        """The same as a loop, where its entries are many."""
+        return self.dynamics.mass_loop() if self._inertia_alone else None
 
     @cached_property
     def _inertia_alone(self) -> bool:

@@ -16,7 +16,7 @@ from mbd.bodies.mass import MassProperties
 from mbd.bodies.scope import Triple
 from mbd.dataclass import dataclass
 from mbd.equations.articulated_bodies import articulated_accelerations
-from mbd.equations.composite_mass import composite_mass_matrix
+from mbd.equations.composite_mass import MassLoop, composite_mass_matrix, mass_loop
 from mbd.equations.composite_tangent import Branches, turns_by_numbers
 from mbd.equations.inputs import Inputs
 from mbd.equations.kinematic_proxies import KinematicProxies, Wrench
@@ -135,6 +135,10 @@ class Dynamics:
     def mass_matrix(self) -> list[list[Node]]:
         """M of the bodies, line by line (n_v × n_v)."""
         return composite_mass_matrix(self._bodies, self._masses, len(self._inputs.v), self._tape)
+
+    def mass_loop(self) -> MassLoop | None:
+        """The same as a loop, see `mbd.equations.composite_mass`."""
+        return mass_loop(self._bodies, self._masses, len(self._inputs.v), self._tape)
 
     def accelerations(self, forces: Sequence[Node]) -> tuple[list[Node], Node] | None:
         """v̇ with M v̇ = forces, see `articulated_accelerations`."""

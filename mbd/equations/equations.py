@@ -23,12 +23,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from mbd.configuration import Configuration
 from mbd.dataclass import dataclass
 from mbd.equations.shapes import Shape
 from mbd.tape.node import Node, Table, Tape
+
+if TYPE_CHECKING:
+    from mbd.equations.composite_mass import MassLoop
 
 __all__ = [
     "ActingForces", "Chart", "Contact", "Coordinate", "Effect", "Eliminated", "Equations", "Facing", "Friction",
@@ -390,6 +393,9 @@ class Geometry(Protocol):
 
     def mass_matrix(self) -> list[list[Node]] | None:
         """M = ∂r/∂a, line by line; None where more than inertia depends on accelerations."""
+
+    def mass_loop(self) -> MassLoop | None:
+        """The same as a loop; None where its entries are few."""
 
     def accelerations(self, forces: Sequence[Node]) -> tuple[list[Node], Node] | None:
         """v̇ with M v̇ = forces by a shorter way than by M, and the least part of an inertia that its pivots keep.

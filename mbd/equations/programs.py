@@ -29,6 +29,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from mbd.dataclass import dataclass
+from mbd.equations.composite_mass import MassLoop
 from mbd.equations.cones import cosine, sliding_force
 from mbd.equations.equations import ActingForces, Contact, Eliminated, Equations
 from mbd.equations.inputs import Inputs
@@ -222,7 +223,7 @@ def _levels(equations: Equations, rows: Sequence[int], stabilized: bool) -> list
     return [row.rate if row.is_velocity else row.value for row in chosen]
 
 
-def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
+def accelerations(equations: Equations, impacts: bool = True, loop: MassLoop | None = None) -> list[Node]:
     """What assembly, impacts and restarts need, over all rows and with penalties behind their switches.
 
     ``r = M a + f + (∂r/∂λ) λ``, ``ḣ = B v + h_t``, ``ḧ = B a + γ``; `captured` are the values that transitions
@@ -230,6 +231,8 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     `impacts`, where c_C is 1, smooth friction of contacts has no impulse, nor have laws that read multipliers, and dry
     friction of contacts its limit at the slip before them. Where such a law is not linear in them, f + R λ is its
     tangent at the λ of the block.
+
+    loop : fills M, whose places it leaves, from its numbers, which stand behind all else
     """
     inputs = Inputs.of(equations)
     tape = equations.tape
@@ -238,8 +241,13 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     r = switched_balance(equations, smooth)
     rest: dict[Node, float] = {node: 0.0 for node in (*inputs.a, *inputs.s, *inputs.lam)}
     f = [force + bent for force, bent in zip(substitute(r, rest), _bent_forces(equations), strict=True)]
-    M = None if equations.geometry is None else equations.geometry.mass_matrix()
-    M = _transposed(mass_matrix(equations, r)) if M is None else M
+    if loop is not None:
+        M, untouched = [[tape.zero] * inputs.n for _ in range(inputs.n)], tape.untouched
+        for i, j in loop.filled:
+            M[i][j] = untouched
+    else:
+        found = None if equations.geometry is None else equations.geometry.mass_matrix()
+        M = _transposed(mass_matrix(equations, r)) if found is None else found
     B = constraint_jacobian(equations, rows)
     right = row_forces(equations, r, rows, B)
     if impacts and law_forces(equations):
@@ -254,7 +262,8 @@ def accelerations(equations: Equations, impacts: bool = True) -> list[Node]:
     out += [value for contact in equations.contacts for value in contact.captured]
     out += [tape.input("anchor", turn.anchor) for turn in equations.turns]
     out += [equations.kinetic, *(friction.limit_at_speed(smooth) for friction in equations.frictions)]
-    return out + [entry for impulse in equations.impulses for entry in impulse.vector]
+    out += [entry for impulse in equations.impulses for entry in impulse.vector]
+    return out + list(() if loop is None else loop.numbers)
 
 
 def constraint_terms(equations: Equations, rows: Sequence[int]) -> list[Node]:

@@ -7,11 +7,9 @@ the addresses of arrays. They do not change while the kernel runs, which the mac
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -19,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from mbd import equal
 from mbd.compile.fingerprint import sources_of
+from mbd.free_memory import no_collection
 from mbd.kernel.schemes import contract
 
 if TYPE_CHECKING:  # the trees of the kernel's functions are made only where it is built
@@ -31,7 +30,6 @@ __all__ = [
     "kernel_functions",
     "kernel_object",
     "kernel_text",
-    "no_collection",
     "object_of",
     "source_digest",
 ]
@@ -138,18 +136,6 @@ def kernel_text() -> str:
 
     with no_collection():
         return llvm_text(kernel_functions(), ENTRY)
-
-
-@contextmanager
-def no_collection() -> Iterator[None]:
-    """Without the search for cycles of objects: trees have none, and it takes a third of the time of making them."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
 
 
 def kernel_c_source() -> str:

@@ -60,7 +60,7 @@ class Balance:
         """The matrix of the rows, f, and (h, ḣ, bias) of the active ones."""
         at, n, m = self.layout, self.layout.n, self.layout.n_rows
         self.block[0], self.block[at.q : at.x], self.block[at.v : at.a] = t, q, y
-        self.system.mechanism.common["accelerations"](self.block, self.system.parameters, self.out)
+        self.system.mechanism.accelerations(self.block, self.system.parameters, self.out)
         out, picked = self.out, self.picked
         b = n * n + n + n * m
         self.matrix[:n, :n] = out[: n * n].reshape(n, n)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mbd.compile.llvm import LEVEL
+from mbd.free_memory import no_collection
 from mbd.kernel import build
 from mbd.kernel.schemes import contract
 from mbd.kernel.translation.translate import Source, functions_of, translate
@@ -94,7 +95,7 @@ def keep_optimized() -> None:
 
 def text() -> str:
     """The kernel with derivatives in LLVM's words."""
-    with build.no_collection():
+    with no_collection():
         return tangent_text(_trees(), ENTRY, HELD)
 
 

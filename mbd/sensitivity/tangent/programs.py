@@ -176,7 +176,7 @@ def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list
         return ()
 
     named: dict[str, Callable[[], Sequence[Node]]] = {
-        "accelerations": lambda: mechanism._accelerations, "guards": lambda: programs.guards(equations),
+        "accelerations": lambda: mechanism.acceleration_nodes, "guards": lambda: programs.guards(equations),
         "scales": none, "compose": none if vector else lambda: programs.compose(equations) or (), "terms": none,
         "increment_rates": none if vector else lambda: programs.increment_rates(equations),
         "chart_end": none if vector else lambda: chart_end(equations),

@@ -48,7 +48,7 @@ def _parts(
     mechanism: Mechanism, rows: Sequence[int]
 ) -> tuple[list[list[Node]], list[Node], list[list[Node]], list[list[Node]], list[Node]]:
     """M (n × n), f (n), R (n × m), B (m × n) and γ (m) of the program `accelerations`."""
-    known, n, count = mechanism._accelerations, mechanism.layout.n, mechanism.layout.n_rows
+    known, n, count = mechanism.acceleration_nodes, mechanism.layout.n, mechanism.layout.n_rows
     at_R, at_B = n * n + n, n * n + n + n * count
     at_gamma = at_B + n * count + 2 * count
     M = [list(known[i * n : (i + 1) * n]) for i in range(n)]

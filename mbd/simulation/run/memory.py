@@ -92,10 +92,10 @@ def _block(run: RunData) -> Vector:
 def _digest(mechanism: Mechanism, block: Vector, parameters: Vector) -> str:
     """Of masses, forces, rows and guards at a state: a model that was changed there has another one."""
     digest = hashlib.sha256()
-    for name in ("accelerations", "guards"):
-        out = np.zeros(max(mechanism.sizes[name], 1))
-        if mechanism.sizes[name]:
-            mechanism.common[name](block, parameters, out)
+    for program in (mechanism.accelerations, mechanism.common["guards"]):
+        out = np.zeros(max(program.size, 1))
+        if program.size:
+            program(block, parameters, out)
         digest.update(out.tobytes())
     return digest.hexdigest()
 

@@ -42,7 +42,7 @@ LAWS = ("newton", "poisson", "sequential")
 
 def is_compiled(mechanism: Mechanism, integrator: Integrator) -> bool:
     """Whether the compiled kernel can run this scheme: machine code exists and it is one of the kernel's own."""
-    return own_scheme(integrator) is not NO_SCHEME and mechanism.common["accelerations"].address != 0
+    return own_scheme(integrator) is not NO_SCHEME and mechanism.accelerations.address != 0
 
 
 def may_be_free(equations: Equations) -> bool:
@@ -124,7 +124,7 @@ class Stepper:
         interpreted = self.own is not NO_SCHEME
         self.scheme: Any = InterpretedScheme(self.own) if interpreted else PlainScheme(integrator, self.system, manager)
         self.plain = self.scheme  # whose memory a final state takes along; that of `scheme` goes into savepoints
-        self.functions: list[Any] = [mechanism.common[name] for name in ("accelerations", "guards", "scales")]
+        self.functions: list[Any] = [mechanism.accelerations, mechanism.common["guards"], mechanism.common["scales"]]
         self.functions.append(None if mechanism.vector else mechanism.common["compose"])
         self.functions.append(mechanism.common["terms"] if mechanism.judged else None)
         for name in ("increment_rates", "chart_end", "chart_motion"):
