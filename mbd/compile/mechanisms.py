@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 from mbd.compile import remembered
 from mbd.compile.forking import free_in_child
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.same_words import digest_of_words
+from mbd.compile.same_words import as_it_is, changing, digest_of_words
 from mbd.constraints.base import Constraint
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
@@ -40,9 +40,11 @@ free_in_child(_LOCK)
 
 def _description(model: Any) -> Any:
     """What the equations depend on, by identity of the words."""
-    words = [getattr(model, kind, ()) for kind in ("joints", "forces", "constraints", "controllers", "observations")]
+    kinds = ("joints", "forces", "constraints", "controllers", "observations", "nonholonomic")
+    words = [getattr(model, kind, ()) for kind in kinds]
     groups = tuple(tuple(group.values() if isinstance(group, Mapping) else group) for group in words)
-    return groups, *(getattr(model, key, None) for key in ("gravity", "cut", "tunable"))
+    own = () if isinstance(model, Description) else tuple(getattr(model, "parameters", {}).items())
+    return groups, *(getattr(model, key, None) for key in ("gravity", "cut", "tunable")), own
 
 
 def _same(old: Any, new: Any) -> bool:
@@ -52,12 +54,20 @@ def _same(old: Any, new: Any) -> bool:
 
 
 class _Kept:
-    """What was made of a model, as long as its words and the named points of its bodies are the same."""
+    """What was made of a model, as long as its words and the named points of its bodies are the same.
+
+    So must be what functions refer to: a global value that was given anew, or a list whose numbers have changed.
+    """
 
     def __init__(self, model: Any, described: Any, made: Any) -> None:
         self.described, self.made = described, made
         self._bodies = bodies_of(model)
         self._points = self._present()
+        whole = isinstance(model, Description)
+        self._changing = changing(
+            [model.joints, model.forces, model.constraints, model.observations] if whole else [model]
+        )
+        self._were = as_it_is(self._changing) if self._changing else None
 
     def _present(self) -> list[Any]:
         return [point for body in self._bodies for point in body.points.values()]
@@ -67,7 +77,9 @@ class _Kept:
         if not _same(self.described, described):
             return False
         points = self._present()
-        return len(points) == len(self._points) and all(map(is_, points, self._points))
+        if len(points) != len(self._points) or not all(map(is_, points, self._points)):
+            return False
+        return self._were is None or as_it_is(self._changing).found == self._were.found
 
 
 def bodies_of(model: Any) -> list[Any]:

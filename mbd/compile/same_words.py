@@ -4,12 +4,14 @@ Only what is listed here is read: numbers, texts, lists, arrays, words of `mbd`,
 nothing but such values, other functions, and numpy and math. Of anything else, such as objects and classes of the
 user's, nobody can tell what it will do as it is called, so that a description that holds one has no digest.
 
-`mbd.results.identity` reads more in the same way: all that a study refers to, as it is at the moment.
+`mbd.results.identity` reads more in the same way: all that a study refers to, as it is at the moment. `changing` and
+`as_it_is` tell whether functions that were recorded would be recorded as they were.
 """
 
 from __future__ import annotations
 
 import dis
+import functools
 import sys
 import types
 from collections.abc import Iterable, Iterator
@@ -19,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["CannotTellError", "Reader", "codes_of", "digest_of_words", "values_of"]
+__all__ = ["CannotTellError", "Reader", "as_it_is", "changing", "codes_of", "digest_of_words", "values_of"]
 
 PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...))
 
@@ -149,6 +151,100 @@ class Reader:
     def is_of_package(self, module: str) -> bool:
         """Whether a module belongs to one of the packages."""
         return module.partition(".")[0] in self.packages
+
+
+def changing(words: Iterable[Any]) -> list[Any]:
+    """What equations were made of and may be another thing later: functions inside words, and objects of users' own.
+
+    Not what runs call as it is then: resets of events, and controllers.
+    """
+    found, stack, met = list[Any](), [*words], set[int]()
+    while stack:
+        item = stack.pop()
+        kind = type(item)
+        if kind in PLAIN or id(item) in met:
+            continue
+        met.add(id(item))
+        if kind in (tuple, list):
+            stack += item
+        elif kind in (dict, types.MappingProxyType):
+            stack += item.values()
+        elif kind in CALLABLE or not _is_installed(kind.__module__):
+            found.append(item)
+        elif kind.__module__.startswith("mbd."):
+            stack += [part for name, part in getattr(item, "__dict__", {}).items() if name not in CALLED]
+    return found
+
+
+def as_it_is(items: Iterable[Any]) -> _AsItIs:
+    """What some functions and objects refer to at the moment, to be compared with that of another moment."""
+    return _AsItIs([*items])
+
+
+CALLED = ("reset", "controllers")
+CALLABLE = (types.FunctionType, types.MethodType, functools.partial, functools._lru_cache_wrapper)
+
+
+@functools.cache
+def _is_installed(module: str) -> bool:
+    """Whether a module is one of Python's or of a package, which stay as they are."""
+    root = module.partition(".")[0]
+    file = getattr(sys.modules.get(root), "__file__", None)
+    return root == "mbd" or (root in sys.stdlib_module_names and root != "__main__") or "-packages" in (file or "")
+
+
+@functools.cache
+def _globals_of(code: types.CodeType) -> frozenset[str]:
+    """Names that code looks up among the values of its module."""
+    return frozenset(
+        step.argval for each in codes_of(code) for step in dis.get_instructions(each) if step.opname == "LOAD_GLOBAL"
+    )
+
+
+class _AsItIs(Reader):
+    """Reads all that items refer to; of objects what the code that refers to them names, and which objects they are."""
+
+    def __init__(self, items: list[Any]) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+        self.found = self.digest(items)
+
+    def parts(self, item: Any) -> tuple[str, Iterable[Any]]:
+        kind = type(item)
+        if kind is dict:
+            return f"dict {len(item)}", [part for pair in item.items() for part in pair]
+        if kind is types.MethodType:
+            return "method", (item.__func__, item.__self__)
+        if kind is functools.partial:
+            return "partial", (item.func, item.args, item.keywords)
+        if kind is functools._lru_cache_wrapper:
+            return "cached", (item.__wrapped__,)
+        try:
+            return super().parts(item)
+        except CannotTellError:
+            return f"{kind.__name__} {id(item)}", self.of_object(item)
+
+    def of_object(self, item: Any) -> list[Any]:
+        """The code of a class of a user's, and what functions read of an object, a class or a module."""
+        own = [kind for kind in type(item).__mro__ if not isinstance(item, type) and not _is_installed(kind.__module__)]
+        methods = [each for kind in own for each in vars(kind).values() if isinstance(each, types.FunctionType)]
+        for method in methods:
+            self.know(method)
+        held = getattr(item, "__dict__", {})
+        return [*methods, *(part for name in sorted(self.names & held.keys()) for part in (name, held[name]))]
+
+    def know(self, function: types.FunctionType) -> None:
+        """Note which attributes a function may ask for."""
+        self.names.update(name for code in codes_of(function.__code__) for name in code.co_names)
+
+    def of_function(self, function: types.FunctionType) -> list[Any]:
+        self.know(function)
+        known = function.__globals__
+        held = [part for name in sorted(_globals_of(function.__code__) & known.keys()) for part in (name, known[name])]
+        try:
+            return [function.__code__, *values_of(function), *held]
+        except CannotTellError:  # something captured has no value yet
+            return [function.__code__, *held]
 
 
 def _name_of(item: Any) -> Any:

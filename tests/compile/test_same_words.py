@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import types
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
@@ -179,6 +180,99 @@ def test_what_may_mean_something_else_later_has_no_digest():
     )
     assert mechanisms._words(rod(lambda t: 2 * t)) != mechanisms._words(rod(lambda t: 2.0 * t))
     assert mechanisms._words(rod(lambda t: np.sin(t))) != mechanisms._words(rod(lambda t: np.cos(t)))
+
+
+class Pull(mbd.forces.Force):
+    """A force of a user's own, whose numbers can be given anew."""
+
+    kind = "applied"
+
+    def __init__(self, joint: Any, size: float) -> None:
+        self.name, self.joint, self.size = "pull", joint, size
+
+    def parameters(self) -> dict[str, float]:
+        return {}
+
+    def mentions(self) -> list[Any]:
+        return [self.joint]
+
+    def act(self, scope: Any) -> Any:
+        (rate,) = scope.joint(self.joint.name).rates
+        return mbd.forces.Action(pairs=((rate, self.size),))
+
+
+def _laws_that_change() -> Iterator[tuple[str, Any, Any]]:
+    """(what changes, a law of size 2, what makes its size 3)."""
+    numbers, table, array = [2.0], {"size": 2.0}, np.array([1.0, 2.0])
+    holder, law, module = types.SimpleNamespace(inner=types.SimpleNamespace(size=2.0)), Law(), tests.comparisons
+    captured = 2.0
+
+    def again() -> None:
+        nonlocal captured
+        captured = 3.0
+
+    def default(t: Any, size: float = 2.0) -> Any:
+        return size * mbd.sin(t)
+
+    def keyword(t: Any, *, size: float = 2.0) -> Any:
+        return size * mbd.sin(t)
+
+    law.size, module.SIZE = 2.0, 2.0
+    yield "list", lambda t: numbers[0] * mbd.sin(t), lambda: numbers.__setitem__(0, 3.0)
+    yield "dict", lambda t: table["size"] * mbd.sin(t), lambda: table.update(size=3.0)
+    yield "array", lambda t: array[1] * mbd.sin(t), lambda: array.__setitem__(1, 3.0)
+    yield "attribute", lambda t: holder.inner.size * mbd.sin(t), lambda: setattr(holder.inner, "size", 3.0)
+    yield "module", lambda t: tests.comparisons.SIZE * mbd.sin(t), lambda: setattr(module, "SIZE", 3.0)
+    yield "captured", lambda t: captured * mbd.sin(t), again
+    yield "default", default, lambda: setattr(default, "__defaults__", (3.0,))
+    yield "keyword", keyword, lambda: keyword.__kwdefaults__.update(size=3.0)
+    yield "callable", law, lambda: setattr(law, "size", 3.0)
+    yield "method", law.__call__, lambda: setattr(law, "size", 3.0)
+    yield "partial", partial(lambda held, t: held[0] * mbd.sin(t), numbers), lambda: numbers.__setitem__(0, 3.0)
+    yield "inner", lambda t: scaled(t), lambda: globals().update(SIZE=3.0)
+
+
+def test_functions_that_refer_to_something_else_by_now_are_recorded_again(monkeypatch):
+    monkeypatch.setitem(globals(), "SIZE", 2.0)
+    monkeypatch.setattr(tests.comparisons, "SIZE", 2.0, raising=False)
+    ends = {size: end(rod(lambda t, size=size: size * mbd.sin(t))) for size in (2.0, 3.0)}
+    for what, law, change in _laws_that_change():
+        if what in ("method", "partial"):  # share what an earlier one has changed
+            vars(law.__self__).update(size=2.0) if what == "method" else law.args[0].__setitem__(0, 2.0)
+        model = rod(law)
+        assert end(model) == ends[2.0], what
+        assert mechanism_of(model) is mechanism_of(model)
+        change()
+        assert end(model) == ends[3.0], what
+
+
+def test_words_of_ones_own_and_parameters_of_a_lagrangian_may_be_given_anew():
+    model = rod(0.0)
+    pull = Pull(model.joints[0], 2.0)
+    model.apply(pull)
+    before = end(model)
+    pull.size = 3.0
+    other = rod(0.0)
+    other.apply(Pull(other.joints[0], 3.0))
+    assert end(model) == end(other) != before
+    y = mbd.Coordinate("y", unit="m")
+    ball = mbd.Lagrangian("ball", [y], 0.1 * y.v**2, lambda y, g: 0.2 * g * y, parameters={"g": 9.81})
+    falls = []
+    for g in (9.81, 1.62):
+        ball.parameters["g"] = g
+        falls.append(mbd.simulate(ball, mbd.assemble(ball), dt=0.01, until=0.1)["y.acceleration"][0])
+    assert falls == pytest.approx([-9.81, -1.62], rel=1e-12)
+
+
+def test_what_runs_call_and_what_no_law_reads_leaves_equations_as_they_are(monkeypatch):
+    log: list[float] = []
+    model = rod(lambda t: 2.0 * mbd.sin(t))
+    angle = mbd.measure(lambda q: q - 0.05, "hinge.angle", unit="rad")
+    model.constrain(mbd.Event("passing", angle, direction=0, reset=lambda v: log.append(1.0) or {}))
+    first = mechanism_of(model)
+    monkeypatch.setitem(globals(), "sin", 2.0)  # the name of an attribute that the law asks mbd for
+    log.append(0.0)
+    assert mechanism_of(model) is first
 
 
 def test_named_points_gravity_and_names_of_inputs_count():
