@@ -56,7 +56,7 @@ def _same(old: Any, new: Any) -> bool:
 class _Kept:
     """What was made of a model, as long as its words and the named points of its bodies are the same.
 
-    So must be what functions refer to: a global value that was given anew, or a list whose numbers have changed.
+    So must be what functions refer to: a global value that was set again, or a list whose numbers have changed.
     """
 
     def __init__(self, model: Any, described: Any, made: Any) -> None:

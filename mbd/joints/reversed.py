@@ -41,6 +41,10 @@ class Reversed(Joint):
     coordinate_rates, increment_rates = forwarded("joint.coordinate_rates"), forwarded("joint.increment_rates")
     increment_velocities, elastic_energy = forwarded("joint.increment_velocities"), forwarded("joint.elastic_energy")
     parameters, domains = forwarded("joint.parameters"), forwarded("joint.domains")
+    losses, frictions, resistance = map(forwarded, ("joint.losses", "joint.frictions", "joint.resistance"))
+    is_isotropic, freedoms = forwarded("joint.is_isotropic"), forwarded("joint.freedoms")
+    coordinate_names, velocity_names = forwarded("joint.coordinate_names"), forwarded("joint.velocity_names")
+    value_faults, faults, known_as = map(forwarded, ("joint.value_faults", "joint.faults", "joint.known_as"))
 
     def transform(self, q: Sequence[Scalar], scope: Scope) -> tuple[Rotation, Triple]:
         """The inverse placement."""

@@ -20,7 +20,7 @@ from mbd.hardcases.shakers import table
 from tests.fuzz.structures import DRIVEN, SPACE, structure
 
 made = structure.__wrapped__
-"""A random mechanism of a number, described anew each time."""
+"""A random mechanism of a number, described again each time."""
 NUMBERS = [*range(0, 160, 9), *range(SPACE, SPACE + 160, 19), *range(DRIVEN, DRIVEN + 160, 19)]
 
 
@@ -183,7 +183,7 @@ def test_what_may_mean_something_else_later_has_no_digest():
 
 
 class Pull(mbd.forces.Force):
-    """A force of a user's own, whose numbers can be given anew."""
+    """A force of a user's own, whose numbers can be set again."""
 
     kind = "applied"
 

@@ -1,5 +1,6 @@
 """A loss of a ball joint acts against its angular velocity, whatever the axes of its frames."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -8,6 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mbd
+from mbd.joints.base import Joint
+from mbd.joints.reversed import Reversed
 
 LOSSES = {
     "quadratic": mbd.Quadratic(0.3),
@@ -36,6 +39,32 @@ def test_the_axes_of_the_joint_change_nothing(name):
         run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.5)
         ends.append([run.final[f"body.origin.{axis}"] for axis in "xyz"])
     np.testing.assert_allclose(ends[1], ends[0], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("loss", [*LOSSES.values(), mbd.Coulomb(0.3)], ids=[*LOSSES, "sticking"])
+def test_which_body_is_named_first_and_what_is_cut_change_nothing(loss):
+    ends, speed = [], np.array([1.0, 2.0, -0.7])
+    for child_first, cut in itertools.product((False, True), ("auto", "all")):
+        model = mbd.Model("arm", cut=cut)
+        upper = mbd.RigidBody("upper", 1.5, (0.2, 0.3, 0.25), center=(0.1, -0.3, 0.05))
+        lower = mbd.RigidBody("lower", 1.0, (0.1, 0.15, 0.12), center=(0.0, -0.2, 0.1))
+        frames = [upper.point(0.0, -0.6), lower.point(0.05, 0.1)]
+        if child_first:
+            frames.reverse()
+        model.connect(
+            mbd.Revolute("shoulder", model.ground.origin, upper.origin, axis=(1.0, 0.2, 0.0)),
+            mbd.Spherical("elbow", *frames, loss=loss),
+        )
+        seen = tuple(-speed if child_first else speed)
+        start = mbd.assemble(model, {"shoulder.angle": 0.4}, {"shoulder.angle": 0.8, "elbow.angular_velocity": seen})
+        run = mbd.simulate(model, start, mbd.RadauIIA(), dt=5e-3, until=0.3)
+        ends.append([run[f"lower.center.{axis}"][-1] for axis in "xyz"])
+    np.testing.assert_allclose(ends[1:], [ends[0]] * 3, rtol=0.0, atol=1e-7)
+
+
+def test_a_joint_seen_from_its_child_answers_all_that_the_joint_does():
+    promised = {name for name in vars(Joint) if not name.startswith("_")}
+    assert promised - set(vars(Reversed)) == {"validate"}
 
 
 def test_the_torque_is_that_of_the_whole_speed():
