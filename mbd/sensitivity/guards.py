@@ -45,7 +45,6 @@ def trigger(
         where several did at one instant, with their names.
     """
     numbers = {contact.name: c for c, contact in enumerate(equations.contacts)}
-    frictions = {friction.name: f for f, friction in enumerate(equations.frictions)}
     closed = {event.name for event in events if event.kind == "closed"}
     found = [Trigger("event", e, equations.guards[e].name) for e in firing(equations, events)]
     for name in sorted(closed):
@@ -62,7 +61,7 @@ def trigger(
             if not ruled and contact.opens_on in kinds:
                 others.append(Trigger(kinds[contact.opens_on], numbers[event.name], event.name))
         elif event.kind in ("stuck", "slipped"):
-            f = frictions[event.name]
+            f = [friction.name for friction in equations.frictions].index(event.name)
             others.append(Trigger("stuck" if slip[f] != 0.0 else "slipped", f, event.name))
     found = found or others
     names = " and ".join(dict.fromkeys(repr(each.name) for each in found))

@@ -147,7 +147,11 @@ def tangent_run(
             visit(row, motion, rows.mode(row), rates)
     if not located:
         return Passed(end[0], last, end[1])
-    return Passed(end[0], last, end[1], refuse_turning_points(rows, programs, at_row, end))
+
+    def time_at(row: int) -> Vector:
+        return joined([run.of_rows[row][:1] for run, _ in runs])[0]
+
+    return Passed(end[0], last, end[1], refuse_turning_points(rows, programs, at_row, time_at, end))
 
 
 def seed(

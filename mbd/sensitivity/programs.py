@@ -118,11 +118,15 @@ class State:
 
 @dataclass(frozen=True)
 class Sparse:
-    """A compiled program: its values, and of their derivatives those that are not always 0, by line and column."""
+    """A compiled program: its values, and of their derivatives those that are not always 0, by line and column.
+
+    size : how many numbers all of these are
+    """
 
     function: Function
     lines: NDArray[np.int64]
     columns: NDArray[np.int64]
+    size: int
 
 
 class Programs:
@@ -163,6 +167,19 @@ class Programs:
         size = 3 * self.layout.n_contacts + len(self.equations.guards) + 2 * self.layout.n_frictions
         return self._call("watched", at, size)
 
+    def watched_flow(self, at: State, flow: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+        """`watched` at N states (N, W), its change along `flow` (N, columns), and the sums of sizes of its terms."""
+        program, blocks = self.sparse("watched"), np.zeros((len(flow), self.layout.size))
+        self.fill(blocks, at)
+        size = program.size - len(program.lines)
+        out = np.empty((len(flow), program.size))
+        for block, line in zip(blocks, out, strict=True):
+            program.function(block, self.values, line)
+        by_line = np.zeros((len(program.lines), size))
+        by_line[np.arange(len(program.lines)), program.lines] = 1.0
+        terms = out[:, size:] * flow[:, program.columns]
+        return out[:, :size], terms @ by_line, np.abs(terms) @ by_line
+
     def limits(self, at: State) -> tuple[Vector, Matrix]:
         """Limits of frictions at rest, and their derivatives."""
         return self._call("limits", at, self.layout.n_frictions)
@@ -199,7 +216,8 @@ class Programs:
         ]
         common.add({symbol: [*values, *(node for _, _, node in found)]})
         lines, places = ([each[k] for each in found] for k in (0, 1))
-        return Sparse(common[symbol], np.array(lines, dtype=int), np.array(places, dtype=int))
+        size = len(values) + len(found)
+        return Sparse(common[symbol], np.array(lines, dtype=int), np.array(places, dtype=int), size)
 
     def fill(self, block: Matrix, at: State) -> None:
         """Write a state into a block, or states into blocks (N, block)."""

@@ -149,17 +149,16 @@ class RunRows:
 
     def mode(self, row: int) -> Mode:
         """What acts from a row on."""
-        known = self._modes.get(row)
+        closed, phase = self.record.closed[row], self.record.phase[row]
+        key = closed.tobytes(), phase.tobytes()
+        known = self._modes.get(key)
         if known is None:
-            known = self._modes[row] = self._mode(row)
+            known = self._modes[key] = mode_of(self.manager, closed, phase)
         return known
 
     @cached_property
-    def _modes(self) -> dict[int, Mode]:
+    def _modes(self) -> dict[tuple[bytes, bytes], Mode]:
         return {}
-
-    def _mode(self, row: int) -> Mode:
-        return mode_of(self.manager, self.record.closed[row], self.record.phase[row])
 
     @property
     def first(self) -> First:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,17 +31,21 @@ def _partners(rows: RunRows, programs: Programs, mode: Mode, closing: set[str]) 
 
 
 def refuse_sided_impact(
-    rows: RunRows, programs: Programs, before: Motion, mode: Mode, events: Sequence[EventRecord], fired: int
+    rows: RunRows, programs: Programs, at: Callable[[], Motion], mode: Mode, events: Sequence[EventRecord], fired: int
 ) -> None:
     """Raise a `OneSidedError` for an impact in which a change however small decides who takes part.
 
     That is for contacts that close with the one that fired, which a direction moves apart, and where the phases of
     Poisson's law or of the sequential one lie on an edge between two choices. What comes to rest does so at once.
     Phases beside impulses of the user's are not decided again here.
+
+    at : gives the motion just before it
     """
     closing = {event.name for event in events if event.kind == "closed"}
     law = str(rows.record.settings.get("impact", "newton"))
-    who = _partners(rows, programs, mode, closing)
+    if law == "newton" and len(closing) == 1:
+        return
+    who, before = _partners(rows, programs, mode, closing), at()
     try:
         _refuse_chance(programs, before, mode, who, fired)
         if any(programs.equations.contacts[push.contact].name in closing for push in programs.equations.impulses):

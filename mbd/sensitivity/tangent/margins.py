@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from mbd.sensitivity.guards import GRAZING_RTOL, Trigger, acts, firing, refused_
 from mbd.sensitivity.motion import Motion, Rates
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_grip, refuse_sided_start
 from mbd.sensitivity.passed import Instant
-from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.programs import Programs, State
 from mbd.sensitivity.run_data import RunRows, sided
 from mbd.sensitivity.strikes import refuse_sided_impact
 
@@ -21,13 +21,16 @@ __all__ = ["refuse_turning_points"]
 AtRow = Callable[[int], tuple[Motion, Rates]]
 
 
-def refuse_turning_points(rows: RunRows, programs: Programs, at_row: AtRow, end: tuple[Motion, Rates]) -> list[Instant]:
+def refuse_turning_points(
+    rows: RunRows, programs: Programs, at_row: AtRow, time_at: Callable[[int], Vector], end: tuple[Motion, Rates]
+) -> list[Instant]:
     """The events, each with the derivatives of its instant.
 
     Parameters
     ----------
     at_row : gives the motion and rates of a row with their derivatives; asked for the first one, and those before and
         after events
+    time_at : gives the derivatives of the time of a row
     end : the same at the end
 
     Raises
@@ -35,26 +38,30 @@ def refuse_turning_points(rows: RunRows, programs: Programs, at_row: AtRow, end:
     OneSidedError, CapabilityError
         where a run has derivatives on one side only, or none.
     """
-    found, lead = list[Instant](), 0
     refuse_sided_start(rows, programs, at_row)
-    time = rows.record.time
-    for row in (0, *(row for row in sorted(rows.events) if row < len(time) - 1)):
+    time, order = rows.record.time, sorted(rows.events)
+    for row in (0, *(row for row in order if row < len(time) - 1)) if programs.equations.frictions else ():
         refuse_sided_grip(rows, programs, row, at_row)
-    for row in sorted(rows.events):
-        before = row - 1
-        prior = before - 1
-        again = before in rows.events or (
-            prior >= 0 and time[prior] == time[before] and (prior in rows.events or prior == 0)
-        )
-        if again:
+    leads = [row for row in order if not _is_again(rows, row)]
+    fired = dict(zip(leads, _fired(rows, programs, leads, at_row), strict=True))
+    found, lead = list[Instant](), 0
+    for row in order:
+        if row not in fired:
             found.append(_beside(rows, programs, at_row, lead, row))
             continue
-        lead, motion = row, at_row(before)[0]
-        fired = _fired(rows, programs, row, *at_row(before))
-        found.append(Instant(fired.name, motion.t, motion.tangent.t))
+        lead = row
+        found.append(Instant(fired[row].name, float(rows.ends[row - 1]), time_at(row - 1)))
     last = len(time) - 1
     refuse_sided_end(rows, programs, end[0], rows.mode(last), end[1], found)
     return found
+
+
+def _is_again(rows: RunRows, row: int) -> bool:
+    """Whether the event of a row comes right after another one, or the start."""
+    time, before, prior = rows.record.time, row - 1, row - 2
+    return before in rows.events or (
+        prior >= 0 and time[prior] == time[before] and (prior in rows.events or prior == 0)
+    )
 
 
 def _beside(rows: RunRows, programs: Programs, at_row: AtRow, lead: int, row: int) -> Instant:
@@ -98,23 +105,35 @@ def _guard(
     return values[place], HALF_PRECISION_RTOL * size, change, float(slopes[place] @ flow)
 
 
-def _fired(rows: RunRows, programs: Programs, row: int, motion: Motion, rates: Rates) -> Trigger:
-    """What ended the step to the event of a row; no graze, and no contact that touches by chance."""
-    equations, c, mode = programs.equations, programs.columns, rows.mode(row - 1)
+def _fired(rows: RunRows, programs: Programs, leads: Sequence[int], at_row: AtRow) -> list[Trigger]:
+    """What ended the steps to the events of rows; no graze, and no contact that touches by chance."""
+    if not leads:
+        return []
+    equations, record, c = programs.equations, rows.record, programs.columns
     contacts, guards = len(equations.contacts), len(equations.guards)
-    values, slopes = programs.watched(motion.at(mode, rates.rate, rates.lam))
-    flow = np.zeros(c.count)
-    flow[c.x], flow[c.y], flow[c.t] = motion.y[: c.n_v], rates.rate, 1.0
-    growth, terms = slopes @ flow, np.abs(slopes) @ np.abs(flow)
-    fired = trigger(equations, rows.events[row], values[:contacts], growth[:contacts], mode.slip, motion.t)
-    first = 2 * contacts + guards
-    k = fired.number
-    places = {"closed": k, "gap": k, "force": contacts + k, "press": contacts + k, "event": 2 * contacts + k,
-              "stuck": first + k}  # fmt: skip
-    place = places.get(fired.kind)
-    slowest = float(rows.record.settings.get("rest_speed", 1e-6)) if fired.kind == "closed" else 0.0
-    if place is not None and not abs(growth[place]) > max(GRAZING_RTOL * terms[place], slowest):
-        raise refused_graze(fired, motion.t, float(growth[place]), float(terms[place]))
-    if fired.kind == "closed" and equations.contacts[k].kind != "penalty":
-        refuse_sided_impact(rows, programs, motion, mode, rows.events[row], k)
-    return fired
+    before = np.array(leads) - 1
+    modes = [rows.mode(row) for row in before]
+    active = np.zeros((len(leads), c.rows))
+    for line, mode in zip(active, modes, strict=True):
+        line[list(mode.held)] = 1.0
+    y, rate = np.hstack([record.v[before], record.z[before]]), np.hstack([record.a[before], record.s[before]])
+    times, switches, slips = rows.ends[before], [mode.switch for mode in modes], [mode.slip for mode in modes]
+    at = State(times, record.q[before], y, rate, record.lam[before] * active, rows.anchors[before], switches, slips)
+    flow = np.zeros((len(leads), c.count))
+    flow[:, c.x], flow[:, c.y], flow[:, c.t] = record.v[before], rate, 1.0
+    found = list[Trigger]()
+    rest_speed = float(record.settings.get("rest_speed", 1e-6))
+    for row, mode, values, growth, terms in zip(leads, modes, *programs.watched_flow(at, flow), strict=True):
+        now = float(rows.ends[row - 1])
+        fired = trigger(equations, rows.events[row], values[:contacts], growth[:contacts], mode.slip, now)
+        k = fired.number
+        places = {"closed": k, "gap": k, "force": contacts + k, "press": contacts + k, "event": 2 * contacts + k,
+                  "stuck": 2 * contacts + guards + k}  # fmt: skip
+        place = places.get(fired.kind)
+        slowest = rest_speed if fired.kind == "closed" else 0.0
+        if place is not None and not abs(growth[place]) > max(GRAZING_RTOL * terms[place], slowest):
+            raise refused_graze(fired, now, float(growth[place]), float(terms[place]))
+        if fired.kind == "closed" and equations.contacts[k].kind != "penalty":
+            refuse_sided_impact(rows, programs, lambda row=row: at_row(row - 1)[0], mode, rows.events[row], k)
+        found.append(fired)
+    return found
