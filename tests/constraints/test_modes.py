@@ -532,3 +532,20 @@ def test_a_law_that_compares_the_number_of_a_state_with_its_name_is_an_error() -
     model.apply(mbd.Motor("other", hinge, lambda s: mbd.where(s == "pull", 1.0, 0.0), arguments=["phase"]))
     with pytest.raises(mbd.TraceError, match="compared with the text 'pull', which no number equals"):
         mbd.assemble(model)
+
+
+def test_states_that_undo_each_other_are_named() -> None:
+    """A leg that is drawn up as its foot stands, and pushed down as it does not."""
+    model, body, foot = mbd.Model("hopper"), mbd.PointMass("body", mass=10.0), mbd.PointMass("foot", mass=0.5)
+    trunk = mbd.Prismatic("trunk", model.ground.origin, body.origin, axis="y")
+    slide = mbd.Prismatic("slide", body.origin, foot.origin, axis=(0, -1, 0), stiffness=4e3, rest=0.5)
+    model.connect(trunk, slide)
+    model.constrain(mbd.Unilateral("toe", mbd.height(foot.origin)))
+    turns = [mbd.Transition("air", "ground", on="toe"), mbd.Transition("ground", "air", on="toe opened")]
+    model.apply(
+        mbd.Mode("leg", ("air", "ground"), transitions=turns),
+        mbd.Motor("drive", slide, force={"ground": -9000.0, "air": 9000.0}, by="leg"),
+    )
+    start = mbd.assemble(model, {"trunk.displacement": 0.7, "slide.displacement": 0.5})
+    with pytest.raises(SimulationError, match="since the states 'ground' and 'air' of 'leg' undo each other; restrict"):
+        mbd.simulate(model, start, mbd.RungeKutta853(), dt=2e-3, until=2.0)

@@ -239,6 +239,24 @@ class Words:
         return ""
 
     @property
+    def undoing(self) -> tuple[str, str]:
+        """The modes that leave states and enter them again at the instant, with these, and what to try; '' for none."""
+        equations, states = self.stepper.mechanism.equations, dict[str, dict[str, None]]()
+        taken = {guard.name: guard.transition for guard in equations.guards}
+        for event in self.events:
+            change = taken.get(event.name)
+            if change is not None and event.time == self.events[-1].time:
+                machine = equations.machines[change.machine]
+                states.setdefault(machine.name, {})[machine.states[change.target]] = None
+        found = [f"{' and '.join(map(repr, of))} of {name!r}" for name, of in states.items() if len(of) > 1]
+        if not found:
+            return "", ""
+        return (
+            f", since the states {', and '.join(found)} undo each other",
+            "restrict a transition with only_while=, or put a state between that lasts (after=); else ",
+        )
+
+    @property
     def touching(self) -> str:
         """The contacts that are closed or about to close, and the frictions of joints, in words."""
         values, manager = self.v, self.stepper.manager
@@ -407,9 +425,10 @@ CAUSES = (
     ),
     Cause((codes.CHATTER, codes.NO_IMPACT), "{x.grip}", when=lambda x: x.grip),
     Cause(
-        (codes.CHATTER,), "{x.switches} at one instant: {x.last_events}; they follow each other without motion",
-        "{x.undamped}{x.sticking}{x.pressing}give a contact a release rule, friction or a penalty law, an event a "
-        "reset that leaves zero, or a transition another cause",
+        (codes.CHATTER,), "{x.switches} at one instant: {x.last_events}; they follow each other without motion"
+        "{x.undoing[0]}",
+        "{x.undamped}{x.sticking}{x.pressing}{x.undoing[1]}give a contact a release rule, friction or a penalty law, an "
+        "event a reset that leaves zero, or a transition another cause",
     ),
     Cause(
         (codes.NO_IMPACT,),
