@@ -55,7 +55,7 @@ def follow_newton(K: Kernel, h: float, t1: float, c_C: float, c_K: float) -> int
     return NOT_FOLLOWED
 
 
-def follow_rates(K: Kernel, t: float) -> int:
+def follow_rates(K: Kernel, t: float, again: bool) -> int:
     """The consistent rates in K.jump and K.impulse of (q1, y1) with their derivatives; 0, or a status."""
     return 0
 

@@ -72,7 +72,7 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
             return NOT_CONVERGED
     compose(K, K.q1)
     if m > 0 or K.n_frictions > 0 or slow:
-        if end_rates(K, t1, m) and follow_rates(K, t1) == 0:
+        if end_rates(K, t1, m) and follow_rates(K, t1, False) == 0:
             K.rate1[: K.n] = K.jump[: K.n]
             K.lam1[: K.n_rows] = K.impulse[: K.n_rows]
         if m > 0:

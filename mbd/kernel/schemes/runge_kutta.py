@@ -84,7 +84,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         explicit_move(K, h, s * stages, s)
         if not (free and stage_in_chart(K, t, s)):
             place_in_chart(K, s)
-            status = follow_rates(K, t) if is_differentiated() else explicit_rates(K, t)
+            status = follow_rates(K, t, s > 1) if is_differentiated() else explicit_rates(K, t)
             if status != 0:
                 return status
         for i in range(n):
@@ -99,7 +99,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
             find_sizes(K)
             return status
     if is_differentiated():
-        status = follow_rates(K, t1)
+        status = follow_rates(K, t1, False)
     elif K.n_active == 0 and K.n_frictions == 0:
         status = explicit_rates(K, t1)
         K.impulse[: K.n_rows] = 0.0

@@ -29,10 +29,12 @@ def prepare_rates(K: Kernel, t: float, m: int) -> int:
     return 0
 
 
-def follow_rates(K: Kernel, t: float) -> int:
+def follow_rates(K: Kernel, t: float, again: bool) -> int:
     """Consistent rates of (q1, y1) in K.jump, multipliers in K.impulse: `consistent` where friction follows λ, else
 
     ``[M R; B 0] (δv̇, δλ) = −δ(M v̇ + f + R λ, B v̇ + γ)`` with v̇ and λ held.
+
+    again : whether the block is that of an earlier stage of the step, but for its time, positions and velocities
     """
     if not is_differentiated():
         return 0
@@ -40,7 +42,12 @@ def follow_rates(K: Kernel, t: float) -> int:
     m = K.n_active
     if K.n_frictions > 0 or K.loaded > 0 or K.loads_act == 1 or K.n_dropped > 0:
         return consistent(K, t, K.q1, K.y1)
-    fill_block(K, t, K.q1, K.y1)
+    if again and K.vector == 1:
+        K.block[0] = t
+        K.block[K.o_q : K.o_q + K.n_q] = K.q1[: K.n_q]
+        K.block[K.o_v : K.o_v + K.n] = K.y1[: K.n]
+    else:
+        fill_block(K, t, K.q1, K.y1)
     if K.correction_program == 0 and solve_straight_rates(K, m):
         return 0
     if prepare_rates(K, t, m) != 0:
@@ -82,14 +89,24 @@ def solve_straight_rates(K: Kernel, m: int) -> bool:
 
 
 def follow_move(K: Kernel, h: float, weights: int, count: int) -> None:
-    """h times the weighted slopes of the first stages into K.spare, as `schemes.runge_kutta.explicit_move` has it."""
+    """h times the weighted slopes of the first stages into K.spare, as `schemes.runge_kutta.explicit_move` has it.
+
+    Two numbers at once take the same weights.
+    """
     width = K.n_v + K.n
-    for i in range(width):
-        total = 0.0
+    i = 0
+    while i < width:
+        following = i + 1 if i + 1 < width else i
+        own = 0.0
+        other = 0.0
         for j in range(count):
-            if K.tableau[weights + j] != 0.0:
-                total += K.tableau[weights + j] * K.stages[j * width + i]
-        K.spare[i] = h * total
+            weight = K.tableau[weights + j]
+            if weight != 0.0:
+                own += weight * K.stages[j * width + i]
+                other += weight * K.stages[j * width + following]
+        K.spare[i] = h * own
+        K.spare[following] = h * other
+        i += 2
 
 
 def follow_factors(K: Kernel, m: int) -> bool:

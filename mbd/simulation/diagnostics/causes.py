@@ -427,8 +427,8 @@ CAUSES = (
     Cause(
         (codes.CHATTER,), "{x.switches} at one instant: {x.last_events}; they follow each other without motion"
         "{x.undoing[0]}",
-        "{x.undamped}{x.sticking}{x.pressing}{x.undoing[1]}give a contact a release rule, friction or a penalty law, an "
-        "event a reset that leaves zero, or a transition another cause",
+        "{x.undamped}{x.sticking}{x.pressing}{x.undoing[1]}give a contact a release rule, friction or a penalty law, "
+        "an event a reset that leaves zero, or a transition another cause",
     ),
     Cause(
         (codes.NO_IMPACT,),
