@@ -21,7 +21,7 @@ from mbd.equations.law_of import Holding, law_of
 from mbd.equations.outputs import Outputs
 from mbd.equations.reactions import Wrench, cut_reaction
 from mbd.equations.results import offer_contacts, offer_rows
-from mbd.errors import ModelError
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 from mbd.topology.held_forces import OF_GAPS, REACTIONS, names_of_held_forces
@@ -65,6 +65,8 @@ class HeldForces:
         ------
         ModelError
             for a force of a penalty contact that follows itself, and the reaction of a joint that is not cut.
+        UnknownNameError
+            for a force that its constraint has under another name.
         """
         if name not in self._possible or name.endswith(REACTIONS):  # of vectors the components have names
             return None
@@ -85,7 +87,9 @@ class HeldForces:
             return self._of_law(word, what)
         if self._first is None:
             return self._scope.tape.input("lam", FIRST_PLACEHOLDER + len(self.asked))
-        return self._known(name) if self._known.offers(name) else None
+        if not self._known.offers(name):
+            raise UnknownNameError(nearest(name, self._known.names(), "force that holds the mechanism", "There are"))
+        return self._known(name)
 
     def _of_law(self, word: Constraint, what: str) -> Node | None:
         """Gap, its rate, and the force of a penalty contact, which the law gives as functions of the motion."""

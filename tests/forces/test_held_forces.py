@@ -212,6 +212,16 @@ def test_what_must_follow_the_motion_alone_is_refused_by_name(word, message):
         mbd.assemble(model, {"float.y": 0.0, "hinge.angle": 0.3}, closed="foot")
 
 
+def test_a_force_that_a_constraint_has_under_another_name_is_offered():
+    model, load = mbd.Model("winch"), mbd.PointMass("load", 2.0)
+    lift = mbd.Prismatic("lift", model.ground.origin, load.origin, axis="y")
+    model.connect(lift)
+    model.constrain(mbd.Bilateral("rope", mbd.measure(lambda y, t: y - 0.1 * t, "lift.displacement", "t")))
+    model.apply(mbd.Motor("band", lift, force=lambda tension: 0.1 * tension, arguments=["rope.force"]))
+    with pytest.raises(mbd.UnknownNameError, match="'band': no force .* 'rope.force'; did you mean 'rope.multiplier'"):
+        mbd.assemble(model)
+
+
 def test_dry_friction_is_read_by_samples_only():
     model = mbd.Model("block")
     block = mbd.PointMass("block", 1.0)
