@@ -18,6 +18,7 @@ from mbd.dataclass import dataclass
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.notes import doubt
 from mbd.sensitivity.motion import First, Mode, Motion, Tangent
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.strikes import captured
@@ -129,6 +130,11 @@ def _directions(
             )
             raise UnknownNameError(f"{text}; an exact 0 or ±1 is a run-time input only with tunable=[{one!r}]")
         if parameters is None and name in start:
+            if name in known:
+                doubt(
+                    f"wrt: {name!r} is a state of the start and a run-time parameter; this is the derivative by the "
+                    f"state. For that by the parameter give its rate, {{'parameter': {{{name!r}: 1.0}}}}"
+                )
             found.append(Direction(name, *start[name]))
         else:
             rates = {name: 1.0} if parameters is None else dict(parameters)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -297,3 +298,20 @@ def test_damping_below_that_of_the_curves_is_refused_as_a_parameter_too():
     start = start_of(model, 0.5, 0.1)
     with pytest.raises(mbd.ModelError, match="damping 0.001 is below 0.01"):
         mbd.simulate(model, start, dt=1e-3, until=0.01, parameters={"biceps.damping": 0.001})
+
+
+def test_a_derivative_by_fiber_length_says_that_it_is_not_that_by_the_optimal_length_of_the_same_name() -> None:
+    model, name = forearm(), "biceps.fiber_length"
+    start = start_of(model, 0.4, 0.3)
+    how: Any = {"integrator": mbd.RungeKutta853(), "dt": 1e-3, "until": 0.1}
+
+    def ends(state: float = 0.0, optimal: float = 0.0) -> Any:
+        place = {"elbow.angle": 0.4, "biceps.activation": 0.3, name: float(start[name]) + state}
+        begun = mbd.assemble(model, place, parameters={name: 0.12 + optimal})
+        return mbd.simulate(model, begun, **how).final["elbow.angle"]
+
+    with pytest.warns(mbd.MbdWarning, match=r"'biceps.fiber_length' is a state of the start and a run-time parameter"):
+        found = mbd.sensitivities(model, start, **how, wrt=[name, {"optimal": {name: 1.0}}], of=["elbow.angle"])
+    for each, label in ("state", name), ("optimal", "optimal"):
+        near, far = (ends(**{each: h}) - ends(**{each: -h}) for h in (1e-5, 2e-5))
+        np.testing.assert_allclose(found["elbow.angle", label], (8.0 * near - far) / 1.2e-4, rtol=1e-6)

@@ -165,7 +165,7 @@ def _doubts(run: RunData) -> list[str]:
 
 
 def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]:
-    """Muscles that push as the run begins: out of equilibrium, or on a path shorter than their tendon alone."""
+    """Muscles that push: out of equilibrium as the run begins, or on a path shorter than their tendon alone."""
     slack, short, forces = list[str](), list[str](), getattr(run.model, "forces", ())
     if not forces:
         return [], []
@@ -173,12 +173,19 @@ def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]
 
     muscles = [force for force in forces if isinstance(force, Muscle)]
     for name, muscle in ((each.name, each) for each in muscles):
-        asked = [columns.node(f"{name}.{field}") for field in ("force", "length", "max_force", "tendon_length")]
-        force, length, most, tendon = (float(x[0]) for x in columns.evaluate(asked, columns.part(np.array([0]), asked)))
-        if length < tendon:
+        lengths, tendons = columns.at_rows([f"{name}.length", f"{name}.tendon_length"])
+        if muscle.is_elastic and muscle.curves == "millard":  # whose tendon carries nothing where it is slack
+            lengths = lengths[:1]
+        pushes = np.flatnonzero(lengths < tendons[: len(lengths)])
+        asked = [columns.node(f"{name}.{field}") for field in ("force", "max_force")]
+        force, most = (float(x[0]) for x in columns.evaluate(asked, columns.part(np.array([0]), asked)))
+        if len(pushes):
+            row = int(pushes[0])
+            when = f" at t = {columns.rows.time[row]:.3g} s" if row else ""
             short.append(
-                f"muscle {name!r} pushes: its path is {length:.3g} m long and its tendon alone {tendon:.3g} m; "
-                "lengths are in metres, and fibers and tendon together are about as long as the path"
+                f"muscle {name!r} pushes{when}: its path is {lengths[row]:.3g} m long and its tendon alone "
+                f"{tendons[row]:.3g} m; lengths are in metres, and fibers and tendon together are about as long as the "
+                "path"
             )
         elif force < -MAX_PUSH_SHARE * most and muscle.is_elastic:
             slack.append(
