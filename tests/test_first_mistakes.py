@@ -481,9 +481,9 @@ def test_a_muscle_in_centimetres_puts_its_run_in_doubt(tendon: str) -> None:
 @pytest.mark.parametrize(("tendon", "curves"), [("elastic", "de groote"), ("rigid", "de groote"), ("rigid", "millard")])
 def test_a_muscle_whose_path_becomes_shorter_than_its_tendon_puts_its_run_in_doubt(tendon: str, curves: str) -> None:
     """Where a slack tendon pushes, or fibers of a rigid one have a length below zero."""
-    model, biceps = forearm(fiber_length=0.06, tendon_length=0.27, tendon=tendon, curves=curves)
+    model, _ = forearm(fiber_length=0.06, tendon_length=0.27, tendon=tendon, curves=curves)
     start = mbd.assemble(model, {"elbow.angle": 0.3}, {"elbow.rate": 20.0})
-    with pytest.warns(mbd.MbdWarning, match=r"'biceps' pushes at t = 0\.\d+ s: its path is 0\.\d+ m long and its tendon"):
+    with pytest.warns(mbd.MbdWarning, match=r"'biceps' pushes at t = 0\.\d+ s: its path is 0\.\d+ m long and its"):
         run = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.25)
     assert run["biceps.length"][0] > 0.27 > run["biceps.length"].min()
 

@@ -43,7 +43,7 @@ def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] |
 
     So it is with sines, whose terms are not looked at. Elements of a rotation made from a quaternion are sums of
     products themselves, by whose terms a vector would grow by a half or more with each turn: 1000 times in a chain of
-    three ball joints.
+    three ball joints. Iterates that later ones correct count with their size (`mbd.tape.functions.settled`).
 
     Parameters
     ----------
@@ -65,6 +65,8 @@ def _sums(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> li
         parts = [size[arg.index] for arg in node.args]
         if node.index in known:
             size[node.index] = tape.constant(known[node.index])
+        elif node.index in node.tape.settled:
+            size[node.index] = abs(node)
         elif node.op in ("add", "sub"):
             size[node.index] = parts[0] + parts[1]
         elif node.op in ("mul", "div"):
@@ -85,6 +87,8 @@ def _squares(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) ->
         parts = [size[arg.index] for arg in node.args]
         if node.index in known:
             size[node.index] = node * node + (MIN_SINE * known[node.index]) ** 2
+        elif node.index in node.tape.settled:
+            size[node.index] = node * node
         elif node.op in ("add", "sub"):
             size[node.index] = maximum(parts[0] + parts[1], node * node)
         elif node.op in ("mul", "div"):

@@ -187,3 +187,59 @@ def test_a_valley_that_is_narrower_than_the_ball_ends_the_run_by_name():
     assert not run.success
     assert "'touch'" in run.message
     assert "narrower" in run.message
+
+
+CUP = 0.5
+
+
+def cup(x, z):
+    return CUP - mbd.sqrt(CUP * CUP - x * x - z * z)
+
+
+def in_a_cup(as_function, **law):
+    """A ball in the lower half of a hollow ball, which is a height function, or a `Ball`."""
+    model, ball = mbd.Model("cup"), mbd.RigidBody("ball", 0.2, (2e-4, 2.2e-4, 1.8e-4), center=(0.005, -0.003, 0.002))
+    model.connect(mbd.Free("float", model.ground.origin, ball.origin))
+    ground = cup if as_function else mbd.Ball(model.ground.point(0.0, CUP, 0.0), CUP, hollow=True)
+    model.constrain(mbd.Unilateral("touch", mbd.sphere_touchdown(ball.origin, 0.05, ground), **law))
+    return model
+
+
+@pytest.mark.parametrize("scheme", [mbd.RungeKutta853(), mbd.RadauIIA(), mbd.HHT()], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("friction", [0.0, 0.15])
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.1, 0.05), (0.2, 0.1), (-0.05, 0.27)])
+def test_a_height_function_is_the_hollow_ball_that_it_describes_however_steep(scheme, friction, place):
+    """The round-off of the place of contact, which Newton's method finds, does not grow with its iterations."""
+    ends = []
+    reach = CUP - 0.05
+    for as_function in (True, False):
+        model = in_a_cup(as_function, friction=friction, spin_friction=0.01)
+        position = {"float.x": place[0], "float.z": place[1], "float.y": CUP - np.sqrt(reach**2 - np.dot(place, place))}
+        velocity = {"float.x": 0.3, "float.z": -0.2, "float.angular_velocity": (1.0, 3.0, -2.0)}
+        start = mbd.assemble(model, position, velocity, closed="touch", project=True)
+        run = mbd.simulate(model, start, scheme, dt=2e-3, until=0.3)
+        names = ("float.x", "float.y", "float.z", "float.angular_velocity")
+        ends.append(
+            (
+                np.concatenate([np.atleast_1d(run[name][-1]) for name in names]),
+                [(event.name, event.kind) for event in run.events],
+                [event.time for event in run.events],
+            )
+        )
+        assert run["touch spin friction.power"].max() < 1e-12
+    assert ends[0][1] == ends[1][1] and ("touch spin", "stuck") in ends[0][1]
+    np.testing.assert_allclose(ends[0][2], ends[1][2], atol=1e-7)
+    np.testing.assert_allclose(ends[0][0], ends[1][0], rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("place", [(0.1, 0.05), (0.2, 0.1), (-0.05, 0.27)])
+def test_spin_friction_of_a_disk_in_a_cup_only_takes(place):
+    model, disk = mbd.Model("disk"), mbd.RigidBody("disk", 0.2, (1e-4, 1e-4, 2e-4))
+    model.connect(mbd.Free("float", model.ground.origin, disk.origin))
+    touch = mbd.disk_touchdown(disk.origin, 0.05, (0, 0, 1), cup)
+    model.constrain(mbd.Unilateral("touch", touch, friction=0.2, spin_friction=0.01))
+    position = {"float.x": place[0], "float.z": place[1], "float.orientation": ("xyz", (0.2, 0.3, 0.1))}
+    start = mbd.assemble(model, position, {"float.angular_velocity": (1.0, 4.0, 2.0)}, closed="touch", project=True)
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=2.5e-4, until=0.2)
+    assert run["touch spin friction.power"].max() < 1e-12 and run["touch friction.power"].max() < 1e-12
+    assert abs(run.energy.numerical).max() < 1e-9

@@ -6,8 +6,12 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.equations import derive
-from mbd.equations.magnitudes import MAX_SUM_RATIO
+from mbd.equations.magnitudes import MAX_SUM_RATIO, magnitudes
 from mbd.equations.programs import accelerations, scales
+from mbd.tape.derivatives import gradient, jvp, substitute
+from mbd.tape.evaluate import evaluate
+from mbd.tape.functions import settled
+from mbd.tape.node import Tape
 from mbd.testing import check_model, trees
 from tests.equations.mechanisms import four_bar, furnished, leg, random_tree, walker
 from tests.equations.numbers import at, inputs
@@ -134,3 +138,29 @@ def test_coordinates_may_be_shared_between_chart_and_increment(equations):
     together |= {("x", k): 0.0 for k in range(equations.n_v)}
     nodes = [*equations.balance, equations.kinetic, equations.potential, *(row.value for row in equations.rows)]
     np.testing.assert_allclose(at(nodes, point), at(nodes, together), rtol=1e-12, atol=1e-12)
+
+
+@settings(max_examples=20, deadline=None)
+@given(value=st.floats(0.1, 10.0), steps=st.integers(8, 20))
+def test_round_off_does_not_grow_with_the_iterations_of_newtons_method(value, steps):
+    """Of a cube root, its derivatives forward and backward, and those after a substitution."""
+
+    def root(x, kept):
+        y = 0.5 * (1.0 + x)
+        for _ in range(steps):
+            y = kept(y)
+            y = y - (y * y * y - x) / (3.0 * y * y)
+        return y
+
+    ratios = []
+    for kept in settled, lambda y: y:
+        tape = Tape()
+        x, z = tape.input("q", 0), tape.input("q", 1)
+        found = root(x, kept)
+        every = [found, *jvp([found], {x: 1.0}), *gradient(found, [x]), *substitute([found], {x: 1.0 * z})]
+        at_value = {("q", 0): value, ("q", 1): value}
+        sizes, values = evaluate(magnitudes(tape, every), at_value), evaluate(every, at_value)
+        exact, slope = value ** (1 / 3), value ** (-2 / 3) / 3
+        np.testing.assert_allclose(values, [exact, slope, slope, exact], rtol=1e-9)
+        ratios.append(np.array(sizes) / values)
+    assert max(ratios[0]) < 20.0 and min(ratios[1]) > max(ratios[0])
