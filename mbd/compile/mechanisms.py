@@ -79,7 +79,7 @@ class _Kept:
         points = self._present()
         if len(points) != len(self._points) or not all(map(is_, points, self._points)):
             return False
-        return self._were is None or as_it_is(self._changing).found == self._were.found
+        return self._were is None or as_it_is(self._changing)[0] == self._were[0]
 
 
 def bodies_of(model: Any) -> list[Any]:

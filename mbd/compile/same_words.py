@@ -176,9 +176,16 @@ def changing(words: Iterable[Any]) -> list[Any]:
     return found
 
 
-def as_it_is(items: Iterable[Any]) -> _AsItIs:
-    """What some functions and objects refer to at the moment, to be compared with that of another moment."""
-    return _AsItIs([*items])
+def as_it_is(items: Iterable[Any]) -> tuple[str, list[Any]]:
+    """What some functions and objects refer to at the moment, to be compared with that of another moment.
+
+    The digest, and the objects that it knows by what they are: as long as these are kept no other can pass for one.
+    """
+    reader = _AsItIs()
+    try:
+        return reader.digest([*items]), reader.kept
+    except Exception:  # attributes of users' objects raise what they like; then nothing is known to have changed
+        return "", reader.kept
 
 
 CALLED = ("reset", "controllers")
@@ -204,13 +211,14 @@ def _globals_of(code: types.CodeType) -> frozenset[str]:
 class _AsItIs(Reader):
     """Reads all that items refer to; of objects what the code that refers to them names, and which objects they are."""
 
-    def __init__(self, items: list[Any]) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.names: set[str] = set()
-        self.found = self.digest(items)
 
     def parts(self, item: Any) -> tuple[str, Iterable[Any]]:
         kind = type(item)
+        if kind is set:
+            return f"set {sorted(type(self)().digest(each) for each in item)}", ()
         if kind is dict:
             return f"dict {len(item)}", [part for pair in item.items() for part in pair]
         if kind is types.MethodType:

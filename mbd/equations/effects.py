@@ -18,10 +18,13 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.joints.base import Joint
 from mbd.joints.losses.base import rates_of
-from mbd.tape.derivatives import jvp
+from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["Cause", "causes", "effect_of", "penalty_effect", "weight_of"]
+
+NO_POTENTIAL = {"v": "velocities", "a": "accelerations", "s": "rates of states", "lam": "forces of constraints"}
+"""Inputs on which no potential depends."""
 
 
 @dataclass
@@ -106,6 +109,7 @@ def _force(force: Force, scope: DerivationScope) -> Cause:
     cause = Cause(force.name, force.kind, force.column, rates=action.rates)
     _apply(cause, action.pairs, scope)
     if action.potential is not None:
+        _require_energy(scope.real(action.potential))
         _store(cause, action.potential, scope)
     for velocity, mass in action.inertias:
         _carry(cause, scope.tape.lift(velocity), scope.tape.lift(mass), scope)
@@ -132,6 +136,16 @@ def _action(force: Force, scope: DerivationScope) -> Action:
                 f"{field_name}=({example},)"
             )
     return action
+
+
+def _require_energy(potential: Node) -> None:
+    """Raise a `ModelError` for a potential that forces would not follow from by its slopes alone."""
+    asked = {node.data[0] for node in live([potential]) if node.op == "input"}
+    if wrong := [what for kind, what in NO_POTENTIAL.items() if kind in asked]:
+        raise ModelError(
+            f"the potential depends on {' and '.join(wrong)}; it is an energy of positions and time, and what depends "
+            "on more is a force: mbd.Applied, mbd.Motor, or a Force of your own"
+        )
 
 
 def _store(cause: Cause, energy: Scalar, scope: DerivationScope) -> None:

@@ -18,6 +18,7 @@ from mbd.bodies.algebra import IDENTITY, ZERO, cross, difference, product, rotat
 from mbd.bodies.base import Body
 from mbd.bodies.scope import Rotation, Scope, Triple
 from mbd.dataclass import dataclass
+from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar, Tape
@@ -136,12 +137,33 @@ def _geometry(edge: Edge, scope: Scope) -> tuple[Rotation, Triple, Triple, tuple
     R_parent, p_parent = joint.parent.placement(scope)
     R_child, p_child = joint.child.placement(scope)
     R, p = joint.transform(edge.values, scope)
+    motions = joint.subspace(edge.values, scope)
+    _require_coordinates_alone(joint, (*R, p, *(each for pair in motions for each in pair)))
     columns = []
-    for k, ((angular, linear), x) in enumerate(zip(joint.subspace(edge.values, scope), edge.increments, strict=True)):
+    for k, ((angular, linear), x) in enumerate(zip(motions, edge.increments, strict=True)):
         slope = _jvp(p, {x: 1.0}, scope.tape) if joint.is_vector or _adds(edge, k) else rotate(R, linear)
         columns.append(Column(rotate(R_child, angular), rotate(R_parent, slope)))
     turn = product(product(R_parent, R), transpose(R_child))
     return turn, total(p_parent, rotate(R_parent, p)), p_child, tuple(columns)
+
+
+def _require_coordinates_alone(joint: Joint, found: Sequence[Triple]) -> None:
+    """Raise a `ModelError` where the placement by a joint of a user's own follows more than its coordinates.
+
+    Velocities and accelerations are those of the coordinates, without what time or other motion would add.
+    """
+    inner = getattr(joint, "joint", joint)
+    if type(inner).__module__.startswith("mbd."):
+        return
+    parts = [part for triple in found for part in triple if isinstance(part, Node)]
+    inputs = [node.data[0] for node in live(parts) if node.op == "input"]
+    if any(kind not in ("q", "x", "p") for kind in inputs):
+        raise ModelError(
+            f"{joint.known_as} ({type(inner).__name__}): its transform or subspace follows "
+            f"{'the time' if 't' in inputs else 'other motion'}; they may depend on its coordinates and parameters "
+            "only. Let a coordinate take what moves, and prescribe it: mbd.Bilateral('drive', mbd.measure("
+            f"'{joint.coordinate_names[0] if joint.labels else joint.name}'), value=lambda t: …)"
+        )
 
 
 def _adds(edge: Edge, k: int) -> bool:

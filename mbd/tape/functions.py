@@ -38,6 +38,10 @@ def on_numpy(name: str, values: Sequence[Any]) -> Any:
         raise TraceError(f"numpy.{name} is not recorded; known are {', '.join(sorted(NUMPY))}")
     if any(getattr(value, "ndim", 0) for value in values):
         return np.frompyfunc(function, len(values), 1)(*[np.asarray(value, dtype=object) for value in values])
+    if any(isinstance(value, complex) for value in values):
+        raise TraceError(
+            f"numpy.{name} of a complex number and a traced value is not recorded; real numbers are wanted"
+        )
     return function(*[value if isinstance(value, Node) else float(value) for value in values])
 
 

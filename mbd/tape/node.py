@@ -8,7 +8,7 @@ found again as ``-(s*x + c*y)``. An effect whose factor is an exact zero therefo
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Sequence
-from numbers import Number
+from numbers import Complex, Number, Real
 from threading import RLock
 from typing import Any, NoReturn, TypeAlias
 
@@ -212,6 +212,8 @@ class Tape:
     def constant(self, number: float) -> Node:
         node = self._numbers.get(number) if number.__class__ is float else None
         if node is None:
+            if isinstance(number, Complex) and not isinstance(number, Real):  # float() drops numpy's imaginary parts
+                raise TraceError(f"the complex number {number!r} met a traced value; real numbers are wanted")
             number = float(number) + 0.0
             node = self._make(("const", number if number == number else "nan"), "const", (), number)
             self._numbers[number] = node

@@ -7,6 +7,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Complex, Real
 from typing import Any, TypeAlias
 
 from mbd.errors import TraceError
@@ -123,7 +124,8 @@ def _component(value: Any, what: str, source: str, tape: Tape) -> Node:
         node = lower(value, {}, tape)
     else:
         try:
-            number = math.nan if isinstance(value, bool | str) else float(value)
+            unreal = isinstance(value, bool | str) or (isinstance(value, Complex) and not isinstance(value, Real))
+            number = math.nan if unreal else float(value)
         except (TypeError, ValueError):
             number = math.nan
         except OverflowError:  # an integer beyond every float

@@ -230,6 +230,8 @@ def _laws_that_change() -> Iterator[tuple[str, Any, Any]]:
     yield "method", law.__call__, lambda: setattr(law, "size", 3.0)
     yield "partial", partial(lambda held, t: held[0] * mbd.sin(t), numbers), lambda: numbers.__setitem__(0, 3.0)
     yield "inner", lambda t: scaled(t), lambda: globals().update(SIZE=3.0)
+    members = {2.0}
+    yield "set", lambda t: max(members) * (1.0 if "a" in {"a", "b"} else 0.0) * mbd.sin(t), lambda: members.add(3.0)
 
 
 def test_functions_that_refer_to_something_else_by_now_are_recorded_again(monkeypatch):

@@ -93,6 +93,15 @@ def test_a_function_of_a_frame_receives_its_position():
     assert scope.value(potential.act(scope).potential) == pytest.approx([19.0])
 
 
+def test_a_potential_is_an_energy_of_positions_and_time():
+    model = mbd.Model("cart", gravity=(0.0, 0.0, 0.0))
+    cart = mbd.PointMass("cart", 1.0)
+    model.connect(mbd.Prismatic("rail", model.ground.origin, cart.origin))
+    model.apply(mbd.Potential("well", lambda q, v: 0.5 * q * q + 0.3 * v * q, ["rail.displacement", "rail.rate"]))
+    with pytest.raises(ModelError, match="'well': the potential depends on velocities; .* a force: mbd.Applied"):
+        mbd.assemble(model)
+
+
 def test_one_function_may_give_all_components():
     force = mbd.Applied("push", BALL.origin, force=lambda t: (t, 2.0 * t))
     scope = ball_at(0.0, 0.0, 0.0)

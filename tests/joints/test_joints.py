@@ -146,3 +146,23 @@ def test_signs_in_a_mirror_are_those_of_angular_velocities_and_places():
     assert (signs["left hip.first"], signs["right hip.second.rate"]) == (1.0, -1.0)
     assert signs_in_a_mirror(joints, (0.3, 0.0, -9.81))["left hip.first"] == -1.0
     assert signs_in_a_mirror(joints[:1], (0.0, -9.81, 0.0)) == {} == signs_in_a_mirror(joints, (1.0, 1.0, 1.0))
+
+
+class Carried(mbd.Prismatic):
+    """A slider whose frame is carried along: its velocity would lack that of the frame."""
+
+    def transform(self, q, scope):
+        R, (x, y, z) = super().transform(q, scope)
+        return R, (x + 0.1 * scope.time**2, y, z)
+
+
+@pytest.mark.parametrize("child_first", [False, True])
+def test_a_joint_of_ones_own_that_moves_by_itself_is_refused(child_first):
+    model = mbd.Model("cart", gravity=(0.0, 0.0, 0.0))
+    cart = mbd.PointMass("cart", 1.0)
+    frames = [model.ground.origin, cart.origin]
+    model.connect(Carried("rail", *(frames[::-1] if child_first else frames)))
+    with pytest.raises(
+        ModelError, match=r"'rail' \(Carried\): its transform or subspace follows the time; .*Bilateral"
+    ):
+        mbd.assemble(model)
