@@ -6,7 +6,7 @@ points before lead, and the test function of its kind, or the limit of its event
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from mbd.errors import GaitError, MbdError, ModelError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.derivatives import parameter_value
 from mbd.gait.limits import changed_events, limit_between
-from mbd.gait.margins import least_margins, watched_feet
+from mbd.gait.margins import margin_at, watched_feet
 from mbd.gait.special_points import TESTS, SpecialPoint, polished
 from mbd.later import later
 from mbd.notebook import table
@@ -184,37 +184,20 @@ def _tested(given: Continuation, near: BranchPoint, last: SpecialPoint) -> Speci
 
 def _margin(given: Continuation, near: BranchPoint, last: SpecialPoint) -> SpecialPoint | None:
     """The zero of a margin near a gait, by the secant method."""
-    watched = watched_feet(given.map, given.friction)
-    where: dict[float, Corrected] = {}
+    from scipy.optimize import root_scalar
+
+    watched, places = watched_feet(given.map, given.friction), list[float]()
 
     def margin(place: float) -> float:
-        corrected = given.corrected(near, near.tangent, place)
-        if not isinstance(corrected, Corrected):
-            return float("nan")
-        where[place] = corrected
-        values = given.with_value(corrected.value)
-        found: Mapping[tuple[str, str], float] = least_margins(given.map, watched, corrected.state, values, exact=True)
-        return found.get((last.kind, last.what), float("nan"))
+        places.append(place)
+        return margin_at(given, watched, near, (last.kind, last.what), place)[0]
 
-    place, along = _secant(margin)
-    if not np.isfinite(along):
+    ended = root_scalar(margin, method="secant", x0=0.0, x1=DIFFERENCE_STEP, xtol=LOCATED, maxiter=SECANTS)
+    if not ended.converged:
         return None
-    point = given.point(where[place], given.whole(near))
+    _, corrected = margin_at(given, watched, near, (last.kind, last.what), ended.root)
+    point, along = given.point(corrected, given.whole(near)), abs(ended.root - places[-1])
     return SpecialPoint(last.kind, point.value, point, (along + given.tol) * given.width, last.what)
-
-
-def _secant(function: Callable[[float], float]) -> tuple[float, float]:
-    """The zero of a function near 0, and its last change; NaN where it does not come to one."""
-    a, b = 0.0, DIFFERENCE_STEP
-    fa, fb = function(a), function(b)
-    for _ in range(SECANTS):
-        if not np.isfinite(fa + fb) or fa == fb:
-            break
-        c = b - fb * (b - a) / (fb - fa)
-        a, fa, b, fb = b, fb, c, function(c)
-        if abs(b - a) <= LOCATED or fb == 0.0:
-            return b, abs(b - a)
-    return b, float("nan")
 
 
 def _limit(given: Continuation, last: SpecialPoint) -> SpecialPoint | None:

@@ -18,10 +18,10 @@ from mbd.equal import BRACKET_RTOL
 from mbd.errors import GaitError, MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 from mbd.gait.return_map import ReturnMap, Values
-from mbd.gait.special_points import MAX_EVALUATIONS, SpecialPoint
+from mbd.gait.special_points import SpecialPoint, zero_between
 from mbd.state import State
 
-__all__ = ["Margin", "Margins", "least_margins", "margin_points", "watched_feet"]
+__all__ = ["Margin", "Margins", "least_margins", "margin_at", "margin_points", "watched_feet"]
 
 NEIGHBOUR_ROWS = 3
 """Rows on each side of the smallest one through which a polynomial goes."""
@@ -145,18 +145,12 @@ def _located(
 
     Its error is the width of the bracket, what is left of the gait's equations, and what half the step changes.
     """
-    from scipy.optimize import brentq
-
     before, after, ds = bracket
-    ends = {0.0: before, ds: after}
     try:
-        place = brentq(
-            lambda place: ends[place] if place in ends else _at(given, watched, one, key, place)[0], 0.0, ds,
-            xtol=BRACKET_RTOL, maxiter=MAX_EVALUATIONS, disp=False,
-        )  # fmt: skip
-        here, corrected = _at(given, watched, one, key, place)
+        place, _ = zero_between(lambda place: margin_at(given, watched, one, key, place)[0], bracket, BRACKET_RTOL)
+        here, corrected = margin_at(given, watched, one, key, place)
         point = given.point(corrected, given.whole(one))
-        finer, corrected_finer = _at(given.with_half_steps(), watched, one, key, place)
+        finer, corrected_finer = margin_at(given.with_half_steps(), watched, one, key, place)
     except MbdError:
         return None
     moves = given.width * abs(ds / (after - before))  # of the parameter, for a margin that differs by 1 N
@@ -165,7 +159,7 @@ def _located(
     return SpecialPoint(key[0], point.value, point, error, key[1])
 
 
-def _at(
+def margin_at(
     given: Continuation, watched: list[Margin], one: BranchPoint, key: tuple[str, str], place: float
 ) -> tuple[float, Corrected]:  # fmt: skip
     """The margin at a place along the tangent, and the gait there.

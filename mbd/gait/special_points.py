@@ -18,16 +18,16 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.equal import BRACKET_RTOL
-from mbd.errors import MbdError
+from mbd.errors import GaitError, MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 
-__all__ = ["KINDS", "TESTS", "SpecialPoint", "polished", "special_points"]
+__all__ = ["KINDS", "TESTS", "SpecialPoint", "polished", "special_points", "zero_between"]
 
 MAX_EVALUATIONS = 40
 """Evaluations of a test function or a margin between two points at most."""
 
 CLOSE, SECANTS = 1e-3, 8
-"""Change of the parameter, over its range, from which on derivatives are found with least errors [-], and how often."""
+"""Distance along the tangent from which on derivatives are found with least errors [-], and how often."""
 RESIDUAL_RATIO = 1e-3
 """Residual of gaits at special points over that of others, where it is reached [-]."""
 ZERO_RTOL = 0.01
@@ -121,25 +121,42 @@ def _located(
 ) -> tuple[BranchPoint, float] | None:
     """The point where a test function is zero, and its error.
 
-    By the Illinois form of the rule of false position, then by secants with derivatives of the least error.
+    By Brent's method, then by secants with derivatives of the least error.
     """
-    (a, fa), (b, fb) = (0.0, test(one)), (ds, test(other))
-    side, value, slope = 0, other.value, (fb - fa) / ds
-    for _ in range(MAX_EVALUATIONS):
-        middle = b - fb * (b - a) / (fb - fa)
-        found = _at(given, one, middle, 2)
+
+    def value(place: float) -> float:
+        found = _at(given, one, place, 2)
         if found is None:
-            return None
-        point = found[0]
-        now, change, value = test(point), abs(point.value - value), point.value
-        slope = (now - fb) / (middle - b) if middle != b else slope
-        if now == 0.0 or change <= CLOSE * given.width:
-            break
-        if now * fb > 0.0:
-            b, fb, fa, side = middle, now, fa * (0.5 if side == 1 else 1.0), 1
-        else:
-            a, fa, fb, side = middle, now, fb * (0.5 if side == -1 else 1.0), -1
-    return polished(given, one, middle, slope, test)
+            raise GaitError("there is no gait between")
+        return test(found[0])
+
+    try:
+        place, slope = zero_between(value, (test(one), test(other), ds), CLOSE)
+    except GaitError:
+        return None
+    return polished(given, one, place, slope, test)
+
+
+def zero_between(
+    function: Callable[[float], float], bracket: tuple[float, float, float], xtol: float
+) -> tuple[float, float]:
+    """A zero of a function between 0 and ds by Brent's method, and the slope between its last two values.
+
+    bracket : its values at 0 and ds, of unlike sign, and ds; xtol : width at which the zero counts as found
+    """
+    from scipy.optimize import brentq
+
+    before, after, ds = bracket
+    values = {0.0: before, ds: after}
+
+    def value(place: float) -> float:
+        if place not in values:
+            values[place] = function(place)
+        return values[place]
+
+    place = float(brentq(value, 0.0, ds, xtol=xtol, maxiter=MAX_EVALUATIONS, disp=False))
+    (a, fa), (b, fb) = list(values.items())[-2:]
+    return place, (fb - fa) / (b - a)
 
 
 def polished(
@@ -158,7 +175,7 @@ def polished(
         if last is not None and place != last[0] and now != last[1]:
             slope = (now - last[1]) / (place - last[0])
         step = -now / slope if slope else 0.0
-        rate = abs((point.value - one.value) / place) if place else 0.0
+        rate = abs((point.value - one.value) / place if place else given.width * one.tangent[-1])
         if abs(step) >= along:  # no more is to be had from these derivatives
             break
         along, last = abs(step), (place, now)
