@@ -96,7 +96,7 @@ class Run(RunData):
             settled = rewind(self, failed=problem not in (INTERRUPTED, self.energy.problem, self.room.problem))
         final = close(self, settled)
         problem, fed = self._in_words(problem), self._in_words(self._guarded(self._judge_energy)[0])
-        if self.stop and not problem and not message.startswith("ended"):
+        if self.stop and not problem and not self.ended:
             message = f"{self.stop!r} did not happen before t = {self.end:g} s"
             if isinstance(self.settings["until"], str) and self.limit is None:
                 asked = f"in {MAX_WAIT} steps" if self.settings.get("dt") else "up to which a run with tol= waits"
@@ -143,11 +143,11 @@ class Run(RunData):
         if not self.carried:
             begin_controllers(self)
         save(self, self.pending)
-        ended = ""
+        self.ended = ""
         if self.pending:
-            ended, self.pending = self._react(self.pending), ()
+            self.ended, self.pending = self._react(self.pending), ()
             save(self)
-        while not ended:
+        while not self.ended:
             known = len(self.events)
             target, due = self.boundaries.next(self.end)
             jump = self.boundaries.ahead
@@ -168,7 +168,7 @@ class Run(RunData):
                     return "", f"reached t = {self.end:g} s"
             elif status == codes.EVENT:
                 save(self, self.events[known:])
-                ended = self._react(self.events[known:])
+                self.ended = self._react(self.events[known:])
             elif status not in (codes.FULL, codes.PAUSE) and not self._goes_on_unlocated(status):
                 return self._explained(status), ""
             save(self)
@@ -185,15 +185,16 @@ class Run(RunData):
             if perf_counter() - shown > 0.1:  # wall time between two looks [s]
                 shown = perf_counter()
                 self._show()
-        return self._finish(f"ended by {ended!r} at t = {self.now:.6g} s")
+        return self._finish()
 
-    def _finish(self, message: str) -> tuple[str, str]:
+    def _finish(self) -> tuple[str, str]:
         """Store the row after the event that ends the run."""
         save(self)
         status = call(self, self.now, np.inf)
         self.collect()
-        ended = status in (codes.DONE, codes.EVENT, codes.NEW_MODE)
-        return ("", message) if ended else (self._explained(status), "")
+        if status not in (codes.DONE, codes.EVENT, codes.NEW_MODE):
+            return self._explained(status), ""
+        return "", f"ended by {self.ended!r} at t = {self.now:.6g} s"
 
     def _goes_on_unlocated(self, status: int) -> bool:
         """Whether the step that failed was taken back, and non-smooth steps follow in the place of located instants."""

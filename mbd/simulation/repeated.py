@@ -104,13 +104,14 @@ class RepeatedRun:
             self._reset(start, self.parameters if parameters is None else dict(parameters))
         except ModelError as error:
             return End(None, (), frozenset(), "", str(error))
-        problem, message = run.march()
+        problem, _ = run.march()
         if run.interrupted:  # a march ends in order then, and what repeats it is to end too
             run.interrupted = False
             raise run.cause or KeyboardInterrupt
         run.collect()
         final = replace(run.state(), moved={})
-        return End(final, tuple(run.events), _before(start, run.events, run.now), self._stop(message), problem)
+        stopped_by = "" if problem else run.ended
+        return End(final, tuple(run.events), _before(start, run.events, run.now), stopped_by, problem)
 
     def many(
         self, starts: Sequence[State], parameters: Sequence[Mapping[str, float]] | Mapping[str, float] | None = None
@@ -207,14 +208,6 @@ class RepeatedRun:
             run.set_parameters(parameters)
         run.start = start
         begin(run, start)
-
-    def _stop(self, message: str) -> str:
-        """The name of the event in the message of a march that one ended."""
-        if not message.startswith("ended by"):
-            return ""
-        ending = [event.name for event in self.run.events if event.kind in ("closed", "event")]
-        terminal = {guard.name for guard in self.run.manager.guards if guard.terminal} | {self.run.stop}
-        return next((name for name in reversed(ending) if name in terminal), "")
 
 
 def _before(start: State, events: Sequence[EventRecord], now: float) -> frozenset[str]:

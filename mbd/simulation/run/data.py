@@ -106,6 +106,8 @@ class RunData:
     """Whether the same run has been made before, so that its parameters need not be judged."""
     interrupted = False
     cause: BaseException | None = None
+    ended = ""
+    """The name of the event that ended it."""
 
     def __init__(
         self,
