@@ -36,8 +36,6 @@ __all__ = ["AnotherRun", "Charted", "seed", "tangent_run"]
 OWN = ("contact", "impact", "locate", "store", "rest_speed")
 FOLLOWING = ("allowed", "longest", "driven")
 CLOCK = TABLE.places["time"][1]
-DIFFERENCE_STEP = 1e-4
-"""Size of an increment by which q ⊕ x is differentiated with an error of its sixth power [-]."""
 
 
 class AnotherRun(CapabilityError):
@@ -59,18 +57,8 @@ class Charted:
         self.programs = programs
 
     def base(self, q: Vector) -> Matrix:
-        """∂(q ⊕ x)/∂x (n_q, n_v) at x = 0."""
-        if self.programs.mechanism.vector:
-            return np.eye(len(q))
-        compose, units = (
-            self.programs.equations.configuration.compose,
-            DIFFERENCE_STEP * np.eye(self.programs.columns.n_v),
-        )
-        parts = [
-            sum(w * (compose(q, k * unit) - compose(q, -k * unit)) for k, w in ((1, 45.0), (2, -9.0), (3, 1.0)))
-            for unit in units
-        ]
-        return np.array(parts).T / (60.0 * DIFFERENCE_STEP)
+        """∂(q ⊕ x)/∂x (n_q, n_v) at x = 0, which are the rates ``q̇ = N(q) v`` of unit velocities."""
+        return self.programs.equations.configuration.rates(q, np.eye(self.programs.columns.n_v)).T
 
     def along(self, q: Vector, of_q: Matrix) -> Matrix:
         """Derivatives along velocities (n_v, D)."""
