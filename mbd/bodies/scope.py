@@ -59,9 +59,11 @@ class Scope(ParameterSource, Protocol):
 
         jumps : the lowest derivative that jumps at each break but the first; by default it is measured
         """
+        return self.tape.table(owner, breaks, coefficients, jumps)
 
     def increment(self, owner: str, field: str) -> Scalar:
         """What is added to the law ``owner.field`` where an analysis asks for it as an input; 0 otherwise."""
+        return 0.0
 
     def frame(self, frame: Frame) -> FrameMotion:
         """Motion of a frame of any body, or of the ground."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Frame
-from mbd.bodies.scope import FrameMotion, JointMotion
+from mbd.bodies.scope import FrameMotion, JointMotion, Scope
 from mbd.constraints.observation import Observation
 from mbd.equations.coordinate_scope import CoordinateScope
 from mbd.equations.derivation_scope import DerivationScope
@@ -50,7 +50,7 @@ def offer_observations(
             outputs.value(f"{observation.name}.{axis}", part)
 
 
-class _ObservingScope:
+class _ObservingScope(Scope):
     """A `Scope` in which every result has its name, and which adds no parameters, tables or states."""
 
     def __init__(self, outputs: Outputs, scope: DerivationScope, name: str) -> None:
@@ -102,9 +102,6 @@ class _ObservingScope:
         if name not in self._scope.parameters:
             raise ModelError(f"{self._what} asks for the parameter {name!r}, which the model has not; write the number")
         return self._scope.parameters[name]
-
-    def increment(self, owner: str, field: str) -> Scalar:
-        return 0.0
 
     def table(
         self,

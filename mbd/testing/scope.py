@@ -10,12 +10,12 @@ import numpy as np
 from mbd.bodies.algebra import axis_rotation, difference, product, rotate, total, transpose
 from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
-from mbd.bodies.scope import FrameMotion, JointMotion, Rotation, Triple
+from mbd.bodies.scope import FrameMotion, JointMotion, Rotation, Scope, Triple
 from mbd.errors import UnknownNameError, nearest
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
-from mbd.tape.node import Node, Scalar, Table, Tape
+from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["FreeScope", "skew"]
 
@@ -24,7 +24,7 @@ Numbers = np.ndarray[Any, np.dtype[np.float64]]
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class FreeScope:
+class FreeScope(Scope):
     """`mbd.bodies.scope.Scope` in which each body has six coordinates: place, then turns about x, y, z.
 
     Joints are read off their frames; `recorded` holds every parameter asked for, `asked` every body,
@@ -56,18 +56,6 @@ class FreeScope:
             self._parameters[name] = node
             self.numbers[node] = value
         return self._parameters[name]
-
-    def increment(self, owner: str, field: str) -> Scalar:
-        return 0.0
-
-    def table(
-        self,
-        owner: str,
-        breaks: Sequence[float],
-        coefficients: Sequence[Sequence[float]],
-        jumps: Sequence[int] | None = None,
-    ) -> Table:
-        return self.tape.table(owner, breaks, coefficients, jumps)
 
     def state_names(self, mode: str) -> Sequence[str]:
         """There are no modes."""
