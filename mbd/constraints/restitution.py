@@ -111,15 +111,15 @@ def stored_work(chi: float) -> float:
 
 
 @cache
-def _quadrature(nodes: int) -> tuple[Vector, Vector]:
+def _quadrature() -> tuple[Vector, Vector]:
     """Nodes and weights of Gauss and Legendre."""
     import numpy as np
 
-    places, weights = np.polynomial.legendre.leggauss(nodes)
+    places, weights = np.polynomial.legendre.leggauss(200)
     return places, weights
 
 
-def impact_integral(chi: float, exponent: float, end: float, nodes: int = 200) -> float:
+def impact_integral(chi: float, exponent: float, end: float) -> float:
     """``∫_end¹ dw/(P(w)^{n/(n+1)} (1 + χ w))`` with ``P(w) = ∫_w¹ s/(1 + χ s) ds``: a duration in its own scale.
 
     From touch until the deepest point (end = 0), or until it parts (end = −e, where P is zero again);
@@ -128,7 +128,7 @@ def impact_integral(chi: float, exponent: float, end: float, nodes: int = 200) -
     import numpy as np
 
     p, power = exponent + 1.0, exponent / (exponent + 1.0)
-    places, weights = _quadrature(nodes)
+    places, weights = _quadrature()
     tau = 0.5 * (places + 1.0)
     front, back = tau**p, (1.0 - tau) ** p
     w = end + (1.0 - end) * front / (front + back)

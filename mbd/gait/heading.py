@@ -88,7 +88,7 @@ def heading_of(
     gravity = np.array([values.get(f"gravity.{axis}", 0.0) for axis in "xyz"])
     size = float(np.linalg.norm(gravity))
     up = -gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
-    parts = parts_of(model, mechanism.equations.configuration, up)
+    parts = parts_of(model, up)
     if parts is None:
         return None
     changed = _names(mechanism, parts)

@@ -16,7 +16,6 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.bodies.base import Frame
-from mbd.configuration import Configuration
 from mbd.dataclass import dataclass
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.joints import Cylindrical, Free, Prismatic, Revolute, Spherical, Translation, Universal
@@ -76,7 +75,7 @@ class _Chain:
         return np.asarray(np.reshape(self.directions, (-1, 3)), dtype=np.float64).T
 
 
-def parts_of(model: Any, configuration: Configuration, up: Vector) -> list[Part] | None:
+def parts_of(model: Any, up: Vector) -> list[Part] | None:
     """What a turn about the vertical changes of every joint; None where some joint cannot follow."""
     edges = plan(model).edges
     first = _firsts(edges)

@@ -136,7 +136,7 @@ def rod(L: float, m: float, g: float, mu: float) -> mbd.Model:
     return model
 
 
-def slide(id: str, mu: float, speed: float, scheme: Any, *, spin: float = 0.0, until: float = 0.1) -> Any:
+def slide(id: str, mu: float, speed: float, scheme: Any, *, until: float = 0.1) -> Any:
     """The run of the rod pushed along the ground at its angle, whatever comes of it."""
     given = numbers(id)
     L, angle = given["L"], given["theta"]
@@ -146,9 +146,9 @@ def slide(id: str, mu: float, speed: float, scheme: Any, *, spin: float = 0.0, u
         model,
         position={"place.y": 0.5 * L * math.sin(angle), "place.angle": angle},
         velocity={
-            "place.x": speed - 0.5 * L * spin * math.sin(angle),
-            "place.y": 0.5 * L * spin * math.cos(angle),
-            "place.angle": spin,
+            "place.x": speed,
+            "place.y": 0.0,
+            "place.angle": 0.0,
         },
         closed=["tip"],
     )

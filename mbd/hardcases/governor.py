@@ -26,13 +26,13 @@ ERROR_FACTOR = 2.0
 """Of the allowance of errors, with the rate of the shaft; that of its angle is reckoned per radian."""
 
 
-def governor(case: str = B5) -> tuple[mbd.Model, mbd.State]:
+def governor() -> tuple[mbd.Model, mbd.State]:
     """A free shaft along z, a slider on it, two rods with balls hinged at its top, a spring-damper to each rod.
 
     Angles of the rods are measured from the downward vertical, outwards; 'shaft.angle', 'sleeve.displacement',
     'right.angle' and 'left.angle' name the motion.
     """
-    data = definition(case)
+    data = definition(B5)
     number = {name: float(value) for name, value in data["definition"].items() if name != "geometry"}
     begin = data["initial_conditions"]
     length, thick, height, edge, off = (number[name] for name in ("L", "t", "H", "bx", "off"))

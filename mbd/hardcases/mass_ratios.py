@@ -34,9 +34,9 @@ WELDED, HINGED = 0.2, 0.5
 """Factors of the allowance of errors of the period, with one coordinate and with rows."""
 
 
-def heavy_below_light(cut: str = "auto", case: str = J4) -> tuple[mbd.Model, mbd.State]:
+def heavy_below_light(cut: str = "auto") -> tuple[mbd.Model, mbd.State]:
     """A double pendulum of a light mass and a heavy one below it; cut='all' has absolute coordinates."""
-    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    numbers, begin = definition(J4)["definition"], definition(J4)["initial_conditions"]
     model = mbd.Model("mass ratio", gravity=(0.0, -numbers["g"], 0.0), cut=cut)
     upper = mbd.Link("upper", numbers["m1"], numbers["L1"], numbers["L1"])
     lower = mbd.Link("lower", numbers["m2"], numbers["L2"], numbers["L2"])

@@ -48,9 +48,9 @@ def parallel_cranks(case: str = J2, cut: Any = "auto", count: int = 0) -> tuple[
     )
 
 
-def bricard(case: str = B4, cut: Any = "auto") -> tuple[mbd.Model, mbd.State]:
+def bricard(cut: Any = "auto") -> tuple[mbd.Model, mbd.State]:
     """Thin rods between two fixed pivots, each of the hinges 'P0' … square to its neighbours."""
-    numbers = definition(case)["definition"]
+    numbers = definition(B4)["definition"]
     points = [np.array(place, dtype=float) for place in numbers["points"].values()]
     down = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}[numbers["gravity"][-1]]
     sign = -1.0 if numbers["gravity"].startswith("-") else 1.0

@@ -26,9 +26,9 @@ CRANK, FLAT = 0.6, 0.2
 """Factors of the allowance of errors, of j3 and j3b."""
 
 
-def equal_slider_crank(case: str = J3) -> tuple[mbd.Model, mbd.State]:
+def equal_slider_crank() -> tuple[mbd.Model, mbd.State]:
     """Crank and rod of one length, the slider on the x axis through the crank's pivot."""
-    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    numbers, begin = definition(J3)["definition"], definition(J3)["initial_conditions"]
     L, m = numbers["L"], numbers["m_each"]
     rod = {"mass": m, "length": L, "center": 0.5 * L, "inertia": m * L * L / 12.0}
     model = mbd.Model("slider-crank", gravity=(0.0, -numbers["g"], 0.0))
@@ -46,9 +46,9 @@ def equal_slider_crank(case: str = J3) -> tuple[mbd.Model, mbd.State]:
     return model, mbd.assemble(model, position=place, velocity={"main.angle": begin["crank_rate"]})
 
 
-def parallelogram(case: str = J3B) -> tuple[mbd.Model, mbd.State]:
+def parallelogram() -> tuple[mbd.Model, mbd.State]:
     """Two cranks and a coupler of one length on a base of the same length; 'a' and 'd' are their pivots."""
-    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    numbers, begin = definition(J3B)["definition"], definition(J3B)["initial_conditions"]
     L, m = numbers["L"], numbers["link_mass"]
     rod = {"mass": m, "length": L, "center": 0.5 * L, "inertia": m * L * L / 12.0}
     model = mbd.Model("parallelogram", gravity=(0.0, -numbers["g"], 0.0))

@@ -21,9 +21,9 @@ SLEIGH, EDGE, FORCE = 0.4, 1.0, 0.01
 """Factors of the allowance of errors: of the sleigh, of the knife edge, of its multiplier, which has order 3."""
 
 
-def sleigh(case: str = D1) -> tuple[mbd.Model, mbd.State]:
+def sleigh() -> tuple[mbd.Model, mbd.State]:
     """The sleigh, its mass center ahead of the blade's point of contact P, and its start."""
-    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    numbers, begin = definition(D1)["definition"], definition(D1)["initial_conditions"]
     inertia = numbers["I_G"]
     model = mbd.Model("sleigh", gravity=(0.0, 0.0, 0.0))
     body = mbd.RigidBody("sleigh", numbers["m"], (0.5 * inertia, 0.5 * inertia, inertia), center=(numbers["a"], 0, 0))
@@ -43,9 +43,9 @@ def sleigh(case: str = D1) -> tuple[mbd.Model, mbd.State]:
     return model, start
 
 
-def knife_edge(case: str = D2) -> tuple[mbd.Model, mbd.State]:
+def knife_edge() -> tuple[mbd.Model, mbd.State]:
     """The knife edge in axes of the incline, x downhill, held by a row of the user's own."""
-    numbers, begin = definition(case)["definition"], definition(case)["initial_conditions"]
+    numbers, begin = definition(D2)["definition"], definition(D2)["initial_conditions"]
     inertia = numbers["I"]
     model = mbd.Model("knife edge", gravity=mbd.on_slope(numbers["slope"], numbers["g"]))
     body = mbd.RigidBody("edge", numbers["m"], (0.5 * inertia, 0.5 * inertia, inertia))

@@ -104,9 +104,9 @@ def _worst(found: Any, reference: Reference) -> float:
     return float(np.max(np.abs(np.asarray(found) - reference.value)))
 
 
-def four_bar_that_cannot_close(case: str = J15) -> mbd.Model:
+def four_bar_that_cannot_close() -> mbd.Model:
     """Three links in a row between two points of the ground that are too far apart."""
-    numbers = definition(case)["definition"]
+    numbers = definition(J15)["definition"]
     model = mbd.Model("four-bar")
     links = [mbd.Link(f"link {k}", 1.0, length, 0.5 * length, length**2 / 12.0)
              for k, length in enumerate(numbers["links"])]  # fmt: skip

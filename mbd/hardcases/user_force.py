@@ -38,9 +38,9 @@ def push(case: str = J16) -> Push:
     return Push(*map(float, found.groups()))
 
 
-def pushed_particle(case: str = J16) -> tuple[mbd.Model, mbd.State]:
+def pushed_particle() -> tuple[mbd.Model, mbd.State]:
     """A free particle under a steady force 'push' that is NaN from a time on."""
-    begin, given = definition(case)["initial_conditions"], push(case)
+    begin, given = definition(J16)["initial_conditions"], push(J16)
     model = mbd.Model("particle", gravity=(0.0, 0.0, 0.0))
     body = mbd.PointMass("particle", given.mass)
     model.connect(mbd.Translation("place", model.ground.origin, body.origin))

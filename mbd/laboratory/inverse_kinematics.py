@@ -312,13 +312,11 @@ def _begin(
     q = np.array(assemble(model, open=contacts, parameters=dict(parameters or {})).q, dtype=float)
     for joint, first_q, first_v in equations.configuration.charts:
         if isinstance(joint, Free) and first_v == 0:
-            return _laid(mechanism, problem, q, first_q, first, float(recording.time[first]), values, len(points))
+            return _laid(problem, q, first_q, first, float(recording.time[first]), values, len(points))
     return q
 
 
-def _laid(
-    mechanism: Mechanism, problem: Problem, q: Vector, place: int, first: int, time: float, values: Vector, markers: int
-) -> Vector:
+def _laid(problem: Problem, q: Vector, place: int, first: int, time: float, values: Vector, markers: int) -> Vector:
     """The posture with its floating body turned and shifted so that its markers lie on those measured."""
     y, _ = problem.program.at_all(np.array([time]), q[np.newaxis], values)
     model = y[0, : 3 * markers].reshape(-1, 3)

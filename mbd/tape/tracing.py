@@ -219,6 +219,6 @@ def _applied(function: Any, values: Sequence[Any], tape: Tape) -> Node:
     return lower(function.expr, dict(zip(function.signature, values, strict=True)), tape)
 
 
-def _short(expression: Any, width: int = 60) -> str:
+def _short(expression: Any) -> str:
     text = str(expression)
-    return text if len(text) <= width else text[: width - 1] + "…"
+    return text if len(text) <= 60 else text[:59] + "…"

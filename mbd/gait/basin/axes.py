@@ -147,7 +147,7 @@ def study_of(map_: ReturnMap, grid: Grid, start: Any) -> Study:
     return study
 
 
-def kinds_of_parameters(map_: ReturnMap, base: Mapping[str, float], columns: Mapping[str, Vector], count: int) -> tuple[
+def kinds_of_parameters(base: Mapping[str, float], columns: Mapping[str, Vector], count: int) -> tuple[
     list[dict[str, float]], Any
 ]:  # fmt: skip
     """The different sets of values (functions among them), and the number of that of each run."""

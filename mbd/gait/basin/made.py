@@ -61,7 +61,7 @@ class Made:
             first.chart.section,
         )
         columns = self.study.columns(_spread(len(self.study.grid)))
-        kinds, _ = kinds_of_parameters(self.map, self.base, columns[1], SAMPLED_STARTS)
+        kinds, _ = kinds_of_parameters(self.base, columns[1], SAMPLED_STARTS)
         plain = [self.map.plain(values) for values in kinds]
         self.plain = {name: np.array([values[name] for values in plain]) for name in plain[0]}
         options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": REST_SPEED,
@@ -141,7 +141,7 @@ class Made:
         for first in range(0, total, CHUNK):
             runs = np.arange(first, min(first + CHUNK, total))
             _, columns = self.study.columns(runs)
-            for values in kinds_of_parameters(self.map, self.base, columns, len(runs))[0]:
+            for values in kinds_of_parameters(self.base, columns, len(runs))[0]:
                 found[tuple(values.values())] = values
             if len(found) > MAX_GAITS:
                 raise ModelError(
@@ -155,7 +155,7 @@ class Made:
     def lines(self, runs: Any) -> tuple[Matrix, NDArray[np.bool_], Changes, Any, list[list[tuple[int, Ball]]]]:
         """Starts of these numbers as lines, whether they are on the section, their parameters, sets and balls."""
         state, columns = self.study.columns(runs)
-        kinds, which = kinds_of_parameters(self.map, self.base, columns, len(runs))
+        kinds, which = kinds_of_parameters(self.base, columns, len(runs))
         changes = self.changes(kinds, which)
         lines = np.repeat(self.walks.lines([self.state]), len(runs), axis=0)
         for place, column in state.items():
