@@ -30,8 +30,7 @@ from mbd.sensitivity.asked import EndState
 from mbd.sensitivity.motion import Mode, Motion, Tangent
 from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.starts import Direction, programs_of
-from mbd.sensitivity.strikes import captured
+from mbd.sensitivity.starts import Direction, captured, programs_of
 from mbd.sensitivity.tangent_run import DIRECTIONS
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
@@ -213,7 +212,7 @@ def motion_on_section(chart: Chart, state: State, programs: Programs, p: Matrix)
     columns, y = programs.columns, np.concatenate([state.v, state.z])
     none = np.zeros(columns.n), np.zeros(columns.rows)
     flags, size = section.flags.astype(float), p.shape[1]
-    mode = Mode((), (), flags, flags, np.zeros(len(equations.frictions)))
+    mode = Mode((), flags, flags, np.zeros(len(equations.frictions)))
     parts = np.split(np.eye(chart.size, size), np.cumsum(chart.counts)[:-1])
 
     def with_rows(free: Matrix, off: Matrix, slopes: Matrix, own: slice, known: Tangent) -> Matrix:

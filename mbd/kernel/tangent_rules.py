@@ -5,12 +5,13 @@ The tangent pass (`mbd.sensitivity.tangent`) translates the kernel with other fu
 
 from __future__ import annotations
 
-from mbd.kernel.records import Equations, Integers, Kernel, Reals, Steps
+from mbd.kernel.records import Balance, Equations, Integers, Kernel, Reals, Steps
 
 __all__ = [
     "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
     "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections", "held_at_end",
-    "is_differentiated", "note_matrix", "note_solution", "solve_plain", "takes_part",
+    "is_differentiated", "note_edges", "note_matrix", "note_order", "note_solution", "note_zero", "solve_plain",
+    "takes_part",
 ]  # fmt: skip
 
 NOT_FOLLOWED = -3
@@ -80,6 +81,18 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
 
 def follow_matrix(K: Steps, m: int, x: Reals, whole: bool) -> None:
     """A correction x follows its matrix; `whole`: x is all that positions are corrected by, not a change of it."""
+
+
+def note_edges(K: Balance) -> None:
+    """A phase of an impact has been found, who takes part in it and how."""
+
+
+def note_order(K: Balance, fastest: float, ends: bool) -> None:
+    """The contacts of the next impact of the sequential law have been chosen, or that it `ends`."""
+
+
+def note_zero(K: Balance, c: int, value: float) -> None:
+    """Contact c gets such an impulse in restitution."""
 
 
 def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals, first: int) -> None:

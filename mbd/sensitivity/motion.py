@@ -14,14 +14,13 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.sensitivity.programs import Columns, State
 
-__all__ = ["First", "Mode", "Motion", "Rates", "Tangent", "solved"]
+__all__ = ["First", "Mode", "Motion", "Rates", "Tangent"]
 
 
 @dataclass(frozen=True)
 class Mode:
-    """What acts: numbers of the rows that do not depend on others, of all that act; closed; signs of sliding."""
+    """What acts: numbers of the rows; closed; signs of sliding."""
 
-    rows: tuple[int, ...]
     held: tuple[int, ...]
     closed: Vector
     switch: Vector
@@ -93,11 +92,3 @@ class Rates:
     lam: Vector
     of_rate: Matrix
     of_lam: Matrix
-
-
-def solved(A: Matrix, b: Matrix) -> Matrix:
-    """A⁻¹ b; the least solution where A is singular."""
-    try:
-        return np.asarray(np.linalg.solve(A, b))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])

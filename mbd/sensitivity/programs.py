@@ -9,7 +9,6 @@ that are not always zero. Where coordinates do not add, x is the increment from 
 
 =============  =============================================================================================
 `steps`        r (n), h (R), ḣ (R): the balance over all rows, penalties behind their switches, frictions behind slips
-`consistent`   r (n), ḧ (R)
 `watched`      gaps (nC), penalty forces (nC), values of users' guards, sliding velocities and limits of frictions,
                measures that must be positive for a contact to be watched (nC)
 `limits`       limits of frictions at rest
@@ -34,7 +33,7 @@ from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
-from mbd.equations.linearization import along_places, row_changes
+from mbd.equations.linearization import along_places
 from mbd.equations.programs import switched_balance
 from mbd.sensitivity.charts import chart_columns
 from mbd.tape.derivatives import jvps
@@ -156,12 +155,6 @@ class Programs:
         of_r, of_h, of_rate = (slopes[a:b] for a, b in pairwise(cuts))
         return r, h, rate, of_r, of_h, of_rate
 
-    def consistent(self, at: State) -> tuple[Vector, Vector, Matrix, Matrix]:
-        """r and ḧ, and their derivatives."""
-        n = self.layout.n
-        values, slopes = self._call("consistent", at, n + self.layout.n_rows)
-        return values[:n], values[n:], slopes[:n], slopes[n:]
-
     def watched(self, at: State) -> tuple[Vector, Matrix]:
         """Gaps | penalty forces | users' guards | sliding velocities | limits | conditions, and their derivatives."""
         size = 3 * self.layout.n_contacts + len(self.equations.guards) + 2 * self.layout.n_frictions
@@ -250,8 +243,6 @@ class Programs:
         if name == "steps":
             values = switched_balance(equations)
             return values + [row.value for row in equations.rows] + [row.rate for row in equations.rows]
-        if name == "consistent":
-            return switched_balance(equations) + row_changes(equations, range(len(equations.rows)))
         if name == "watched":
             zero, contacts, frictions = equations.tape.zero, equations.contacts, equations.frictions
             values = [contact.gap for contact in contacts]
@@ -266,11 +257,6 @@ class Programs:
         if name == "captured":
             return [value for contact in equations.contacts for value in contact.captured]
         return [equations.output(each) for each in name.removeprefix("results ").split(RESULT_SEPARATOR)]
-
-
-def paired(equations: Equations) -> list[int]:
-    """Numbers of the frictions that slide together with others, in a plane or in space."""
-    return [k for k, friction in enumerate(equations.frictions) if friction.group]
 
 
 def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[int]) -> list[list[Node]]:

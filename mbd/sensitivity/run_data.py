@@ -171,7 +171,7 @@ def mode_of(manager: ActiveSetManager, closed: NDArray[Any], phase: NDArray[Any]
     """What acts by the flags of contacts and the phases of frictions."""
     held = manager.active_rows(np.asarray(closed, dtype=np.int64), (phase == 2).astype(np.int64))
     slip = np.where(np.abs(phase) == 1, phase, 0).astype(float)
-    return Mode(held, held, np.asarray(closed), np.asarray(closed, dtype=float), slip)
+    return Mode(held, np.asarray(closed), np.asarray(closed, dtype=float), slip)
 
 
 def held_at(start: State | None, mechanism: Mechanism) -> Vector:

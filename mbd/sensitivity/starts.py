@@ -8,6 +8,7 @@ where they are then; then velocities.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,6 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.notes import doubt
 from mbd.sensitivity.motion import First, Mode, Motion, Tangent
 from mbd.sensitivity.programs import Programs
-from mbd.sensitivity.strikes import captured
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names
 from mbd.sensitivity.transitions import stored_at_start
 
@@ -249,3 +249,19 @@ def _by_row(M: Matrix, B: Matrix) -> Matrix:
         pass
     flow = np.linalg.solve(M, B.T)
     return -flow @ np.linalg.lstsq(B @ flow, np.eye(m), rcond=1e-12)[0]
+
+
+def captured(programs: Programs, motion: Motion, mode: Mode, contacts: Sequence[int]) -> Motion:
+    """The motion with what these contacts hold from now on."""
+    equations = programs.equations
+    places = [place for c in contacts for place in equations.contacts[c].anchors]
+    if not places:
+        return motion
+    order = [place for contact in equations.contacts for place in contact.anchors]
+    lines = [order.index(place) for place in places]
+    zero = np.zeros(programs.columns.n), np.zeros(programs.columns.rows)
+    values, slopes = programs.captured(motion.at(mode, *zero))
+    anchors, of_anchors = motion.anchors.copy(), motion.tangent.anchors.copy()
+    anchors[places] = values[lines]
+    of_anchors[places] = slopes[lines] @ motion.tangent.stacked(programs.columns)
+    return replace(motion, anchors=anchors).with_tangent(anchors=of_anchors)

@@ -21,7 +21,7 @@ from mbd.sensitivity.tangent.programs import (
     lanes,
     no_values,
 )
-from mbd.sensitivity.tangent.words import every_row_place
+from mbd.sensitivity.tangent.words import edge_place, every_row_place
 from mbd.simulation.marching import Run
 from mbd.simulation.run.call_table import BOUND, PLACES
 from mbd.simulation.run.stepper import Stepper
@@ -111,7 +111,7 @@ class TangentStepper(Stepper):
     def _lengths(self, given: dict[str, int]) -> dict[str, int]:
         K, size = self.kernel, self.mechanism.layout.size
         unknowns = K.n + 2 * K.n_rows  # of `follow_newmark.follow_newton`
-        starts = 2 * size + 10 * (K.n + K.n_rows + K.n_v + 1) + K.n_q + K.n_watched + K.n_frictions
+        starts = 2 * size + 10 * (K.n + K.n_rows + K.n_v + 2) + K.n_q + K.n_watched + K.n_frictions
         own = {"kkt": unknowns * unknowns, "rhs": unknowns, "pivots": unknowns}
         own["block"] = size + K.n + (K.n_rows + 1) * (K.n_v + 1)  # with W and Z behind it
         own["out"] = K.n + K.n_rows + K.n_v + 1
@@ -203,6 +203,12 @@ class TangentRun(Run):
     every_row = False
     moved_with_jump: Callable[[], Matrix | None]
     differentiated_reset: Callable[[Guard, dict[str, tuple[Any, Lanes]], Any, Any], tuple[Lanes, Lanes]]
+
+    @property
+    def edge(self) -> tuple[float, int, int, float]:
+        """What a change decides in an impact, about whom, and when: see `follow_impacts.note`; 0: nothing."""
+        kind, first, second, time = self.kernel.starts[edge_place(self.kernel) :][:4].tolist()
+        return kind, int(first), int(second), time
 
     def at_state(self) -> dict[str, tuple[Any, Lanes]]:
         """Numbers of the accepted state, each with its derivatives."""

@@ -182,3 +182,13 @@ def test_ties_in_the_order_are_named():
     found = mbd.sensitivities(model, pairs, SCHEME, **given)
     wanted = one_after_the_other([1.0, 1.0, 0.0, 0.0], [0.8] * 4, [0.5, 0.6 + 1e-30j, 0.5]).imag / 1e-30
     assert found.matrix[:, 0] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_restitution_of_zero_is_named_where_a_change_of_it_gives_an_impulse_back():
+    model = corner(0.4, bounce=0.0)
+    given = {"dt": 0.01, "until": 0.25, "impact": "poisson"}
+    with pytest.raises(mbd.CapabilityError, match=r"the restitution of 'wall' is 0: it has derivatives on one side"):
+        mbd.sensitivities(model, arriving(model), SCHEME, wrt=["wall.restitution"], **given)
+    assert np.isfinite(
+        mbd.sensitivities(model, arriving(model), SCHEME, wrt=["floor.restitution"], **given).matrix
+    ).all()

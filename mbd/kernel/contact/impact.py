@@ -21,6 +21,7 @@ from mbd.kernel.codes import CONFLICT, ENERGY_GAIN, NO_IMPACT, PULL
 from mbd.kernel.contact.impact_solve import (
     energy_gain,
     gather,
+    is_held_through,
     let_rebound,
     loosen,
     prepare,
@@ -31,6 +32,7 @@ from mbd.kernel.contact.impact_solve import (
 )
 from mbd.kernel.records import ContactForces, Contacts, Switching
 from mbd.kernel.stepping.restart import row_speed
+from mbd.kernel.tangent_rules import note_order, note_zero
 
 __all__ = ["impact"]
 
@@ -142,6 +144,8 @@ def poisson_law(K: Switching, energetic: bool) -> int:
         if K.closing[c] > 0 and K.kind[c] == 0 and K.active[c] == 1:
             row = K.normal[c]
             K.trial_given[row] = K.restitution[c] * K.total[row]
+            if not energetic:
+                note_zero(K, c, K.trial_given[row])
             work += 0.5 * K.restitution[c] * K.restitution[c] * K.total[row] * (row_speed(K, row) + speed(K, row))
     status = give_back_work(K, max(work, 0.0)) if energetic else give_back(K, 1.0)
     fastest = 0.0
@@ -212,11 +216,6 @@ def give_back_work(K: Switching, work: float) -> int:
     return give_back(K, low)
 
 
-def is_held_through(K: Contacts, c: int) -> bool:
-    """Whether a contact acts in every impact whatever the sign of its impulse: it has a rule, and does not rebound."""
-    return bool(K.opens[c] != 0 and (K.closed[c] == 1 or K.restitution[c] == 0.0))
-
-
 def sequential_law(K: Switching) -> int:
     """Impact after impact of the contacts that approach fastest, each as if the others that push were not there."""
     gather(K, False, False)
@@ -231,6 +230,7 @@ def sequential_law(K: Switching) -> int:
                 most = max(most, abs(approach) if is_held_through(K, c) else approach)
         fastest = max(fastest, most)
         if most <= LAW_RTOL * fastest or most < 1e-14:
+            note_order(K, fastest, True)
             end_together(K, fastest)
             return 0
         for c in range(K.n_contacts):
@@ -240,6 +240,7 @@ def sequential_law(K: Switching) -> int:
                 held = is_held_through(K, c)
                 K.active[c] = 1 if held or -speed(K, K.normal[c]) >= (1.0 - 1e-9) * most else 0
                 K.free[c] = 1 if (K.active[c] == 1 and not held) else 0
+        note_order(K, fastest, False)
         loosen(K)
         for k in range(K.n_rows):
             c = K.row_contact[k]

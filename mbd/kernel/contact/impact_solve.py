@@ -8,9 +8,10 @@ from mbd.kernel.contact.cones import hold_directions
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, Frictions, Guards, Mechanism
 from mbd.kernel.stepping.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
+from mbd.kernel.tangent_rules import note_edges
 
 __all__ = [
-    "energy_gain", "gather", "let_rebound", "loosen", "prepare", "restitution_of", "solve_impact",
+    "energy_gain", "gather", "is_held_through", "let_rebound", "loosen", "prepare", "restitution_of", "solve_impact",
     "speed", "start_over", "strikes",
 ]  # fmt: skip
 
@@ -108,6 +109,7 @@ def solve_impact(K: Balance) -> int:
     status = complementarity(K, 1)
     if status != 0:
         return status
+    note_edges(K)
     for i in range(K.n):
         K.total_jump[i] += K.jump[i]
         K.jump[i] = K.total_jump[i]
@@ -117,6 +119,11 @@ def solve_impact(K: Balance) -> int:
         K.given[k] = 0.0
     K.parting[: K.n_contacts] = 0
     return 0
+
+
+def is_held_through(K: Contacts, c: int) -> bool:
+    """Whether a contact acts in every impact whatever the sign of its impulse: it has a rule, and does not rebound."""
+    return bool(K.opens[c] != 0 and (K.closed[c] == 1 or K.restitution[c] == 0.0))
 
 
 def restitution_of(K: Contacts, c: int) -> float:

@@ -16,6 +16,7 @@ from mbd.kernel.stepping.restart import compose, consistent, fill_block
 from mbd.kernel.stepping.trial_step import try_step
 from mbd.sensitivity.tangent.words import (
     at_root,
+    candidate_place,
     derivative_of,
     every_row_place,
     seed_rate,
@@ -52,7 +53,7 @@ def restore_candidate(K: Kernel) -> None:
 
 def carry_candidate(K: Kernel, out: bool) -> None:
     """The values of the candidate there or back."""
-    o = carry(K.q1, K.starts, every_row_place(K) + 1, K.n_q, out)
+    o = carry(K.q1, K.starts, candidate_place(K), K.n_q, out)
     o = carry(K.y1, K.starts, o, K.n, out)
     o = carry(K.rate1, K.starts, o, K.n, out)
     o = carry(K.aux1, K.starts, o, K.n, out)

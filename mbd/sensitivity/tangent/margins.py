@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.equal import HALF_PRECISION_RTOL
+from mbd.errors import OneSidedError
 from mbd.sensitivity.guards import GRAZING_RTOL, Trigger, acts, firing, refused_graze, trigger
-from mbd.sensitivity.motion import Motion, Rates
+from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_grip, refuse_sided_start
 from mbd.sensitivity.passed import Instant
 from mbd.sensitivity.programs import Programs, State
-from mbd.sensitivity.run_data import RunRows, sided
-from mbd.sensitivity.strikes import refuse_sided_impact
+from mbd.sensitivity.run_data import RunRows, refused, sided
+from mbd.sensitivity.tangent.follow_impacts import EDGE, NO_REBOUND, TIE
+from mbd.sensitivity.tangent_run import TangentRun
 
-__all__ = ["refuse_turning_points"]
+__all__ = ["refuse_edges", "refuse_turning_points"]
 
 AtRow = Callable[[int], tuple[Motion, Rates]]
 
@@ -134,6 +136,52 @@ def _fired(rows: RunRows, programs: Programs, leads: Sequence[int], at_row: AtRo
         if place is not None and not abs(growth[place]) > max(GRAZING_RTOL * terms[place], slowest):
             raise refused_graze(fired, now, float(growth[place]), float(terms[place]))
         if fired.kind == "closed" and equations.contacts[k].kind != "penalty":
-            refuse_sided_impact(rows, programs, lambda row=row: at_row(row - 1)[0], mode, rows.events[row], k)
+            _refuse_chance(rows, programs, row, mode, k, at_row)
         found.append(fired)
     return found
+
+
+def _refuse_chance(rows: RunRows, programs: Programs, row: int, mode: Mode, fired: int, at_row: AtRow) -> None:
+    """Raise a `OneSidedError` where contacts close with the one that fired, and a direction moves them apart."""
+    contacts, zero = programs.equations.contacts, (np.zeros(programs.columns.n), np.zeros(programs.columns.rows))
+    closing = {event.name for event in rows.events[row] if event.kind == "closed"}
+    beside = [
+        c for c, each in enumerate(contacts)
+        if each.name in closing and each.kind != "penalty" and c != fired and not mode.closed[c]
+    ]  # fmt: skip
+    if not beside:
+        return
+    before = at_row(row - 1)[0]
+    slopes = programs.watched(before.at(mode, *zero))[1]
+    Z, found = before.tangent.stacked(programs.columns), []
+    for c in beside:
+        terms = np.abs(slopes[c]) @ np.abs(Z)
+        if np.any(np.abs(slopes[c] @ Z) > HALF_PRECISION_RTOL * terms + 1e-12 * np.max(terms)):
+            found.append(repr(contacts[c].name))
+    if found:
+        why = f"{' and '.join(found)} may touch in it or not, which a change decides"
+        raise _sided(rows, closing, before.t, why)
+
+
+def refuse_edges(rows: RunRows, run: TangentRun) -> None:
+    """Raise a `OneSidedError` where a change decides how an impact goes on (see `tangent.follow_impacts`)."""
+    kind, first, second, time = run.edge
+    if not kind:
+        return
+    equations = rows.mechanism.equations
+    names = [*(each.name for each in equations.contacts), *(each.name for each in equations.frictions)]
+    listed = " and ".join(repr(names[each]) for each in (first, second) if each >= 0)
+    why = {
+        EDGE: f"{listed} may go on in either of two ways in it, which a change decides",
+        TIE: f"{listed} approach equally fast in its sequence, and a change decides which strikes first",
+        NO_REBOUND: f"the restitution of {listed} is 0",
+    }[kind]
+    closing = {each.name for each in rows.run.events if each.kind == "closed" and each.time == time}
+    raise _sided(rows, closing, time, why)
+
+
+def _sided(rows: RunRows, closing: Collection[str], time: float, why: str) -> OneSidedError:
+    names = " and ".join(repr(name) for name in sorted(closing))
+    law = str(rows.record.settings.get("impact", "newton"))
+    which = f"the impact of {names} at t = {time:.9g} s (law {law!r})"
+    return OneSidedError(str(refused(f"{which}: {why}: it has derivatives on one side only")))

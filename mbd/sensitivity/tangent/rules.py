@@ -14,11 +14,18 @@ from pathlib import Path
 from typing import Any
 
 from mbd.kernel.translation.translate import Source, functions_of
-from mbd.sensitivity.tangent import follow_accelerations, follow_candidates, follow_newmark, follow_stages, words
+from mbd.sensitivity.tangent import (
+    follow_accelerations,
+    follow_candidates,
+    follow_impacts,
+    follow_newmark,
+    follow_stages,
+    words,
+)
 
 __all__ = ["FILES", "own_rules"]
 
-PARTS = (words, follow_candidates, follow_newmark, follow_accelerations, follow_stages)
+PARTS = (words, follow_candidates, follow_newmark, follow_accelerations, follow_stages, follow_impacts)
 FILES = tuple(Path(str(part.__file__)) for part in PARTS)
 """Where they stand."""
 

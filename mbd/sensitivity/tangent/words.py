@@ -1,19 +1,19 @@
 """Words of the rules that the printer knows (`printer`), what follows from them, and where K.starts holds what.
 
 Numbers in K.starts: inputs of the last of Newton's matrices | W | the block of the solution | what is noted of a step
-(2), and of the run (1) | the candidate | columns of K₀⁻¹ or stages.
+(1), and of the run (5) | the candidate | columns of K₀⁻¹ or stages.
 """
 
 from __future__ import annotations
 
 from mbd.equal import ROUND_OFF_RTOL
-from mbd.kernel.records import Integers, Kernel, Reals
+from mbd.kernel.records import Integers, Kernel, Reals, Sizes
 
 __all__ = [
-    "MAX_CONTRACTION", "MAX_CORRECTIONS", "are_corrected", "at_root", "derivative_of", "derivative_program",
-    "every_row_place", "is_differentiated", "largest_derivative", "metric_place", "metric_program", "moved", "n_inputs",
-    "seed_rate", "seeded", "solution_place", "solve_plain", "solved_program", "step_place", "takes_part",
-    "turned_program", "was_near_singular", "without_tangent",
+    "MAX_CONTRACTION", "MAX_CORRECTIONS", "are_corrected", "at_root", "candidate_place", "derivative_of",
+    "derivative_program", "edge_place", "every_row_place", "is_differentiated", "largest_derivative", "metric_place",
+    "metric_program", "moved", "n_inputs", "seed_rate", "seeded", "solution_place", "solve_plain", "solved_program",
+    "step_place", "takes_part", "turned_program", "was_near_singular", "without_tangent",
 ]  # fmt: skip
 
 MAX_CONTRACTION = 0.9
@@ -122,17 +122,17 @@ def solve_plain(plain_A: Reals, n: int, pivots: Integers, b: Reals, first: int) 
         i -= 2
 
 
-def n_inputs(K: Kernel) -> int:
+def n_inputs(K: Sizes) -> int:
     """How many numbers the inputs of Newton's matrix are."""
     return int(K.o_slip + K.n_frictions + K.n_v)
 
 
-def solution_place(K: Kernel) -> int:
+def solution_place(K: Sizes) -> int:
     """Where the block of the solution begins in K.starts."""
     return int(n_inputs(K) + K.n + K.n_rows + K.n_v)
 
 
-def step_place(K: Kernel) -> int:
+def step_place(K: Sizes) -> int:
     """Where what is noted of a step begins in K.starts."""
     return int(solution_place(K) + n_inputs(K))
 
@@ -142,15 +142,25 @@ def was_near_singular(K: Kernel) -> bool:
     return bool(K.starts[step_place(K)] > 0.0)
 
 
-def every_row_place(K: Kernel) -> int:
+def every_row_place(K: Sizes) -> int:
     """Where K.starts says whether all rows are stored with their derivatives."""
     return int(step_place(K) + 1)
+
+
+def edge_place(K: Sizes) -> int:
+    """Where K.starts says what a change decides in an impact, and when: see `follow_impacts.note`; 0: nothing."""
+    return int(every_row_place(K) + 1)
+
+
+def candidate_place(K: Sizes) -> int:
+    """Where the candidate begins in K.starts."""
+    return int(edge_place(K) + 4)
 
 
 def metric_place(K: Kernel) -> int:
     """Where columns of K₀⁻¹, or stages, begin in K.starts."""
     kept = K.n_q + 4 * K.n + 2 * K.n_rows + 1 + 2 * K.n_v + K.n_watched + K.n_frictions
-    return int(every_row_place(K) + 1 + kept)
+    return int(candidate_place(K) + kept)
 
 
 def turned_program(K: Kernel) -> int:
