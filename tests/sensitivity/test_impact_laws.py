@@ -192,3 +192,28 @@ def test_a_restitution_of_zero_is_named_where_a_change_of_it_gives_an_impulse_ba
     assert np.isfinite(
         mbd.sensitivities(model, arriving(model), SCHEME, wrt=["floor.restitution"], **given).matrix
     ).all()
+
+
+@pytest.mark.parametrize("kick", [0.0, 0.26])
+@pytest.mark.parametrize("axes", ["xy", "xyz"])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_ball_that_just_sticks_as_it_strikes_has_two_derivatives(law, axes, kick):
+    """It sticks by −μ v_y up to v_x, and loses no more beyond: ∂v_x⁺/∂v_x is 0 below and 1 above."""
+    model = mbd.Model("thrown", gravity=(0, 0, 0))
+    ball = mbd.PointMass("ball", mass=1.3)
+    model.connect(mbd.Translation("place", model.ground.origin, ball.origin, axes=axes))
+    model.constrain(
+        mbd.Unilateral("floor", mbd.touchdown(ball.origin), friction=0.5, restitution=0.0),
+        mbd.Impulse("kick", ball.origin, kick, "floor", direction=(1, 0), order="with"),
+    )
+    given = {"dt": 0.1, "until": 1.5, "impact": law, "wrt": ["place.x.rate"], "of": ["place.x.rate"]}
+    limit = 0.5 - kick / 1.3
+    for part, expected in ((-0.1, 0.0), (0.0, None), (0.1, 1.0)):
+        start = mbd.assemble(model, {"place.y": 1.0}, {"place.x": limit + part, "place.y": -1.0})
+        if expected is not None:
+            found = mbd.sensitivities(model, start, SCHEME, **given)
+            assert found.matrix == pytest.approx(np.array([[expected]]), abs=1e-9)
+            continue
+        with pytest.raises(mbd.errors.OneSidedError, match="'floor' may go on in either of two ways") as caught:
+            mbd.sensitivities(model, start, SCHEME, **given)
+        assert caught.value.sides["place.x.rate", "place.x.rate"] == pytest.approx((0.0, 1.0), abs=1e-6)
