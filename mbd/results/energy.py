@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.equal import ROUND_OFF_RTOL, SMALL_SUM_RTOL
+from mbd.equal import HALF_PRECISION_RTOL, ROUND_OFF_RTOL, SMALL_SUM_RTOL
 from mbd.results.columns import ModelColumns
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.powers import Lost, Power, moving_share, powers
 from mbd.results.quadrature import cumulative_of_many
-from mbd.results.record import EventRecord
+from mbd.results.record import EventRecord, Rows
 from mbd.results.within import readable, within
 
 if TYPE_CHECKING:
@@ -102,14 +102,10 @@ def _works(
 
     Powers are asked a little inside of the smooth stretch on either side of a switch, where signals may jump.
     """
-    record, rows = columns.record, columns.rows
-    time = record.time.copy()
-    after = _after_switch(columns)
-    before = np.append(after[1:], False)[: len(after)]
-    time[before] = np.nextafter(time[before], -np.inf)
-    inside = replace(rows, time=time)
-    values = columns.evaluate([power.value for power in found], inside)
-    rates = iter(columns.evaluate([power.rate for power in found if power.rate is not None], inside))
+    record, after = columns.record, _after_switch(columns)
+    values = columns.evaluate([power.value for power in found], _inside(columns, 0.0))
+    asked_rates = [power.rate for power in found if power.rate is not None]
+    rates = iter(columns.evaluate(asked_rates, _inside(columns, HALF_PRECISION_RTOL)))
     named, moved = [], [Part("moving coordinates", "constraint", np.cumsum(np.where(after, 0.0, _steps(moving))))]
     doubt = np.zeros((2, len(record.time)))
     asked = [
@@ -133,6 +129,24 @@ def _works(
         gives = power.name not in lending and np.max(value, initial=0.0) > 0.0
         doubt[0 if gives else 1 :, 1:] += unsure
     return named, moved, np.cumsum(doubt, axis=1)
+
+
+def _inside(columns: ModelColumns, share: float) -> Rows:
+    """The rows, those at the ends of smooth stretches moved into these by a share of the interval there.
+
+    As contacts close and open their gap is zero up to a round-off, whose sign must not say whether a force grows.
+    """
+    rows, length = columns.rows, np.diff(columns.record.time)
+    ends = np.diff(columns.record.time, prepend=-np.inf, append=np.inf) <= 0.0
+    ends[[0, -1]] = True
+    forward = np.where(ends[:-1], np.append(length, 0.0), 0.0)
+    backward = np.where(ends[1:], np.insert(length, 0, 0.0), 0.0)
+    move = share * (forward - backward)
+    time = rows.time + move
+    before = ends[1:] & (backward > 0.0)
+    time[before] = np.minimum(time, np.nextafter(rows.time, -np.inf))[before]
+    way = move[:, None]
+    return replace(rows, time=time, q=rows.q + way * columns.q_rate, v=rows.v + way * rows.a, z=rows.z + way * rows.s)
 
 
 def _shares_its_energy(power: Power, found: list[Power]) -> bool:
@@ -177,9 +191,8 @@ def _of_stop(
     surface of rubber that comes back, the power p ġ `given` has a kink there, and −U(g) tells the work.
     """
     time, closed = columns.record.time, columns.record.closed[:, lost.contact].astype(bool)
-    nodes = [node for node in (lost.elastic, lost.value, lost.rate) if node is not None]
-    elastic, power, *rest = (np.broadcast_to(one, time.shape) for one in columns.evaluate(nodes, columns.rows))
-    rate = rest[0] if rest else None
+    elastic, power = columns.evaluate([lost.elastic, lost.value], columns.rows)
+    rate = None if lost.rate is None else columns.evaluate([lost.rate], _inside(columns, HALF_PRECISION_RTOL))[0]
     (work,) = _refined(columns, [(lost.value, power, rate)], least)
     work = never_giving(work, power, _trapezoid(time, power))
     held = np.where(closed, elastic, 0.0)

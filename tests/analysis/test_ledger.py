@@ -213,6 +213,24 @@ def test_a_penalty_stores_and_takes_what_the_blow_says():
     assert back.energy["wall"][-1] == pytest.approx(-0.5 * mass * speed**2 * (1.0 - e**2), rel=1e-5)
 
 
+@pytest.mark.parametrize("restitution", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8)], ids=repr)
+def test_the_sign_of_a_gap_of_round_off_tells_no_work(restitution, scheme):
+    """The force of rubber is zero as it is touched and left, but not its rate: the remainder falls with order 2."""
+    model, ball = mbd.Model("rubber"), mbd.PointMass("ball", 1.0)
+    model.connect(mbd.Prismatic("fall", model.ground.origin, ball.origin, axis=(0.0, 1.0, 0.0)))
+    model.constrain(mbd.Penalty("floor", mbd.height(ball.origin), stiffness=1300.0, restitution=restitution))
+    start, found = mbd.assemble(model, {"fall.displacement": 0.7}), []
+    for dt in (1e-3, 5e-4, 2.5e-4, 1.25e-4):
+        begun = [
+            mbd.simulate(model, replace(start, time=begin), scheme, dt=dt, until=begin + 1.3).energy.numerical[-1]
+            for begin in (0.0, 16.0, -3.0)
+        ]
+        np.testing.assert_allclose(begun[1:], begun[0], rtol=1e-5)
+        found.append(begun[0])
+    np.testing.assert_allclose(np.array(found[:-1]) / found[1:], 4.0, rtol=0.05)
+
+
 def test_a_signal_that_turns_is_asked_from_its_own_side():
     """A force in straight lines, whose impulse the trapezoidal rule has exactly: its kinks cost the work nothing."""
     model = slider()
