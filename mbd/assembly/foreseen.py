@@ -14,6 +14,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.inertia import lost_sentence
+from mbd.compile.mechanisms import is_known
 from mbd.equations.sizes import MIN_CHECKED_OPERATIONS, MIN_JOINTS, operations, require_room
 from mbd.errors import AssemblyError
 from mbd.joints.base import Joint
@@ -49,7 +50,9 @@ def require_inertia(model: Any, position: Mapping[str, float], changed: Mapping[
     AssemblyError
         with the coordinate that moves most, the share of inertia, and what to try.
     """
-    if not isinstance(model, Description) or len(model.joints) < MIN_JOINTS or faults(model):
+    if not isinstance(model, Description) or len(model.joints) < MIN_JOINTS:
+        return
+    if not is_known(model) and faults(model):
         return
     chosen = plan(model)
     free = not (chosen.cut or model.bilaterals or model.nonholonomic)

@@ -11,7 +11,8 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.orientation import faced
 from mbd.assembly.pose import Posture
 from mbd.assembly.turns import choose_turns, hold_directions
-from mbd.equal import EQUAL_RTOL, SMALL_SUM_RTOL
+from mbd.compile.orders import MIN_UNKNOWNS
+from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, SMALL_SUM_RTOL
 
 __all__ = [
     "Posture", "capture", "close_nearby", "close_positions", "close_velocities", "damped_step",
@@ -58,12 +59,31 @@ def _weighted(M: Matrix) -> Matrix:
     return np.asarray(M + 1e-9 * size * np.eye(len(M)))
 
 
-def _least_change(M: Matrix, B: Matrix, residual: Vector, pull: Vector) -> Vector:
+class _LeastChange:
     """The change d with B d = −residual nearest to `pull` in the M-norm; least squares where rows depend."""
-    inverse = np.linalg.inv(_weighted(M))
-    flow = inverse @ B.T
-    multiplier = np.linalg.lstsq(B @ flow, residual + B @ pull, rcond=1e-12)[0]
-    return np.asarray(pull - flow @ multiplier)
+
+    def __init__(self, M: Matrix, B: Matrix) -> None:
+        self.B, self.flow = B, np.linalg.inv(_weighted(M)) @ B.T
+        self.matrix = B @ self.flow
+        self.inverse = _regular_inverse(self.matrix) if len(B) >= MIN_UNKNOWNS else None
+
+    def __call__(self, residual: Vector, pull: Vector) -> Vector:
+        right = residual + self.B @ pull
+        if self.inverse is None:
+            multiplier = np.linalg.lstsq(self.matrix, right, rcond=1e-12)[0]
+        else:
+            multiplier = self.inverse @ right
+        return np.asarray(pull - self.flow @ multiplier)
+
+
+def _regular_inverse(matrix: Matrix) -> Matrix | None:
+    """The inverse of the matrix of many rows, much cheaper than its singular values; None where rows may depend."""
+    try:
+        inverse = np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        return None
+    condition = float(np.linalg.norm(inverse) * np.linalg.norm(matrix))
+    return np.asarray(inverse) if condition * HALF_PRECISION_RTOL < 1.0 else None
 
 
 def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
@@ -200,7 +220,7 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
             places = acting if len(acting) else places
             change = np.where(free, work.equations.configuration.difference(work.q, start), 0.0)
         M = terms.M[:n_v, :n_v][np.ix_(places, places)]
-        change[places] = _least_change(M, B[:, places], h, change[places])
+        change[places] = _LeastChange(M, B[:, places])(h, change[places])
         limit = max(1.0, float(np.max(np.abs(change))) / 0.5)
         if size < 1e-13 and float(np.max(np.abs(change))) < 1e-12:
             return h
@@ -242,13 +262,14 @@ def close_velocities(work: Posture, free: Matrix) -> Vector:
     picked = work.active_rows
     if not picked and not work.rates:
         return np.zeros(0)
-    n_v = work.equations.n_v
+    n_v, least_change = work.equations.n_v, None
     for refinement in range(REFINEMENTS + 1):
         terms = work.terms()
         rate, B = work.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], work.rates)
         places = _involved(B, free)
         if refinement == REFINEMENTS or not len(places):
             break
-        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
-        work.y[places] += _least_change(M, B[:, places], rate, np.zeros(len(places)))
+        if least_change is None:  # neither M nor B follow velocities
+            least_change = _LeastChange(terms.M[:n_v, :n_v][np.ix_(places, places)], B[:, places])
+        work.y[places] += least_change(rate, np.zeros(len(places)))
     return rate

@@ -9,7 +9,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Collection, Hashable, Mapping
 from operator import is_
-from typing import Any
+from typing import Any, overload
 from weakref import WeakKeyDictionary
 
 from mbd.compile import remembered
@@ -26,7 +26,7 @@ from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
 from mbd.topology.description import Description
 
-__all__ = ["mechanism_of", "require_model", "tunable_model"]
+__all__ = ["is_known", "mechanism_of", "require_model", "tunable_model"]
 
 _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept]] = WeakKeyDictionary()
 _TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept]] = WeakKeyDictionary()
@@ -144,7 +144,17 @@ def tunable_model(model: Any, names: Collection[str]) -> Any:
     return found
 
 
-def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
+def is_known(model: Any, backend: str = "auto") -> bool:
+    """Whether the mechanism of a model is there already, so that nothing can be wrong with its words."""
+    return _mechanism(model, backend, frozenset(), derived=False) is not None
+
+
+@overload
+def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism: ...
+@overload
+def _mechanism(model: Any, backend: str, tunable: frozenset[str], derived: bool) -> Mechanism | None: ...
+def _mechanism(model: Any, backend: str, tunable: frozenset[str], derived: bool = True) -> Mechanism | None:
+    """The mechanism that is known, or else is `derived`."""
     now = _description(model)
     with _LOCK:
         known = _KNOWN.setdefault(model, {}).get((backend, tunable))
@@ -154,6 +164,8 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:
     key = backend, tunable, _words(model)
     with _LOCK:
         made = _BY_WORDS.get(key) if key[-1] else None
+    if made is None and not derived:
+        return None
     if made is None:
         made = _derived(model, backend, tunable)
     with _LOCK:

@@ -72,7 +72,7 @@ class Reader:
         CannotTellError
             for what is not read.
         """
-        found, stack = sha256(), [root]
+        titles, stack = list[str](), [root]
         parts: Iterable[Any]
         while stack:
             item = stack.pop()
@@ -85,10 +85,10 @@ class Reader:
                 self.met[id(item)] = len(self.met)
                 self.kept.append(item)
                 title, parts = self.parts(item)
-            found.update(title.encode(errors="backslashreplace") + b"\0")
+            titles.append(title)
             if parts:
                 stack += [*parts][::-1]
-        return found.hexdigest()
+        return sha256("\0".join(titles).encode(errors="backslashreplace")).hexdigest()
 
     def parts(self, item: Any) -> tuple[str, Iterable[Any]]:
         """What an object is called, and what it holds."""
