@@ -15,7 +15,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.inertia import lost_sentence
 from mbd.compile.mechanisms import is_known
-from mbd.equations.sizes import MIN_CHECKED_OPERATIONS, MIN_JOINTS, operations, require_room
+from mbd.equations.sizes import MIN_CHECKED_OPERATIONS, MIN_JOINTS, OF_PAIR, pairs_on_paths, require_room
 from mbd.errors import AssemblyError
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Tape
@@ -56,7 +56,8 @@ def require_inertia(model: Any, position: Mapping[str, float], changed: Mapping[
         return
     chosen = plan(model)
     free = not (chosen.cut or model.bilaterals or model.nonholonomic)
-    if not free or operations(chosen) < MIN_CHECKED_OPERATIONS or not all(joint.is_vector for joint in chosen.edges):
+    large = OF_PAIR[chosen.planar] * pairs_on_paths(chosen) >= MIN_CHECKED_OPERATIONS
+    if not free or not large or not all(joint.is_vector for joint in chosen.edges):
         return
     require_room(chosen)
     names, velocities = weighted_velocities(chosen, position, changed)

@@ -191,6 +191,11 @@ class Mechanism:
         """The program `accelerations` with every entry of M."""
         return self._accelerations if self._mass_loop is None else programs.accelerations(self.equations)
 
+    @property
+    def _operations(self) -> int:
+        """What is derived, and what a loop spares of M: Newton's matrix has as many entries."""
+        return len(self.equations.tape.nodes) + (0 if self._mass_loop is None else self._mass_loop.spared)
+
     @cached_property
     def _composes(self) -> bool:
         return composes(self.equations)
@@ -222,7 +227,7 @@ class Mechanism:
             elif active not in self._modes:
 
                 def make() -> Made:
-                    require_room_for_tangent(len(self.equations.tape.nodes))
+                    require_room_for_tangent(self._operations)
                     outputs = programs.newton(self.equations, active)
                     order = self._order(pattern(outputs, self.layout.n + len(active.rows)), active.rows)
                     if order is not None:
@@ -278,7 +283,7 @@ class Mechanism:
             return self._parts_of_modes[part]
 
         def make() -> Made:
-            require_room_for_tangent(len(self.equations.tape.nodes))
+            require_room_for_tangent(self._operations)
             facts: dict[str, Any] = {}
             for name, made in (("tangent", part.newton), ("residual", part.residual)):
                 found = made(self.equations)
@@ -341,7 +346,7 @@ class Mechanism:
                 def make() -> Made:
                     order = None
                     pays = may_pay(self._filled, n, sorted(rows))
-                    if pays and not tangent_refused(len(self.equations.tape.nodes)):  # whose pattern is that of both
+                    if pays and not tangent_refused(self._operations):  # whose pattern is that of both
                         order = self._order(pattern(programs.newton(self.equations, active), n + len(rows)), rows)
                     found = None
                     if order is None and not active.given_rows:
@@ -376,7 +381,7 @@ class Mechanism:
 
     def _newton(self, equations: Equations, active: ActiveSet) -> Sequence[Node]:
         """`programs.newton` within a run, which ends in order where it does not fit into the memory that is free."""
-        refused = tangent_refused(len(equations.tape.nodes))
+        refused = tangent_refused(self._operations)
         if refused:
             raise MemoryLimitError(f"a step needs the tangent as a matrix: {refused}")
         return programs.newton(equations, active)

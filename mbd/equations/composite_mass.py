@@ -18,14 +18,11 @@ from mbd.bodies.algebra import cross, difference, dot, product, rotate, scaled, 
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.scope import Rotation, Triple
 from mbd.dataclass import dataclass
+from mbd.equations import sizes
 from mbd.equations.kinematics import Moving
 from mbd.tape.node import Node, Scalar, Tape
 
 __all__ = ["MassLoop", "composite_mass_matrix", "entry", "mass_loop", "passed_down"]
-
-MIN_LOOP_ENTRIES = 2000
-"""Pairs of a coordinate and one below it from which on M is filled by a loop: straight code takes 2 ns of each pair in
-place of 4, elimination more than either, and making straight code 30 µs."""
 
 
 @dataclass(frozen=True)
@@ -87,16 +84,19 @@ class MassLoop:
     numbers : of each body R and the place of its origin in the parent (12 numbers, row-major), and then of each
         coordinate force and torque per unit acceleration, ω and l per unit rate (12)
     filled : places (i, j) of M that the loop writes
+    spared : operations that straight-line code would take, about
     """
 
     bodies: tuple[tuple[int, int, int], ...]
     numbers: tuple[Node, ...]
     filled: frozenset[tuple[int, int]]
+    spared: int
 
 
 def mass_loop(bodies: Sequence[Moving], masses: Mapping[str, MassProperties], n_v: int, tape: Tape) -> MassLoop | None:
     """M of a tree of bodies as a loop; None where its entries are few."""
-    if sum(len(body.columns) * len(body.path) for body in bodies) < MIN_LOOP_ENTRIES:
+    pairs = sum(len(body.columns) * len(body.path) for body in bodies)
+    if pairs < sizes.MIN_LOOP_ENTRIES:
         return None
     moving = [body for body in bodies if body.edge is not None]
     number = {body.body.name: k for k, body in enumerate(moving)}
@@ -115,7 +115,9 @@ def mass_loop(bodies: Sequence[Moving], masses: Mapping[str, MassProperties], n_
     numbers += [part for of_one in known for part in of_one]
     filled = {(i, j) for body in moving for j in body.path[len(body.path) - len(body.columns) :] for i in body.path}
     filled |= {(j, i) for i, j in filled}
-    return MassLoop(tuple(lines), tuple(map(tape.lift, numbers)), frozenset(filled))
+    planar = all(tape.lift(part).is_constant for body in moving for part in body.turn[2])
+    spared = int(sizes.OF_PAIR[planar] * pairs)
+    return MassLoop(tuple(lines), tuple(map(tape.lift, numbers)), frozenset(filled), spared)
 
 
 def entry(force: Triple, torque: Triple, angular: Triple, linear: Triple) -> Scalar:

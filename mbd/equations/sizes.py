@@ -1,7 +1,8 @@
 """How large the equations of a model become, predicted from its joints before anything is derived.
 
-Each pair of coordinates on one path from the ground has an entry in the mass matrix, so that a chain of n joints needs
-some n² operations; bodies beside each other, and joints that are cut, add to each other only.
+Each pair of coordinates on one path from the ground has an entry in the mass matrix, which straight-line code works
+out where pairs are few, and a loop where they are many (`mbd.equations.composite_mass`): code then grows with the
+bodies, arrays with the square of the coordinates.
 """
 
 from __future__ import annotations
@@ -10,7 +11,15 @@ from mbd.errors import ModelError
 from mbd.free_memory import available, size_in_words
 from mbd.topology.plan import Plan
 
-__all__ = ["operations", "require_room", "require_room_for_tangent", "tangent_refused"]
+__all__ = [
+    "MIN_LOOP_ENTRIES",
+    "OF_PAIR",
+    "operations",
+    "pairs_on_paths",
+    "require_room",
+    "require_room_for_tangent",
+    "tangent_refused",
+]
 
 OF_PAIR = {True: 10.0, False: 40.0}
 """Operations for each pair of coordinates on one path, of planar and of spatial models [-]."""
@@ -20,22 +29,32 @@ BYTES, SECONDS = 800.0, 25e-6
 """Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 1000 links."""
 BYTES_OF_TANGENT = 550.0
 """Memory for each of these operations beside that as the tangent of implicit steps is derived and compiled."""
+BYTES_OF_PAIR = 80.0
+"""Memory of the two entries of a pair in the arrays that a run has for matrices."""
 MIN_CHECKED_OPERATIONS = 1e6
 """Operations below which the free memory is not asked for [-]."""
+MIN_LOOP_ENTRIES = 2000
+"""Pairs of coordinates from which on M is filled by a loop: straight-line code takes 2 ns of each pair in place of 4,
+elimination more than either, and making straight-line code 30 µs."""
 MIN_JOINTS = 12
 """Fewer joints make no tree of so many operations: with two floating bodies each, 18 coordinates a joint at most."""
 
 
-def operations(plan: Plan) -> float:
-    """About how many operations assembling takes: ``a Σ (coordinates on the path to each) + b n``."""
+def pairs_on_paths(plan: Plan) -> int:
+    """Pairs of coordinates on one path from the ground, each coordinate with itself among them."""
     depth: dict[str, int] = {}
-    pairs = count = 0
+    pairs = 0
     for joint in plan.edges:
         above, own = depth.get(joint.parent.body.name, 0), len(joint.freedoms)
         pairs += own * above + own * (own + 1) // 2
-        count += own
         depth[joint.child.body.name] = above + own
-    return OF_PAIR[plan.planar] * pairs + OF_COORDINATE[plan.planar] * count
+    return pairs
+
+
+def operations(plan: Plan) -> float:
+    """About how many operations assembling derives: ``a pairs + b n``, and b n alone where a loop does the pairs."""
+    pairs = pairs_on_paths(plan)
+    return OF_PAIR[plan.planar] * (pairs if pairs < MIN_LOOP_ENTRIES else 0) + OF_COORDINATE[plan.planar] * plan.dof
 
 
 def require_room(plan: Plan) -> None:
@@ -46,10 +65,10 @@ def require_room(plan: Plan) -> None:
     ModelError
         with the numbers of bodies and joints, the memory and the time predicted, and what to try.
     """
-    expected = operations(plan)
-    if expected < MIN_CHECKED_OPERATIONS:
+    expected, pairs = operations(plan), pairs_on_paths(plan)
+    if expected < MIN_CHECKED_OPERATIONS and OF_PAIR[plan.planar] * pairs < MIN_CHECKED_OPERATIONS:
         return
-    needed, free = BYTES * expected, available()
+    needed, free = BYTES * expected + BYTES_OF_PAIR * pairs, available()
     if needed <= free:
         return
     time = f"{SECONDS * expected / 60.0:.2g} minutes"

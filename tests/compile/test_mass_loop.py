@@ -8,7 +8,7 @@ from mbd.compile import remembered
 from mbd.compile.ir import Module
 from mbd.compile.mass_loop import WithMasses
 from mbd.compile.mechanism import Mechanism
-from mbd.equations import composite_mass
+from mbd.equations import sizes
 from mbd.equations.derivation import derive
 from mbd.testing.mechanisms import random_tree
 from tests.fuzz.structures import SPACE, structure
@@ -24,7 +24,7 @@ def mechanisms_of(model, monkeypatch, backend="llvm"):
     """With the loop, and without."""
     found = []
     for least in (1, 10**9):
-        monkeypatch.setattr(composite_mass, "MIN_LOOP_ENTRIES", least)
+        monkeypatch.setattr(sizes, "MIN_LOOP_ENTRIES", least)
         found.append(Mechanism(derive(model), backend))
     assert [isinstance(each.accelerations, WithMasses) for each in found] == [True, False]
     return found
@@ -56,7 +56,7 @@ def test_runs_of_random_mechanisms_are_the_same(monkeypatch):
     for number in (*range(0, 60, 9), *range(SPACE, SPACE + 60, 9)):
         runs = []
         for least in (1, 10**9):
-            monkeypatch.setattr(composite_mass, "MIN_LOOP_ENTRIES", least)
+            monkeypatch.setattr(sizes, "MIN_LOOP_ENTRIES", least)
             made = structure.__wrapped__(number)
             start = mbd.assemble(made.model, position=made.position, project=True)
             for scheme in (mbd.HHT(), mbd.RungeKutta4()):
@@ -73,7 +73,7 @@ def test_runs_of_random_mechanisms_are_the_same(monkeypatch):
 
 def test_code_of_a_chain_grows_with_its_bodies(monkeypatch):
     def lines(bodies, least):
-        monkeypatch.setattr(composite_mass, "MIN_LOOP_ENTRIES", least)
+        monkeypatch.setattr(sizes, "MIN_LOOP_ENTRIES", least)
         model, end = mbd.Model("chain"), None
         for k in range(bodies):
             rod = mbd.Link(f"rod {k}", length=1.0, **mbd.rod(mass=1.0, length=1.0).link)
