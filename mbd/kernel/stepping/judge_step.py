@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbd.kernel.codes import AT_POSE, CHATTER, CROSS, JUMPED, PAUSE, PULL, STICK
+from mbd.kernel.contact.carried import slides_as_carried
 from mbd.kernel.contact.cone_steps import (
     ONSET_STEP_RATIO,
     SLIDES_ON,
@@ -197,6 +198,8 @@ def judge_step(K: Kernel, h: float, full: float, t1: float, cut: bool, within: b
 
     Where guards are looked at inside it, only as many of its parts are taken as are free of events.
     """
+    if K.n_dropped > 0 and K.n_frictions > 0 and K.strategy == 0 and slides_as_carried(K):
+        return -1
     holds = K.n_dropped == 0 or still_dependent(K) or K.near_singular > 0  # ranks are round-off there
     looked = takes_substeps(K)
     quiet = not looked and is_quiet(K)

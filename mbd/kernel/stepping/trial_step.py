@@ -9,6 +9,7 @@ from mbd.kernel.codes import (
     NOT_CONVERGED,
     NOT_FINITE,
 )
+from mbd.kernel.contact.carried import is_carried
 from mbd.kernel.contact.cones import HOLD_DIRECTION, leads_group, sliding_force, speed_of
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
@@ -191,5 +192,7 @@ def departs(K: DependentRows) -> bool:
             and K.row_level[k] == 0
             and abs(K.acc[o_h + k]) > HALF_PRECISION_RTOL * max(K.scale[K.n + k], 1e-3)
         ):
-            return True
+            f = K.row_friction[k]
+            if f < 0 or not is_carried(K, K.leader[f]):
+                return True
     return False
