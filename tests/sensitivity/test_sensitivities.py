@@ -334,3 +334,26 @@ def test_an_event_at_the_gap_of_a_contact_happens_with_it(until):
     assert found["time", "fall.displacement"] == pytest.approx(math.sqrt(0.5 / 9.81 / 1.3), rel=1e-9)
     speed = 0.5 * math.sqrt(0.5 * 9.81 / 1.3)
     assert found["fall.displacement.rate", "fall.displacement"] == pytest.approx(speed, rel=1e-9)
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
+@pytest.mark.parametrize("restitution", [0.05, 0.3, 0.5])
+def test_runs_have_derivatives_where_contacts_come_to_rest_by_bouncing(scheme, restitution):
+    """A knee bounces on its stop, ever less, and stays; so does a ball thrown, which slides on until it sticks."""
+    leg, thrown = mbd.Model("leg"), mbd.Model("thrown")
+    thigh, shank = mbd.Link("thigh", 1.0, 1.0, 0.5, 0.1), mbd.Link("shank", 0.5, 0.6, 0.3, 0.02)
+    knee = mbd.Revolute("knee", thigh.end, shank.start, loss=mbd.Viscous(0.05))
+    leg.connect(mbd.Revolute("hip", leg.ground.origin, thigh.start, loss=mbd.Viscous(0.2)), knee)
+    leg.constrain(mbd.Unilateral("stop", mbd.flexion(knee), restitution=restitution))
+    ball = mbd.PointMass("ball", 1.0)
+    thrown.connect(mbd.Translation("place", thrown.ground.origin, ball.origin))
+    thrown.constrain(mbd.Unilateral("floor", mbd.touchdown(ball.origin), restitution=restitution, friction=0.1))
+    for model, start, names, until in (
+        (leg, {"hip.angle": -1.0, "knee.angle": -0.5}, ["thigh.mass", "knee.angle"], 1.25),
+        (thrown, {"place.y": 0.1}, ["gravity.y", "place.y", "place.x.rate"], 1.5),
+    ):
+        begin = mbd.assemble(model, start, {"place.x": 1.0} if model is thrown else None)
+        found = mbd.sensitivities(model, begin, scheme, dt=5e-3, until=until, wrt=names)
+        last = [event for event in found.run.events if event.kind == "closed"][-1]
+        assert found.run.record.closed[-1].any() and last.energy_loss < 1e-12
+        assert off(found.matrix, differences(model, begin, scheme, names, dt=5e-3, until=until)[0]).max() < 1e-5

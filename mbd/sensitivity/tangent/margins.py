@@ -21,6 +21,8 @@ from mbd.sensitivity.tangent_run import TangentRun
 __all__ = ["refuse_edges", "refuse_turning_points"]
 
 AtRow = Callable[[int], tuple[Motion, Rates]]
+MIN_IMPULSE_RATIO = 1e-3
+"""Impulse of a contact that comes to rest over that of the bounce before, at least: e/(1 + e) in free flight [-]."""
 
 
 def refuse_turning_points(
@@ -132,13 +134,25 @@ def _fired(rows: RunRows, programs: Programs, leads: Sequence[int], at_row: AtRo
         places = {"closed": k, "gap": k, "force": contacts + k, "press": contacts + k, "event": 2 * contacts + k,
                   "stuck": 2 * contacts + guards + k}  # fmt: skip
         place = places.get(fired.kind)
-        slowest = rest_speed if fired.kind == "closed" else 0.0
+        slowest = rest_speed if fired.kind == "closed" and not _comes_to_rest(rows, fired.name, now) else 0.0
         if place is not None and not abs(growth[place]) > max(GRAZING_RTOL * terms[place], slowest):
             raise refused_graze(fired, now, float(growth[place]), float(terms[place]))
         if fired.kind == "closed" and equations.contacts[k].kind != "penalty":
             _refuse_chance(rows, programs, row, mode, k, at_row)
         found.append(fired)
     return found
+
+
+def _comes_to_rest(rows: RunRows, name: str, now: float) -> bool:
+    """Whether a contact closes after a rebound that was small already, as a ball does that comes to rest by bouncing.
+
+    Each bounce of such a sequence follows smoothly from the one before; a graze comes from a larger motion.
+    """
+    sizes = [
+        abs(float(event.impulse[0])) for event in rows.run.events
+        if event.name == name and event.kind == "closed" and event.time <= now and event.impulse.size
+    ]  # fmt: skip
+    return len(sizes) > 1 and sizes[-1] > MIN_IMPULSE_RATIO * sizes[-2] > 0.0
 
 
 def _refuse_chance(rows: RunRows, programs: Programs, row: int, mode: Mode, fired: int, at_row: AtRow) -> None:
