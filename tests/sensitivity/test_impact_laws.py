@@ -196,7 +196,7 @@ def test_a_restitution_of_zero_is_named_where_a_change_of_it_gives_an_impulse_ba
 
 @pytest.mark.parametrize("kick", [0.0, 0.26])
 @pytest.mark.parametrize("axes", ["xy", "xyz"])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", ["newton", *LAWS])
 def test_a_ball_that_just_sticks_as_it_strikes_has_two_derivatives(law, axes, kick):
     """It sticks by −μ v_y up to v_x, and loses no more beyond: ∂v_x⁺/∂v_x is 0 below and 1 above."""
     model = mbd.Model("thrown", gravity=(0, 0, 0))

@@ -40,8 +40,6 @@ def is_edge(value: float, size: float, sizes: float) -> bool:
 
 def note_edges(K: Kernel) -> None:
     """Note who obeys its law in the phase of an impact just found, but on an edge between two branches."""
-    if K.impact_law == 0:
-        return
     most = 1e-300
     much = 1e-300
     fast = 1e-300
