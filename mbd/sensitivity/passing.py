@@ -17,7 +17,6 @@ from mbd.equations.equations import Guard
 from mbd.equations.switching_times import instant_slopes
 from mbd.errors import CapabilityError
 from mbd.integrators.stepping import own_scheme
-from mbd.kernel.records import TABLE
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.sensitivity.motion import Motion, Rates, Tangent
 from mbd.sensitivity.one_sided import sided_end
@@ -35,7 +34,6 @@ __all__ = ["AnotherRun", "Charted", "seed", "tangent_run"]
 
 OWN = ("contact", "impact", "locate", "store", "rest_speed")
 FOLLOWING = ("allowed", "longest", "driven")
-CLOCK = TABLE.places["time"][1]
 
 
 class AnotherRun(CapabilityError):

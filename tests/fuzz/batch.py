@@ -36,28 +36,28 @@ def run_batch(
     numbers: Sequence[int],
     limit: float = LIMIT,
     hear: Callable[[dict[str, Any]], None] | None = None,
-    structures: int = STRUCTURES,
+    command: Sequence[str] | None = None,
 ) -> list[dict[str, Any]]:
     """Verdicts of scenes, made in another process; one that dies or takes longer than `limit` seconds is 'bad'.
 
     Parameters
     ----------
     hear : called with each verdict
-    structures : how many mechanisms the scenes are drawn from
+    command : of a worker, to which numbers come as one list and which writes verdicts line by line; None: `COMMAND`
     """
     left, found = list(numbers), []
     while left:
-        done = _until_lost(left, limit, hear, structures)
+        done = _until_lost(left, limit, hear, command or COMMAND)
         found += done
         left = left[len(done) :]
     return found
 
 
 def _until_lost(
-    numbers: Sequence[int], limit: float, hear: Callable[[dict[str, Any]], None] | None, structures: int
+    numbers: Sequence[int], limit: float, hear: Callable[[dict[str, Any]], None] | None, command: Sequence[str]
 ) -> list[dict[str, Any]]:
     process = subprocess.Popen(
-        [*COMMAND, f"--structures={structures}"],
+        command,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -157,7 +157,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for k in range(0, len(mine), 250):
             if given.seconds and time.perf_counter() - began > given.seconds:
                 return
-            run_batch(mine[k : k + 250], hear=hear, structures=given.structures)
+            run_batch(mine[k : k + 250], hear=hear, command=[*COMMAND, f"--structures={given.structures}"])
 
     threads = [threading.Thread(target=serve, args=(place,)) for place in range(given.workers)]
     for thread in threads:

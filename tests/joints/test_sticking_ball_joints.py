@@ -12,7 +12,6 @@ LIMIT, INERTIA = 0.3, 0.1
 SCHEMES = [
     mbd.HHT(), mbd.GeneralizedAlpha(0.8), mbd.Newmark(), mbd.RadauIIA(), mbd.RungeKutta4(), mbd.RungeKutta853(),
 ]  # fmt: skip
-IMPLICIT = SCHEMES[:4]
 
 
 def ball(loss, torque=None, cut="auto", turn=None, **body):

@@ -1,34 +1,29 @@
-"""What every run must keep, whatever its scene is; and batches of wild scenes in processes of their own."""
+"""What every run must keep, whatever its scene is; run as a program, the worker of a batch (`tests.fuzz.batch`)."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
 import sys
-import threading
 import time
 import traceback
 from pathlib import Path
-from queue import Empty, Queue
 
 import numpy as np
 
 import mbd
 from tests.simulation.wild import wild_scene
 
-__all__ = ["complaints", "run_batch", "verdict"]
+__all__ = ["complaints", "verdict"]
 
 ADVICE = re.compile(r"; |: |use |try |give |leave |hold |raise |name |move |change |make |lower |lock ")
 """A message that tells what to try has a second part."""
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def verdict(seed: int, scenes=wild_scene) -> dict:
     """How a scene ended: 'ok', 'stopped' in the run, 'refused' before it, or 'bad' with reasons."""
     began = time.perf_counter()
-    told = {"seed": seed, "scene": "", "message": "", "reasons": []}
+    told = {"number": seed, "scene": "", "message": "", "reasons": []}
     try:
         scene = scenes(seed)
         told["scene"] = f"{scene.integrator!r} dt={scene.dt:.3g} until={scene.until:.3g} {dict(scene.options)}"
@@ -177,41 +172,6 @@ def _drives(run: mbd.Trajectory, frictions) -> list[str]:
     return found
 
 
-# batches ------------------------------------------------------------------------------------------------------------
-def run_batch(seeds: list[int], limit: float = 60.0) -> list[dict]:
-    """Verdicts of scenes, run in another process; one that dies or takes longer than `limit` seconds is 'bad'."""
-    left, verdicts = list(seeds), []
-    while left:
-        verdicts += _until_lost(left, limit)
-        left = [seed for seed in left if seed not in {told["seed"] for told in verdicts}]
-    return verdicts
-
-
-def _until_lost(seeds: list[int], limit: float) -> list[dict]:
-    """Verdicts up to the end, or to the first scene that is lost, which has one too."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
-    command = [sys.executable, str(Path(__file__).resolve()), *map(str, seeds)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment)
-    lines: Queue[str] = Queue()
-    threading.Thread(target=lambda: ([lines.put(line) for line in process.stdout], lines.put("")), daemon=True).start()
-    verdicts: list[dict] = []
-    for seed in seeds:
-        why = ""
-        try:
-            line = lines.get(timeout=limit)
-            why = "" if line else f"the interpreter died with code {process.wait()}"
-        except Empty:
-            why = f"no end after {limit:g} s"
-        if why:
-            process.kill()
-            process.wait()
-            lost = {"seed": seed, "kind": "bad", "message": why, "reasons": [why], "scene": "", "seconds": limit}
-            return [*verdicts, lost]
-        verdicts.append(json.loads(line))
-    process.wait(limit)
-    return verdicts
-
-
 if __name__ == "__main__":
-    for seed in sys.argv[1:]:
-        print(json.dumps(verdict(int(seed))), flush=True)
+    for seed in json.load(sys.stdin):
+        print(json.dumps(verdict(seed)), flush=True)
