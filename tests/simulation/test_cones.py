@@ -115,13 +115,14 @@ def thrown(friction, restitution):
     law=st.sampled_from(["newton", "poisson", "sequential"]), friction=st.sampled_from([0.1, 0.7]),
     restitution=st.sampled_from([0.0, 0.6]), along=st.floats(-1.5, 1.5), across=st.floats(-1.5, 1.5),
 )  # fmt: skip
-def test_impacts_obey_the_cone(law, friction, restitution, along, across):
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+def test_impacts_obey_the_cone(contact, law, friction, restitution, along, across):
     model, before = thrown(friction, restitution), np.array([along, -1.0, across])
     fall = before @ NORMAL
     start = mbd.assemble(
         model, position={"slide.y": 0.01}, velocity=dict(zip(("slide.x", "slide.y", "slide.z"), before, strict=True))
     )
-    run = mbd.simulate(model, start, dt=5e-3, until=0.1, impact=law)
+    run = mbd.simulate(model, start, dt=5e-3, until=0.1, impact=law, contact=contact)
     slip, push = before - fall * NORMAL, -(1.0 + restitution) * fall
     size = np.linalg.norm(slip)
     left = slip * max(1.0 - friction * push / size, 0.0) if size > 0.0 else slip

@@ -213,20 +213,6 @@ def pile(radius=0.1):
     return model, a, np.sqrt(4.0 * radius**2 - a * a)
 
 
-@pytest.mark.parametrize("law", ["newton", "poisson", "sequential"])
-@pytest.mark.parametrize("friction", [0.1, 0.7])
-def test_impacts_obey_the_cone(law, friction):
-    before, e = np.array([0.7, -1.0, -0.4]), 0.6
-    fall = before @ cones.NORMAL
-    model = cones.thrown(friction, e)
-    speed = dict(zip(("slide.x", "slide.y", "slide.z"), before, strict=True))
-    start = mbd.assemble(model, position={"slide.y": 0.01}, velocity=speed)
-    run = mbd.simulate(model, start, dt=5e-3, until=0.1, impact=law, **STEPS)
-    slip = before - fall * cones.NORMAL
-    left = slip * max(1.0 + friction * (1.0 + e) * fall / np.linalg.norm(slip), 0.0)
-    assert np.allclose([run[f"slide.{axis}.rate"][-1] for axis in "xyz"], left - e * fall * cones.NORMAL, atol=1e-12)
-
-
 @lru_cache(maxsize=1)
 def mixed():
     """A sledge on a rail with dry friction carries a plate on feet that rub, slide freely and hold, and a hinge."""
