@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -121,13 +121,15 @@ def assemble(
     q, y = _values(equations, named, {})
     if faults := _off_manifold(equations, named, q):
         raise ModelError(faults)
-    guess, _ = _values(equations, named, opening(model, mechanism, values, position or {}))
-    guess = equations.configuration.normalise(guess)
-    first = first_anchors(mechanism)
-    hold(mechanism, held, first)
-    work = Posture(
-        mechanism, manager, values, guess, y.copy(), manager.flags(closed), first, named.places, named.speeds
-    )
+
+    def closing(of: Mechanism, given: Vector) -> Posture:
+        wanted, unknown = _named(model, of, position or {}, velocity or {})
+        trial = _opened(of, given, wanted, {}, closed, held)
+        if not unknown and not project:
+            _closed_as_named(trial, wanted, close_positions)
+        return trial
+
+    work = _opened(mechanism, values, named, opening(model, mechanism, values, closing), closed, held)
     bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened))
     if bad:
         raise AssemblyError(bad)
@@ -214,19 +216,31 @@ def _no_rate(name: str, rates: Mapping[str, int]) -> str:
     )
 
 
+def _opened(
+    mechanism: Mechanism, parameters: Vector, named: _Named, guess: Mapping[str, float], closed: Iterable[str],
+    held: Mapping[str, float],
+) -> Posture:  # fmt: skip
+    """A mechanism where closing begins."""
+    q, y = _values(mechanism.equations, named, guess)
+    q = mechanism.equations.configuration.normalise(q)
+    manager, first = manager_of(mechanism, parameters), first_anchors(mechanism)
+    hold(mechanism, held, first)
+    return Posture(mechanism, manager, parameters, q, y, manager.flags(closed), first, named.places, named.speeds)
+
+
 def _values(equations: Equations, named: _Named, guess: Mapping[str, float]) -> tuple[Vector, Vector]:
     """q and (v, z) as named; elsewhere the guess, or defaults, and no velocity."""
     q = np.array(
         [named.q.get(k, guess.get(c.name, c.default)) for k, c in enumerate(equations.coordinates)], dtype=float
     )
-    v = [named.v.get(k, 0.0) for k in range(equations.n_v)]
+    v = [named.v.get(k, guess.get(name, 0.0)) for k, name in enumerate(equations.velocity_names)]
     z = [named.z.get(k, float(state.default)) for k, state in enumerate(equations.states)]
     return q, np.array([*v, *z], dtype=float)
 
 
 def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str]:
     """Close positions, then velocities; what contradicts them."""
-    if project and _closed_as_named(work, named):
+    if project and _closed_as_named(work, named, close_nearby):
         return []
     equations = work.equations
     q, y, rows = work.q.copy(), work.y.copy(), position_rows(work)
@@ -256,14 +270,14 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
     return contradictions(work, Attempt(rows, q, y, held_q, held_v, misfit, speed_misfit, project), model)
 
 
-def _closed_as_named(work: Posture, named: _Named) -> bool:
-    """Close around the named values without moving them, if that can be done from here."""
+def _closed_as_named(work: Posture, named: _Named, close: Callable[..., Vector]) -> bool:
+    """Close around the named values without moving them, if that can be done."""
     trial, rows = replace(work, q=work.q.copy(), y=work.y.copy(), anchors=work.anchors.copy()), position_rows(work)
     held_q, held_v = _held(work.equations, named)
     free = np.ones((2, work.equations.n_v), dtype=bool)
     _hold(free, held_q, held_v)
     choose_turns(trial, rows)
-    if not np.max(np.abs(close_nearby(trial, rows, free[0])), initial=0.0) <= EQUAL_RTOL:
+    if not np.max(np.abs(close(trial, rows, free[0])), initial=0.0) <= EQUAL_RTOL:
         return False
     nearest_turns(trial, rows, named.q, EQUAL_RTOL)
     capture(trial)

@@ -1,57 +1,86 @@
-"""Where closing begins, whatever joints are cut: the pose that the model has with only its loops cut."""
+"""Where closing begins, whatever joints are cut: the start that the model has with only its loops cut."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from mbd.arrays import Vector
+from mbd.assembly.posture import Posture
 from mbd.compile.mechanism import Mechanism
-from mbd.equations.derivation_context import DerivationContext
-from mbd.tape.evaluate import evaluate
+from mbd.compile.python import ScalarFunction, scalar_function
+from mbd.dataclass import dataclass
+from mbd.equations.derivation import TreeGeometry, derive
+from mbd.errors import MbdError
 from mbd.tape.node import Node
 from mbd.topology.description import Description
 from mbd.topology.plan import plan, uncut
 
 __all__ = ["opening"]
 
+Values = dict[str, float]
+"""Values of coordinates or of their velocities, by name."""
 
-def opening(model: Any, mechanism: Mechanism, parameters: Vector, position: Mapping[str, float]) -> dict[str, float]:
-    """Values of coordinates that exist only because joints are cut, in the pose that has the named values.
 
-    The named values are put into the tree that cuts nothing but loops, with zeros elsewhere. The places of the bodies
-    there are those from which closing begins, so that a start does not depend on the choice of cuts.
+@dataclass(frozen=True)
+class _Whole:
+    """The mechanism with only its loops cut, and the coordinates and velocities that there are with others cut, too.
+
+    names : of both; function : their values by the coordinates of the whole
+    """
+
+    mechanism: Mechanism
+    names: Sequence[str]
+    function: ScalarFunction
+
+
+def opening(
+    model: object, mechanism: Mechanism, parameters: Vector, close: Callable[[Mechanism, Vector], Posture]
+) -> Values:
+    """Values of coordinates and velocities in the start without the cuts that the model asks for; none without such.
+
+    What rows move, and how far, follows from the coordinates that they move: with a joint cut a drive of the shoulder
+    would leave the forearm in its direction, not at its angle. So the start is closed in the tree that cuts nothing but
+    loops, and closing begins there.
 
     Parameters
     ----------
     parameters : values of the run-time parameters
-    position : the named positions
+    close : the named values in a mechanism with these values of its parameters, closed if they can be
     """
     if not isinstance(model, Description):
         return {}
-    made = mechanism.kept(_cut_coordinates, lambda: _cut_coordinates(model))
-    names, nodes, coordinates, defaults, inputs = made
-    if not names:
+    whole = mechanism.kept(opening, lambda: _whole(model, mechanism))
+    if whole is None:
         return {}
-    given: dict[Node | tuple[str, int], float] = {("t", 0): 0.0}
-    for k, (name, default) in enumerate(zip(coordinates, defaults, strict=True)):
-        given["q", k], given["x", k] = float(position.get(name, default)), 0.0
-    values = dict(zip((each.name for each in mechanism.equations.parameters), parameters, strict=False))
-    for k, parameter in enumerate(inputs):
-        given["p", k] = float(values.get(parameter.name, parameter.value))
-    return dict(zip(names, evaluate(nodes, given), strict=True))
+    known = dict(zip((each.name for each in mechanism.equations.parameters), parameters.tolist(), strict=False))
+    own = whole.mechanism.equations.parameters
+    values = whole.mechanism.parameters({each.name: known[each.name] for each in own if each.name in known})
+    work, found = close(whole.mechanism, values), np.zeros(len(whole.names))
+    block = whole.mechanism.block(work.time, work.q, work.y, work.anchors)
+    whole.function(block, work.parameters, found)
+    return dict(zip(whole.names, found.tolist(), strict=True))
 
 
-def _cut_coordinates(model: Description) -> tuple[list[str], list[Node], list[str], Sequence[float], Any]:
-    """(names of coordinates, their values on a tape, names of its coordinates, their defaults, its parameters)."""
-    here, whole = plan(model), uncut(model)
-    apart = {joint.name for joint in (*here.floating, *whole.cut)}
-    moved = [joint for joint in here.edges if joint.name in apart]
-    if not moved:
-        return [], [], [], (), ()
-    scope = DerivationContext(model.ground, whole.edges, whole.cut, model.gravity, model.tunable, whole.planar)
-    names, nodes = list[str](), list[Node]()
-    for joint in moved:
-        names += joint.coordinate_names
-        nodes += [scope.real(value) for value in joint.recover(*scope.relative(joint), scope)]
-    return names, nodes, list(whole.coordinate_names), scope.configuration.defaults, scope.parameters.found
+def _whole(model: Description, mechanism: Mechanism) -> _Whole | None:
+    """None where nothing but loops is cut, or the model cannot be derived so."""
+    here, chosen = plan(model), uncut(model, with_reactions=True)
+    apart = {joint.name for joint in (*here.floating, *chosen.cut)}
+    if apart.isdisjoint(joint.name for joint in here.edges):
+        return None
+    known = model.parameters
+    tunable = [each.name for each in mechanism.equations.parameters if each.name in known]
+    try:
+        equations = derive(model.with_tunable(*tunable), chosen)
+    except MbdError:
+        return None
+    assert isinstance(equations.geometry, TreeGeometry)
+    scope, names, nodes = equations.geometry.scope, list[str](), list[Node]()
+    for joint in here.edges:
+        values = scope.read(joint) if joint.name in apart else scope.joint(joint.name).coordinates
+        rates = scope.velocities(joint, values) if joint.name in apart else scope.joint(joint.name).rates
+        names += (*joint.coordinate_names, *joint.velocity_names)
+        nodes += [scope.real(value) for value in (*values, *rates)]
+    made = Mechanism(equations, "python")
+    return _Whole(made, names, scalar_function(nodes, made.layout, "opening"))

@@ -61,18 +61,19 @@ class FrontDoor(Protocol):
         """The judgement of values of its parameters."""
 
 
-def derive(model: Description | FrontDoor) -> Equations:
+def derive(model: Description | FrontDoor, chosen: Plan | None = None) -> Equations:
     """The equations of motion ``M a + f + Bᵀ λ = 0``, ``h = 0`` of a model.
 
     Parameters
     ----------
     model : a `Model`, or another front door; all its faults are raised together as a `ModelError`
+    chosen : which joints of a `Model` are cut, in place of what it says itself
     """
     if isinstance(model, FrontDoor):
         equations = model.equations_of_motion()
     else:
         require_valid(model)
-        chosen = plan(model)
+        chosen = plan(model) if chosen is None else chosen
         require_room(chosen)
         equations = _derived(model, chosen)
     if faults := table_faults(equations):

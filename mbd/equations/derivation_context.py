@@ -186,7 +186,7 @@ class DerivationContext(ParameterScope):
             if joint is None:
                 raise UnknownNameError(nearest(name, [j.name for j in (*self.tree, *self.cuts)], "joint"))
             values = self.read(joint)
-            rates = self._velocities(joint, values)
+            rates = self.velocities(joint, values)
             place, angle = self._angles.get(name, (-1, 0.0))
             if place >= 0:
                 values[place] = self.tape.lift(angle)
@@ -351,8 +351,8 @@ class DerivationContext(ParameterScope):
         seeds: dict[Node, Scalar] = {self.time: 1.0, **self.inputs.clock}
         return jvp(values, seeds | self.views.rates(values))
 
-    def _velocities(self, joint: Joint, values: Sequence[Node]) -> list[Node]:
-        """The velocities of a cut joint: the rates of its coordinates, or of ``q ⊖ q₀`` at q = q₀."""
+    def velocities(self, joint: Joint, values: Sequence[Node]) -> list[Node]:
+        """The velocities of a joint, with values read off its frames: their rates, or that of ``q ⊖ q₀`` at q = q₀."""
         rates = self.rates(values)
         if joint.is_vector:
             return rates

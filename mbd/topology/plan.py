@@ -78,9 +78,9 @@ def plan(model: Description) -> Plan:
     return _plan(model, cut_names(model) | loaded | reactions_read(model))
 
 
-def uncut(model: Description) -> Plan:
-    """The same as `plan`, of the model that has nothing but its loops cut."""
-    return _plan(model, set())
+def uncut(model: Description, with_reactions: bool = False) -> Plan:
+    """The same as `plan`, of the model that has nothing but its loops cut, and joints whose reactions laws read."""
+    return _plan(model, reactions_read(model) if with_reactions else set())
 
 
 def _plan(model: Description, wanted: set[str]) -> Plan:
