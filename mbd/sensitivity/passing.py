@@ -24,7 +24,7 @@ from mbd.sensitivity.passed import Passed
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.resets import after_reset
 from mbd.sensitivity.run_data import RunRows, refused, sided
-from mbd.sensitivity.tangent.margins import refuse_edges, refuse_turning_points
+from mbd.sensitivity.tangent.margins import refuse_edge, refuse_turning_points
 from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
 from mbd.simulation.run.idle import keep_idle
@@ -135,11 +135,11 @@ def tangent_run(
         return Passed(end[0], last, end[1])
 
     def time_at(row: int) -> Vector:
-        return joined([run.of_rows[row][:1] for run, _ in runs])[0]
+        return np.asarray(joined([run.of_rows[row][:1] for run, _ in runs])[0])
 
     instants = refuse_turning_points(rows, programs, at_row, time_at, end)
     for run, _ in runs:
-        refuse_edges(rows, run)
+        refuse_edge(rows, *run.edge)
     return Passed(end[0], last, end[1], instants)
 
 

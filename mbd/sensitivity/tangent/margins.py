@@ -16,9 +16,8 @@ from mbd.sensitivity.passed import Instant
 from mbd.sensitivity.programs import Programs, State
 from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.sensitivity.tangent.follow_impacts import EDGE, NO_REBOUND, TIE
-from mbd.sensitivity.tangent_run import TangentRun
 
-__all__ = ["refuse_edges", "refuse_turning_points"]
+__all__ = ["refuse_edge", "refuse_turning_points"]
 
 AtRow = Callable[[int], tuple[Motion, Rates]]
 MIN_IMPULSE_RATIO = 1e-3
@@ -121,7 +120,8 @@ def _fired(rows: RunRows, programs: Programs, leads: Sequence[int], at_row: AtRo
     for line, mode in zip(active, modes, strict=True):
         line[list(mode.held)] = 1.0
     y, rate = np.hstack([record.v[before], record.z[before]]), np.hstack([record.a[before], record.s[before]])
-    times, switches, slips = rows.ends[before], [mode.switch for mode in modes], [mode.slip for mode in modes]
+    times = rows.ends[before]
+    switches, slips = np.array([mode.switch for mode in modes]), np.array([mode.slip for mode in modes])
     at = State(times, record.q[before], y, rate, record.lam[before] * active, rows.anchors[before], switches, slips)
     flow = np.zeros((len(leads), c.count))
     flow[:, c.x], flow[:, c.y], flow[:, c.t] = record.v[before], rate, 1.0
@@ -177,9 +177,8 @@ def _refuse_chance(rows: RunRows, programs: Programs, row: int, mode: Mode, fire
         raise _sided(rows, closing, before.t, why)
 
 
-def refuse_edges(rows: RunRows, run: TangentRun) -> None:
-    """Raise a `OneSidedError` where a change decides how an impact goes on (see `tangent.follow_impacts`)."""
-    kind, first, second, time = run.edge
+def refuse_edge(rows: RunRows, kind: float, first: int, second: int, time: float) -> None:
+    """Raise a `OneSidedError` where a change decides how an impact goes on (see `follow_impacts.note`)."""
     if not kind:
         return
     equations = rows.mechanism.equations
