@@ -132,6 +132,9 @@ class _Reading:
         """What an object holds, last first; its kind and size are noted at once."""
         add = self.words.append
         if kind is tuple or kind is list:
+            if {*map(type, item)} == {int}:  # paths, as many as bodies, of as many coordinates
+                add((kind.__name__, *item))
+                return []
             add((kind.__name__, len(item)))
             return list(item[::-1])
         if kind is dict:

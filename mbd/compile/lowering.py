@@ -297,9 +297,16 @@ def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:
 def _places(outputs: Sequence[Node]) -> dict[int, list[int]]:
     """Where each node is asked for, by its index."""
     places: dict[int, list[int]] = {}
+    untouched: Node | None = None  # one node, however many outputs it stands for
     for k, node in enumerate(outputs):
-        if not node.is_untouched:
-            places.setdefault(node.index, []).append(k)
+        known = places.get(node.index)
+        if known is not None:
+            known.append(k)
+        elif node is not untouched:
+            if node.is_untouched:
+                untouched = node
+            else:
+                places[node.index] = [k]
     return places
 
 

@@ -165,9 +165,10 @@ class Mechanism:
         """What steps of every mode need."""
         n, untouched = self.layout.n, self.equations.tape.untouched  # M alone is ever written to by others
         of_rows = range(n * (n + 1), n * (n + 1) + 2 * n * self.layout.n_rows)
-        accelerations = [
-            untouched if node.is_zero and k in of_rows else node for k, node in enumerate(self._accelerations)
-        ]
+        accelerations = self._accelerations.copy()
+        for k in of_rows:
+            if accelerations[k].is_zero:
+                accelerations[k] = untouched
         made = {"accelerations": accelerations, "guards": programs.guards(self.equations)}
         composed = programs.compose(self.equations)
         if composed is not None:

@@ -49,7 +49,7 @@ MIN_SAVING = 4
 def may_pay(filled: Filled, n: int, rows: Sequence[int]) -> bool:
     """Whether there may be an order that pays, as far as size and entries of the matrices of accelerations tell."""
     size = n + len(rows)
-    return size >= MIN_UNKNOWNS and 4 * len(filled.places(n, rows)) <= size * size
+    return not filled.is_dense and size >= MIN_UNKNOWNS and 4 * len(filled.places(n, rows)) <= size * size
 
 
 def elimination_order(
@@ -104,16 +104,22 @@ def is_unit(node: Node) -> bool:
 
 @dataclass(frozen=True)
 class Filled:
-    """Places of what is not zero in M, and coordinates that R and B of each row concern, which serve all modes."""
+    """Places of what is not zero in M, and coordinates that R and B of each row concern, which serve all modes.
+
+    is_dense : entries of M alone are so many that no order pays in any mode; places are not told then
+    """
 
     M: frozenset[tuple[int, int]]
     R: tuple[frozenset[int], ...]
     B: tuple[frozenset[int], ...]
+    is_dense: bool = False
 
     @classmethod
     def of(cls, accelerations: Sequence[Node], n: int, n_rows: int) -> Filled:
         """These of the outputs of `programs.accelerations`."""
         at_R, at_B = n * n + n, n * n + n + n * n_rows
+        if 4 * sum(not node.is_zero for node in accelerations[: n * n]) > (n + n_rows) ** 2:
+            return cls(frozenset(), (), (), True)
         known = [k for k, node in enumerate(accelerations[: at_B + n_rows * n]) if not node.is_zero]
         R, B = ([set[int]() for _ in range(n_rows)] for _ in range(2))
         for k in known:
@@ -129,6 +135,8 @@ class Filled:
     def places(self, n: int, rows: Sequence[int]) -> set[tuple[int, int]]:
         """Places of what is not zero in [M R; B 0] and [M Bᵀ; B 0] of some rows."""
         found = set(self.M)
+        if self.is_dense:
+            return found
         for column, row in enumerate(rows, n):
             found |= {(i, column) for i in self.R[row] | self.B[row]} | {(column, i) for i in self.B[row]}
         return found

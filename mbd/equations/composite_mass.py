@@ -83,13 +83,13 @@ class MassLoop:
     bodies : of each body the number of its parent (−1 of the ground), and its coordinates, from the first to the last
     numbers : of each body R and the place of its origin in the parent (12 numbers, row-major), and then of each
         coordinate force and torque per unit acceleration, ω and l per unit rate (12)
-    filled : places (i, j) of M that the loop writes
+    paths : of each coordinate those on the path from the ground to its body, with which it has entries
     spared : operations that straight-line code would take, about
     """
 
     bodies: tuple[tuple[int, int, int], ...]
     numbers: tuple[Node, ...]
-    filled: frozenset[tuple[int, int]]
+    paths: tuple[tuple[int, ...], ...]
     spared: int
 
 
@@ -113,11 +113,10 @@ def mass_loop(bodies: Sequence[Moving], masses: Mapping[str, MassProperties], n_
         _, turns, moves = motions[body.body.name][j - lines[number[body.body.name]][1]]
         known[j] = (*force, *torque, *turns, *moves)
     numbers += [part for of_one in known for part in of_one]
-    filled = {(i, j) for body in moving for j in body.path[len(body.path) - len(body.columns) :] for i in body.path}
-    filled |= {(j, i) for i, j in filled}
+    paths = tuple(body.path for body in moving for _ in body.columns)
     planar = all(tape.lift(part).is_constant for body in moving for part in body.turn[2])
     spared = int(sizes.OF_PAIR[planar] * pairs)
-    return MassLoop(tuple(lines), tuple(map(tape.lift, numbers)), frozenset(filled), spared)
+    return MassLoop(tuple(lines), tuple(map(tape.lift, numbers)), paths, spared)
 
 
 def entry(force: Triple, torque: Triple, angular: Triple, linear: Triple) -> Scalar:

@@ -243,8 +243,9 @@ def accelerations(equations: Equations, impacts: bool = True, loop: MassLoop | N
     f = [force + bent for force, bent in zip(substitute(r, rest), _bent_forces(equations), strict=True)]
     if loop is not None:
         M, untouched = [[tape.zero] * inputs.n for _ in range(inputs.n)], tape.untouched
-        for i, j in loop.filled:
-            M[i][j] = untouched
+        for j, path in enumerate(loop.paths):
+            for i in path:
+                M[i][j] = M[j][i] = untouched
     else:
         found = None if equations.geometry is None else equations.geometry.mass_matrix()
         M = _transposed(mass_matrix(equations, r)) if found is None else found

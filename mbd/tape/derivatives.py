@@ -20,14 +20,16 @@ _FLAT = CONDITIONS | {"floor", "sign"}
 
 def live(outputs: Iterable[Node], given: Container[int] = ()) -> list[Node]:
     """The nodes that the outputs need, arguments first; what lies behind nodes whose index is `given` is left out."""
-    found: dict[int, Node] = {}
-    stack = list(outputs)
+    found = {node.index: node for node in outputs}
+    stack = list(found.values())
     while stack:
         node = stack.pop()
-        if node.index not in found:
-            found[node.index] = node
-            if node.index not in given:
-                stack += node.args
+        if node.index in given:
+            continue
+        for arg in node.args:
+            if arg.index not in found:
+                found[arg.index] = arg
+                stack.append(arg)
     return [found[index] for index in sorted(found)]
 
 
