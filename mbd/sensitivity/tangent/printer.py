@@ -9,7 +9,7 @@ Values are computed by the very operations of the kernel, so that a run with der
 derivatives take fused ones where the processor has them.
 
 Functions in `HELD` are called as they stand, without derivatives: what they write keeps the derivatives it had. Model
-code is called for its values, then its exact derivatives are multiplied into the vectors of its inputs (`product`).
+code is called for its values, then its exact derivatives are multiplied into the vectors of its inputs (`answers`).
 """
 
 from __future__ import annotations
@@ -56,157 +56,44 @@ BUNDLES = {kind: f"{{ {', '.join((LLVM[kind], *more))} }}" for kind, more in WIT
 """What functions return that return reals, or the address of an array."""
 
 
-def each(line: str) -> str:
-    """A line for every vector of derivatives, whose number stands in the place of #."""
-    return "\n".join(f"  {line.replace('#', str(piece))}" for piece in range(PIECES))
-
-
-def loaded(name: str, address: str) -> str:
-    """Lines that read the derivatives of a number."""
-    place = each(f"%{name}.at.# = getelementptr {VECTOR}, ptr %{address}, i64 #")
-    return place + "\n" + each(f"%{name}.# = load {VECTOR}, ptr %{name}.at.#, align 8")
-
-
-def stored(name: str, address: str) -> str:
-    """Lines that write them."""
-    place = each(f"%{name}.to.# = getelementptr {VECTOR}, ptr %{address}, i64 #")
-    return place + "\n" + each(f"store {VECTOR} %{name}.#, ptr %{name}.to.#, align 8")
-
-
-def entry(name: str, number: str, to: str) -> str:
-    """Lines that add an entry times the derivatives of its input, to two sums that do not wait for each other."""
-    return f"""\
-  %column.at.{name} = getelementptr i64, ptr %columns, i64 %{number}
-  %column.{name} = load i64, ptr %column.at.{name}
-  %input.at.{name} = getelementptr ptr, ptr %found, i64 %column.{name}
-  %input.{name} = load ptr, ptr %input.at.{name}
-  %entry.at.{name} = getelementptr double, ptr %numbers, i64 %{number}
-  %number.{name} = load double, ptr %entry.at.{name}
-{loaded(f"of.{name}", f"input.{name}")}
-  %only.{name} = insertelement {VECTOR} poison, double %number.{name}, i64 0
-  %factor.{name} = shufflevector {VECTOR} %only.{name}, {VECTOR} poison, <{WIDTH} x i32> zeroinitializer
-{each(f"%part.{name}.# = fmul contract {VECTOR} %factor.{name}, %of.{name}.#")}
-{each(f"%sum.{name}.# = fadd contract {VECTOR} %{to}.#, %part.{name}.#")}"""
-
-
-PRODUCT = f"""\
+PRODUCT = """\
 define internal void @product(
   ptr %program, ptr %block, ptr %params, ptr %out, ptr %of.block, ptr %of.params, ptr %of.out
-) noinline {{
+) noinline {
 entry:
   %code = load ptr, ptr %program
-  %size.at = getelementptr i64, ptr %program, i64 1
-  %size = load i64, ptr %size.at
-  %ends.at = getelementptr i64, ptr %program, i64 2
-  %ends = load ptr, ptr %ends.at
-  %columns.at = getelementptr i64, ptr %program, i64 3
-  %columns = load ptr, ptr %columns.at
-  %numbers.at = getelementptr i64, ptr %program, i64 4
+  %numbers.at = getelementptr i64, ptr %program, i64 1
   %numbers = load ptr, ptr %numbers.at
-  %count.at = getelementptr i64, ptr %program, i64 5
-  %count = load i64, ptr %count.at
-  %places.at = getelementptr i64, ptr %program, i64 6
-  %places = load ptr, ptr %places.at
-  %others.at = getelementptr i64, ptr %program, i64 7
-  %others = load ptr, ptr %others.at
-  %room.at = getelementptr i64, ptr %program, i64 8
-  %room = load ptr, ptr %room.at
-  %found.list = getelementptr i64, ptr %program, i64 9
-  %found = load ptr, ptr %found.list
+  %answer.at = getelementptr i64, ptr %program, i64 2
+  %answer = load ptr, ptr %answer.at
+  %bytes.at = getelementptr i64, ptr %program, i64 3
+  %bytes = load i64, ptr %bytes.at
+  %found.at = getelementptr i64, ptr %program, i64 4
+  %found = load ptr, ptr %found.at
   %there = icmp ne ptr %code, null
-  br i1 %there, label %evaluate, label %inputs
+  br i1 %there, label %evaluate, label %values
 evaluate:
   call void %code(ptr %block, ptr %params, ptr %numbers)
-  br label %inputs
-inputs:
-  %i = phi i64 [ 0, %entry ], [ 0, %evaluate ], [ %i.next, %keep ]
-  %wanted = icmp slt i64 %i, %count
-  br i1 %wanted, label %input, label %lines
-input:
-  %place.at = getelementptr i64, ptr %places, i64 %i
-  %place = load i64, ptr %place.at
-  %of.state = icmp sge i64 %place, 0
-  %parameter = sub i64 -1, %place
-  %number.of = select i1 %of.state, i64 %place, i64 %parameter
-  %array = select i1 %of.state, ptr %of.block, ptr %of.params
-  %source = getelementptr {ROOM}, ptr %array, i64 %number.of
-  %other.at = getelementptr i64, ptr %others, i64 %i
-  %other = load i64, ptr %other.at
-  %pair = icmp sge i64 %other, 0
-  br i1 %pair, label %both, label %keep
-both:
-{loaded("first", "source")}
-  %second.at = getelementptr {ROOM}, ptr %of.block, i64 %other
-{loaded("second", "second.at")}
-{each(f"%whole.# = fadd {VECTOR} %first.#, %second.#")}
-  %kept.at = getelementptr {ROOM}, ptr %room, i64 %i
-{stored("whole", "kept.at")}
-  br label %keep
-keep:
-  %whole = phi ptr [ %source, %input ], [ %kept.at, %both ]
-  %found.at = getelementptr ptr, ptr %found, i64 %i
-  store ptr %whole, ptr %found.at
-  %i.next = add i64 %i, 1
-  br label %inputs
-lines:
-  %k = phi i64 [ 0, %inputs ], [ %k.next, %store ]
-  %begin = phi i64 [ 0, %inputs ], [ %last, %store ]
-  %more = icmp slt i64 %k, %size
-  br i1 %more, label %line, label %end
-line:
-  %end.at = getelementptr i64, ptr %ends, i64 %k
-  %last = load i64, ptr %end.at
-  br label %entries
-entries:
-  %e = phi i64 [ %begin, %line ], [ %e.next, %pairs ]
-{each(f"%even.# = phi {VECTOR} [ zeroinitializer, %line ], [ %sum.a.#, %pairs ]")}
-{each(f"%odd.# = phi {VECTOR} [ zeroinitializer, %line ], [ %sum.b.#, %pairs ]")}
-  %e.next = add i64 %e, 2
-  %whole.pair = icmp sle i64 %e.next, %last
-  br i1 %whole.pair, label %pairs, label %rest
-pairs:
-{entry("a", "e", "even")}
-  %e.second = add i64 %e, 1
-{entry("b", "e.second", "odd")}
-  br label %entries
-rest:
-  %left = icmp slt i64 %e, %last
-  br i1 %left, label %single, label %store
-single:
-{entry("c", "e", "even")}
-  br label %store
-store:
-{each(f"%own.# = phi {VECTOR} [ %even.#, %rest ], [ %sum.c.#, %single ]")}
-{each(f"%sum.# = fadd {VECTOR} %own.#, %odd.#")}
-  %out.at = getelementptr {ROOM}, ptr %of.out, i64 %k
-{stored("sum", "out.at")}
-  %k.next = add i64 %k, 1
-  br label %lines
-end:
-  %bytes.at = getelementptr i64, ptr %program, i64 12
-  %bytes = load i64, ptr %bytes.at
+  br label %values
+values:
   %solved = icmp ne i64 %bytes, 0
-  br i1 %solved, label %solution, label %done
+  br i1 %solved, label %solution, label %derivatives
 solution:
-  %values.at = getelementptr i64, ptr %program, i64 11
-  %values = load ptr, ptr %values.at
-  call void @llvm.memcpy.p0.p0.i64(ptr %out, ptr %values, i64 %bytes, i1 false)
-  %answer.at = getelementptr i64, ptr %program, i64 10
-  %answer = load ptr, ptr %answer.at
+  call void @llvm.memcpy.p0.p0.i64(ptr %out, ptr %found, i64 %bytes, i1 false)
+  br label %derivatives
+derivatives:
   %known = icmp ne ptr %answer, null
   br i1 %known, label %answered, label %done
 answered:
-  %factors.at = getelementptr i64, ptr %program, i64 13
-  %factors = load ptr, ptr %factors.at
-  call void %answer(ptr %factors, ptr %of.out)
+  call void %answer(ptr %numbers, ptr %of.block, ptr %of.params, ptr %of.out)
   br label %done
 done:
   ret void
-}}
+}
 """
-"""Derivatives of a program at its inputs, entry by entry, times those of the inputs (see `programs.Derivative`).
+"""Derivatives of a program at its inputs (see `programs.Derivative`): what multiplies those of the inputs, then these.
 
-Where these are residuals of a system, its solution and what it makes of these derivatives take their place.
+Of a system its solution takes the place of its residuals.
 """
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.compile.llvm import Machine
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations import programs
 from mbd.equations.charts import chart_end, chart_motion
-from mbd.sensitivity.tangent.answers import Answer, answer_of
+from mbd.sensitivity.tangent.answers import Answer, Place, answer_of
 from mbd.sensitivity.tangent.interpreted import Pair
 from mbd.sensitivity.tangent.printer import LANES
 from mbd.sensitivity.tangent.systems import System, balance, metric, plus, rates, step
@@ -41,13 +42,13 @@ class Derivative:
     mechanism, name : of the program
     outputs : gives its outputs where its derivatives are not known yet
     places : of parameters that are differentiated by
+    first : numbers before the outputs, without derivatives
 
     Attributes
     ----------
-    address : of ``[code, outputs, ends of their lines, columns, numbers, inputs, places, second places, room,
-        found, answer, values, their bytes, factors]``, with the best code that there is now, as `printer.PRODUCT` reads
-        it: columns are numbers of inputs; where their derivatives are is found first, of sums of two places in the
-        room; of a program that solves, `answer` turns what was found into the derivatives of its values
+    address : of ``[code, numbers, answer, bytes of values, values]``, with the best code that there is now, as
+        `printer.PRODUCT` reads it: the code computes factors, of which and of the derivatives of its inputs the answer
+        makes its own, and behind them the values of a program that solves
     """
 
     def __init__(
@@ -59,26 +60,15 @@ class Derivative:
         first: int = 0,
         without: Sequence[str] = WITHOUT,
     ) -> None:
-        symbol = f"tangent_{name}_by_{'_'.join(map(str, places))}"
-
-        def made() -> tuple[_Entries, int]:
+        def made() -> _Code:
             found = outputs()
             system = found if isinstance(found, System) else System(found)
-            entries = _made(mechanism, f"tangent_{len(mechanism.common)}", system, places, without)
-            return entries, len(system.lines)
+            return _made(mechanism, f"tangent_{len(mechanism.common)}", system, places, first, without)
 
-        known, count = mechanism.kept((Derivative, symbol), made)
-        self._known, self._size, self._lines = known, first + count, known.lines + first
-        self._ends = np.searchsorted(self._lines, np.arange(self._size), side="right")
-        solved, answer = len(known.lines) + known.values, known.answer
-        self._numbers = np.zeros(max(solved + (0 if answer is None else len(answer.factors)), 1))
-        self._room = lanes(len(known.inputs))
-        self._found = np.zeros(max(len(known.inputs), 1), dtype=np.int64)
-        arrays = self._ends, known.columns, self._numbers, known.inputs, known.others, self._room, self._found
-        ends, columns, numbers, inputs, *others = (each.ctypes.data for each in arrays)
-        words = [0, self._size, ends, columns, numbers, len(known.inputs), inputs, *others]
-        words += [0 if answer is None else answer.address, numbers + NUMBER_BYTES * len(known.lines)]
-        words += [NUMBER_BYTES * known.values, numbers + NUMBER_BYTES * solved]
+        self._known = known = mechanism.kept((Derivative, name, first, *places), made)
+        self._numbers = np.zeros(max(known.values + len(known.answer.factors), 1))
+        numbers, factors = int(self._numbers.ctypes.data), len(known.answer.factors)
+        words = [0, numbers, known.answer.address, NUMBER_BYTES * known.values, numbers + NUMBER_BYTES * factors]
         self._words = np.array(words, dtype=np.int64)
         self._address = int(self._words.ctypes.data)
 
@@ -95,17 +85,16 @@ class Derivative:
 
     def product(self, block: Pair, parameters: Pair, values: Vector) -> Matrix:
         """The derivatives of its outputs, in Python; values : of outputs that are solved for, which it writes."""
-        out = np.zeros((self._size, LANES))
         known = self._known
         if known.function is not None:
             known.function(block.values, parameters.values, self._numbers)
-            inputs = block.of[np.maximum(known.inputs, 0)]
-            inputs[known.inputs < 0] = parameters.of[-1 - known.inputs[known.inputs < 0]]
-            inputs[known.others >= 0] += block.of[known.others[known.others >= 0]]
-            np.add.at(out, self._lines, self._numbers[: len(known.columns), None] * inputs[known.columns])
-        solved = len(known.lines) + known.values
-        values[: known.values] = self._numbers[len(known.lines) : solved]
-        return out if known.answer is None else known.answer.taken(self._numbers[solved:], out)
+        factors = len(known.answer.factors)
+        values[: known.values] = self._numbers[factors : factors + known.values]
+        own, others = np.array(known.inputs, dtype=np.int64).reshape(-1, 2).T
+        inputs = block.of[np.maximum(own, 0)]
+        inputs[own < 0] = parameters.of[-1 - own[own < 0]]
+        inputs[others >= 0] += block.of[others[others >= 0]]
+        return known.answer.taken(self._numbers[:factors], inputs)
 
 
 def lanes(count: int) -> Matrix:
@@ -116,25 +105,20 @@ def lanes(count: int) -> Matrix:
 
 
 @dataclass(frozen=True)
-class _Entries:
-    """Compiled entries, their lines and the numbers of their inputs.
-
-    inputs : places in the block, or −1 − place of a parameter; others : a second place whose derivatives are added, −1
-        for none: where coordinates add, of what depends on q + x alone
-    """
+class _Code:
+    """Compiled values and factors of an answer, how many the values are, the places of its inputs, and itself."""
 
     function: Any
     values: int
-    answer: Answer | None
-    lines: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    inputs: NDArray[np.int64]
-    others: NDArray[np.int64]
+    inputs: Sequence[Place]
+    answer: Answer
 
 
-def _made(mechanism: Mechanism, symbol: str, system: System, places: Sequence[int], without: Sequence[str]) -> _Entries:
+def _made(
+    mechanism: Mechanism, symbol: str, system: System, places: Sequence[int], first: int, without: Sequence[str]
+) -> _Code:
     """The derivatives of some outputs that are not always 0."""
-    outputs = system.lines
+    outputs, tape = system.lines, mechanism.equations.tape
     layout, wanted = mechanism.layout, set(places)
     inputs = [node for node in live(outputs) if node.op == "input"]
     inputs = [
@@ -143,29 +127,33 @@ def _made(mechanism: Mechanism, symbol: str, system: System, places: Sequence[in
     ]  # fmt: skip
     slopes = jvps(outputs, [{node: 1.0} for node in inputs]) if inputs else []
     found = {node.data: each for node, each in zip(inputs, slopes, strict=True)}
-    made, own, others = list[tuple[int, int, Node]](), list[int](), list[int]()
+    own, columns = list[Place](), list[Sequence[Node]]()
     for (kind, index), column in found.items():
-        beside = found.get(("q" if kind == "x" else "x", index), ())
+        beside, other = found.get(("q" if kind == "x" else "x", index), ()), -1
         if kind in "qx" and [each.index for each in column] == [each.index for each in beside]:
             if kind == "x":
                 continue
-            others.append(layout.place("x", index))
-        else:
-            others.append(-1)
-        made += [(line, len(own), entry) for line, entry in enumerate(column) if not entry.is_zero]
-        own.append(-1 - index if kind == "p" else layout.place(kind, index))
-    made.sort(key=lambda each: each[0])
-    numbers, answer = substitute([entry for _, _, entry in made], system.known), None
-    if system.answer is not None:
-        given = [mechanism.equations.tape.input("lane", k) for k in range(len(outputs))]
-        answer = answer_of(system.answer(given), mechanism.backend.name == "llvm")
-        numbers = [*numbers, *system.values, *answer.factors]
+            other = layout.place("x", index)
+        own.append((-1 - index if kind == "p" else layout.place(kind, index), other))
+        columns.append(column)
+    entries = iter(substitute([entry for column in columns for entry in column], system.known))
+    lines = [tape.zero for _ in outputs]
+    for k, column in enumerate(columns):
+        lane = tape.input("lane", k)
+        for line in range(len(column)):
+            lines[line] = lines[line] + next(entries) * lane
+    load = partial(_loaded, mechanism) if mechanism.backend.name == "llvm" else None
+    answer = answer_of(lines if system.answer is None else system.answer(lines), own, first, load)
+    numbers = [*answer.factors, *system.values]
     if numbers:
         mechanism.common.add({symbol: numbers}, soon=True)
-    function = mechanism.common[symbol] if numbers else None
-    lines, columns = ([each[k] for each in made] for k in (0, 1))
-    arrays = [np.array(each, dtype=np.int64) for each in (lines, columns, own, others)]
-    return _Entries(function, len(system.values), answer, *arrays)
+    return _Code(mechanism.common[symbol] if numbers else None, len(system.values), own, answer)
+
+
+def _loaded(mechanism: Mechanism, code: bytes, symbol: str) -> int:
+    """The address of an answer, in memory as long as the mechanism."""
+    machine = mechanism.kept(_loaded, Machine)
+    return mechanism.kept((_loaded, symbol), lambda: machine.load(code, [symbol])[0])
 
 
 def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list[Derivative]:
