@@ -348,9 +348,16 @@ class _Search:
 
         scale = 2.0 ** np.round(np.log2(np.abs(np.where(guess == 0.0, 1.0, guess))))
         size = float(np.linalg.norm(self.residuals(guess))) or 1.0
+
+        def residuals(u: Vector) -> Vector:
+            return self.residuals(scale * u) / size
+
+        def slopes(u: Vector) -> Matrix:
+            return self.slopes(scale * u) * scale / size
+
         found: Any = least_squares(
-            lambda u: self.residuals(scale * u) / size, guess / scale, lambda u: self.slopes(scale * u) * scale / size,
-            (low / scale, high / scale), x_scale="jac", xtol=1e-9, ftol=1e-12, gtol=1e-12, max_nfev=most,
+            residuals, guess / scale, slopes, (low / scale, high / scale), x_scale="jac", xtol=1e-9, ftol=1e-12,
+            gtol=1e-12, max_nfev=most,
         )  # fmt: skip
         found.x, found.fun, found.jac, found.cost = (
             scale * found.x, size * found.fun, size / scale * found.jac, size**2 * found.cost
