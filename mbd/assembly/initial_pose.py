@@ -13,7 +13,7 @@ from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.dataclass import dataclass
 from mbd.equations.derivation import TreeGeometry, derive
 from mbd.errors import MbdError
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 from mbd.topology.description import Description
 from mbd.topology.plan import plan, uncut
 
@@ -57,7 +57,10 @@ def opening(
     known = dict(zip((each.name for each in mechanism.equations.parameters), parameters.tolist(), strict=False))
     own = whole.mechanism.equations.parameters
     values = whole.mechanism.parameters({each.name: known[each.name] for each in own if each.name in known})
-    work, found = close(whole.mechanism, values), np.zeros(len(whole.names))
+    try:
+        work, found = close(whole.mechanism, values), np.zeros(len(whole.names))
+    except MbdError:  # the mechanism as it is cut says why
+        return {}
     block = whole.mechanism.block(work.time, work.q, work.y, work.anchors)
     whole.function(block, work.parameters, found)
     return dict(zip(whole.names, found.tolist(), strict=True))
@@ -78,9 +81,13 @@ def _whole(model: Description, mechanism: Mechanism) -> _Whole | None:
     assert isinstance(equations.geometry, TreeGeometry)
     scope, names, nodes = equations.geometry.scope, list[str](), list[Node]()
     for joint in here.edges:
-        values = scope.read(joint) if joint.name in apart else scope.joint(joint.name).coordinates
-        rates = scope.velocities(joint, values) if joint.name in apart else scope.joint(joint.name).rates
+        if joint.name in apart:
+            seen = scope.read(joint)
+            found: Sequence[Scalar] = (*seen, *scope.velocities(joint, seen))
+        else:
+            motion = scope.joint(joint.name)
+            found = (*motion.coordinates, *motion.rates)
         names += (*joint.coordinate_names, *joint.velocity_names)
-        nodes += [scope.real(value) for value in (*values, *rates)]
+        nodes += [scope.real(value) for value in found]
     made = Mechanism(equations, "python")
     return _Whole(made, names, scalar_function(nodes, made.layout, "opening"))
