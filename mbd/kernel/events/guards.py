@@ -45,12 +45,13 @@ from mbd.kernel.records import (
 )
 from mbd.kernel.stepping.restart import (
     consistent,
+    evaluate,
     evaluate_loaded,
     fill_block,
     largest_force,
     limit_of,
 )
-from mbd.kernel.stepping.scales import FORCE_ULPS
+from mbd.kernel.stepping.scales import FORCE_ULPS, speed_round_off
 
 __all__ = [
     "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
@@ -350,6 +351,9 @@ def judge_friction(K: Switching, f: int, h: float) -> None:
     d0 = along(K, f, K.guards0, K.at_slip_rate) * h
     d1 = along(K, f, K.guards1, K.at_slip_rate) * h
     tiny = ROUND_OFF_RTOL * max(K.scale[K.n + K.n_rows + K.friction_row[f]], 1e-3)
+    if v1 < -tiny or (d0 < 0.0 < d1 and v0 > tiny):  # round-off of the whole motion is asked for where it matters
+        evaluate(K, K.time, K.q, K.y)
+        tiny = speed_round_off(K, K.friction_row[f])
     if v1 < -tiny:
         top = hermite_turn(v0, v1, d0, d1, True) if d0 > 0.0 else -1.0
         if v0 > tiny:

@@ -27,7 +27,7 @@ from mbd.kernel.records import Equations, Motion
 
 __all__ = [
     "FORCE_ULPS", "HORIZON_STEPS", "add_force_floors", "load_accepted", "note_extent", "restore_iterate", "size_of",
-    "still_energy", "still_speed",
+    "speed_round_off", "still_energy", "still_speed",
 ]  # fmt: skip
 
 HORIZON_STEPS = 1000.0
@@ -80,6 +80,29 @@ def still_energy(K: Motion) -> float:
         speed = still_speed(K, i)
         energy += 0.5 * abs(K.acc[i * K.n + i]) * speed * speed
     return energy
+
+
+def speed_round_off(K: Motion, row: int) -> float:
+    """Speed along a row that may be round-off of any motion of its cluster, M and B in K.acc [m/s, rad/s].
+
+    Elimination mixes speeds as it mixes forces: with the kinetic energy of the cluster each coordinate of the row would
+    move at √(2 T/M_ii). The row's own terms say nothing where its bodies rest in what moves.
+    """
+    n = K.n
+    energy = 0.0
+    for i in range(K.n_v):
+        if K.cluster[i] == K.cluster[n + row]:
+            momentum = 0.0
+            for j in range(K.n_v):
+                momentum += K.acc[i * n + j] * K.y[j]
+            energy += 0.5 * momentum * K.y[i]
+    speed = max(K.scale[n + K.n_rows + row], 1e-3)
+    for i in range(K.n_v):
+        slope = abs(K.acc[K.acc_B + row * n + i])
+        mass = abs(K.acc[i * n + i])
+        if slope > 0.0 and 2.0 * slope * slope * energy > speed * speed * mass and mass > 0.0:
+            speed = slope * sqrt(2.0 * energy / mass)
+    return ROUND_OFF_RTOL * speed
 
 
 def load_accepted(K: Equations) -> None:
