@@ -248,7 +248,8 @@ def contradicts(K: Balance, y: Any, m: int, what: int) -> bool:
     Next to a singular configuration a row may be as short as its distance from there: what such errors leave of it is
     much of its own terms, but little of those of the rows beside it. So each row is judged by the largest terms of all
     rows of its unit, those of the velocities y included where they are what is corrected. Where positions are, Newton's
-    iteration ends in round-off, in which dependent rows agree no longer.
+    iteration ends in round-off, in which dependent rows agree no longer; nor do accelerations of what cannot move,
+    in the round-off of those that the forces alone, or a stop within a step, would make.
     """
     n = K.n
     for unit in range(3):
@@ -260,13 +261,17 @@ def contradicts(K: Balance, y: Any, m: int, what: int) -> bool:
             if K.row_unit[row] == unit:
                 missed = K.bias[row]
                 terms = abs(missed)
+                free = 0.0
                 for j in range(n):
                     slope = K.acc[K.acc_B + row * n + j]
                     missed += slope * K.jump[j]
                     terms += abs(slope * K.jump[j])
                     terms += abs(slope * y[j]) if what == VELOCITIES else 0.0
+                    if what == OWN_TERMS and j < K.n_v and K.dt > 0.0 and K.acc[j * n + j] > 0.0:
+                        free += abs(slope) * (abs(K.force[j]) / K.acc[j * n + j] + abs(K.y[j]) / K.dt)
                 worst = max(worst, abs(missed))
                 size = max(size, terms)
+                round_off = max(round_off, ROUND_OFF_RTOL * free)
                 if what == POSITIONS:
                     round_off = max(round_off, ROW_RTOL * max(K.scale[n + row], 1e-3))
         if worst > COMPATIBILITY_RTOL * size + round_off:
