@@ -49,16 +49,15 @@ def added(name: str, *losses: Loss | None) -> Loss | None:
     return total
 
 
-def constrain_stop(model: Description, name: str, measure: Measure, stop: Stop) -> None:
-    """Add a penalty contact, where there is a stop."""
-    if stop is None:
-        return
+def constrain_stop(model: Description, name: str, measure: Measure, stop: Stop, what: str = "stop") -> None:
+    """Add the penalty contact '<name> <what>'."""
     if not isinstance(stop, Mapping):
-        raise ModelError(f"stop of '{name}' is a dictionary of arguments of mbd.Penalty, got {stop!r}")
+        raise ModelError(f"{what} of '{name}' is a dictionary of arguments of mbd.Penalty, got {stop!r}")
     try:
-        model.constrain(Penalty(f"{name} stop", measure, **stop))
+        model.constrain(Penalty(f"{name} {what}", measure, **stop))
     except TypeError as error:
-        raise ModelError(f"stop of '{name}': {error}; give arguments of mbd.Penalty such as stiffness=1300.0") from None
+        text = f"{what} of '{name}': {error}; give arguments of mbd.Penalty such as stiffness=1300.0"
+        raise ModelError(text) from None
 
 
 def sizes(part: str, **values: Any) -> tuple[float, ...]:

@@ -188,7 +188,12 @@ WRONG = [
     (lambda m, a, b: parts.pneumatic_knee(m, "knee", a, b, volume=1e-4, swept=1e-5, exponent=1.0), "above 1"),
     (lambda m, a, b: parts.magnetorheological_knee(m, "k", a, b, torques={}, viscous=1.0, foot="f"), "stance flexion"),
     (lambda m, a, b: parts.tabulated_ankle(m, "ankle", a, b, angle=[0.0, 0.0], torque=[0.0, 1.0]), "must increase"),
-    (lambda m, a, b: parts.bumper_ankle(m, "ankle", a, b, heel=3.0, toe={}), "heel of bumper_ankle"),
+    (lambda m, a, b: parts.bumper_ankle(m, "ankle", a, b, heel=3.0, toe={}), "heel bumper of 'ankle' is a dictionary"),
+    (lambda m, a, b: parts.bumper_ankle(m, "ankle", a, b, heel=None, toe={}), "heel bumper of 'ankle' is a dictionary"),
+    (
+        lambda m, a, b: parts.bumper_ankle(m, "ankle", a, b, heel={"stifness": 1.0}, toe={}),
+        "heel bumper of 'ankle': .*stifness.*; give arguments of mbd.Penalty",
+    ),
     (lambda m, a, b: parts.elastic_socket(m, "fit", a, b, stiffness=3.0, damping=1.0), "stiffness"),
     (lambda m, a, b: parts.passive_moment(m, "l", mbd.Revolute("k", a, b), of="toe"), "knee"),
     (lambda m, a, b: parts.person(70.0, 1.75, "winter"), "Winter"),

@@ -7,11 +7,9 @@ from typing import Any
 
 from mbd.bodies.base import Frame
 from mbd.constraints.measures import extension, flexion
-from mbd.constraints.penalty import Penalty
-from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss
 from mbd.joints.revolute import Revolute
-from mbd.parts.arguments import between, check
+from mbd.parts.arguments import between, check, constrain_stop
 from mbd.topology.description import Description
 
 __all__ = ["bumper_ankle"]
@@ -51,7 +49,5 @@ def bumper_ankle(
     ankle = Revolute(name, shank, foot, loss=loss, anatomy=anatomy)
     model.connect(ankle)
     for end, how, room in ("heel", heel, extension(ankle, -clearance)), ("toe", toe, flexion(ankle, -clearance)):
-        if not isinstance(how, Mapping):
-            raise ModelError(f"{end} of bumper_ankle '{name}' is a dictionary of arguments of mbd.Penalty, got {how!r}")
-        model.constrain(Penalty(f"{name} {end} bumper", room, **how))
+        constrain_stop(model, name, room, how, f"{end} bumper")
     return ankle

@@ -133,7 +133,8 @@ def four_bar_knee(
         )
     bend = measure(_sum, joints["front lower"], joints["front upper"], unit="rad")
     model.observe(f"{name} flexion", bend)
-    constrain_stop(model, name, bend, stop)
+    if stop is not None:
+        constrain_stop(model, name, bend, stop)
     return bend
 
 

@@ -44,5 +44,6 @@ def stop_knee(
     between("stop_knee", name, thigh=thigh, shank=shank)
     knee = Revolute(name, thigh, shank, loss=loss, stiffness=stiffness, rest=rest, anatomy=anatomy)
     model.connect(knee)
-    constrain_stop(model, name, flexion(knee), stop)
+    if stop is not None:
+        constrain_stop(model, name, flexion(knee), stop)
     return knee
