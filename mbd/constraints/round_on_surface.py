@@ -23,7 +23,7 @@ from mbd.bodies.scope import Scope, Triple
 from mbd.constraints.surfaces import Surface
 from mbd.equal import NOMINAL_RTOL
 from mbd.tape.derivatives import substitute
-from mbd.tape.functions import cos, settled, sin, sqrt, where
+from mbd.tape.functions import cos, sin, sqrt, where
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["NO_CONTACT_POINT", "ball_on", "edge_on"]
@@ -69,7 +69,6 @@ def ball_on(surface: Surface, center: Triple, radius: Scalar, scope: Scope) -> t
     heights = Heights(surface, scope)
     x, z = center[0], center[2]
     for _ in range(NEWTON_STEPS):
-        x, z = settled(x), settled(z)
         missed, bend = _off_center(heights, center, radius, x, z)
         (a, b), (c, d) = bend
         size = a * d - b * c
@@ -119,7 +118,6 @@ def edge_on(surface: Surface, center: Triple, axle: Triple, radius: Scalar, scop
 
     angle: Scalar = 0.0
     for _ in range(NEWTON_STEPS):
-        angle = settled(angle)
         _, _, first, second, _ = lower(angle)
         angle = angle - first / second
     arm, height, first, second, steep = lower(angle)

@@ -12,7 +12,8 @@ from mbd.tape.node import Node, Scalar, Tape
 __all__ = ["magnitudes", "of_directions"]
 
 MAX_SUM_RATIO = 16.0
-"""How far the sum of the terms of a force may lie above the root of their squares: as far as 256 equal ones do."""
+"""How far the sum of the terms of a force may lie above the root of their squares, and that above the largest of them:
+as far as those of 256 equal ones do."""
 MIN_SINE = 0.1
 """Share of its amplitude that a sine has at least: round-off of its argument when it vanishes."""
 
@@ -35,7 +36,7 @@ def of_directions(values: Iterable[Scalar]) -> dict[int, float]:
 
 
 def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] | None = None) -> list[Node]:
-    """Σ|terms| through sums and products, bounded by `MAX_SUM_RATIO` times their root of squares.
+    """Σ|terms| through sums and products, bounded by their root of squares and by the largest of them.
 
     Where a vector is turned, Σ|terms| of its components is up to √2 times as long as the vector, and in recursions up
     and down a chain of n links this grows like 2ⁿ: beyond some twenty links every residual would pass for round-off.
@@ -43,15 +44,20 @@ def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] |
 
     So it is with sines, whose terms are not looked at. Elements of a rotation made from a quaternion are sums of
     products themselves, by whose terms a vector would grow by a half or more with each turn: 1000 times in a chain of
-    three ball joints. Iterates that later ones correct count with their size (`mbd.tape.functions.settled`).
+    three ball joints.
+
+    Sum and squares multiply the terms of factors, so that in iterations each step raises the terms of the one before to
+    powers, though it corrects them: ten steps of Newton's method in a user's force counted 10³⁰⁰ times its size. The
+    largest term has the factors that lead to it, to first order, which is what its round-off is multiplied by.
 
     Parameters
     ----------
     known : the amplitudes of nodes that count as sines do, by their numbers (see `of_directions`)
     """
     bounds = known or {}
-    sums, squares = _sums(tape, outputs, bounds), _squares(tape, outputs, bounds)
-    return [minimum(s, MAX_SUM_RATIO * sqrt(q)) for s, q in zip(sums, squares, strict=True)]
+    sums, squares, largest = (each(tape, outputs, bounds) for each in (_sums, _squares, _largest))
+    found = zip(sums, squares, largest, strict=True)
+    return [minimum(minimum(s, MAX_SUM_RATIO * sqrt(q)), MAX_SUM_RATIO * MAX_SUM_RATIO * m) for s, q, m in found]
 
 
 def _sums(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> list[Node]:
@@ -65,8 +71,6 @@ def _sums(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> li
         parts = [size[arg.index] for arg in node.args]
         if node.index in known:
             size[node.index] = tape.constant(known[node.index])
-        elif node.index in node.tape.settled:
-            size[node.index] = abs(node)
         elif node.op in ("add", "sub"):
             size[node.index] = parts[0] + parts[1]
         elif node.op in ("mul", "div"):
@@ -87,8 +91,6 @@ def _squares(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) ->
         parts = [size[arg.index] for arg in node.args]
         if node.index in known:
             size[node.index] = node * node + (MIN_SINE * known[node.index]) ** 2
-        elif node.index in node.tape.settled:
-            size[node.index] = node * node
         elif node.op in ("add", "sub"):
             size[node.index] = maximum(parts[0] + parts[1], node * node)
         elif node.op in ("mul", "div"):
@@ -100,6 +102,28 @@ def _squares(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) ->
             size[node.index] = node * node + _amplitude(node) ** 2
         else:
             size[node.index] = parts[0] if node.op == "neg" else node * node
+    return [size[node.index] for node in outputs]
+
+
+def _largest(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> list[Node]:
+    """The largest term times the factors on its way to the output, max |∂output/∂term · term| over terms and ways."""
+    size: dict[int, Node] = {}
+    for node in live(outputs):
+        parts = [size[arg.index] for arg in node.args]
+        if node.index in known:
+            size[node.index] = tape.constant(known[node.index])
+        elif node.op in ("add", "sub"):
+            size[node.index] = maximum(parts[0], parts[1])
+        elif node.op == "mul":
+            size[node.index] = maximum(parts[0] * abs(node.args[1]), parts[1] * abs(node.args[0]))
+        elif node.op == "div":
+            size[node.index] = maximum(parts[0], parts[1] * abs(node)) / abs(node.args[1])
+        elif node.op in ("sin", "cos", "tanh"):
+            size[node.index] = tape.one
+        elif node.op == "table":
+            size[node.index] = abs(node) + _amplitude(node)
+        else:
+            size[node.index] = parts[0] if node.op == "neg" else abs(node)
     return [size[node.index] for node in outputs]
 
 

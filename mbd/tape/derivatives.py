@@ -152,7 +152,7 @@ class Sweeps:
 
 def _push_forward(tape: Tape, order: Sequence[Node], dots: dict[int, Node]) -> None:
     """Fill `dots`, which holds the derivatives of some nodes by their index, for all nodes in `order`."""
-    zero, mul, get, settled = tape.zero, tape.mul, dots.get, tape.settled
+    zero, mul, get = tape.zero, tape.mul, dots.get
     for node in order:
         args, index = node.args, node.index
         if len(args) == 2:
@@ -180,8 +180,6 @@ def _push_forward(tape: Tape, order: Sequence[Node], dots: dict[int, Node]) -> N
             dot = tape.where(args[0], zero if da is None else da, zero if db is None else db)
         if dot is not zero:
             dots[index] = dot
-            if index in settled and dot.args:
-                settled.add(dot.index)
 
 
 def _binary_dot(tape: Tape, node: Node, a: Node, b: Node, da: Node, db: Node) -> Node:
@@ -233,8 +231,6 @@ def vjp(outputs: Sequence[Node], adjoints: Sequence[Scalar], inputs: Sequence[No
     for node in reversed(order):
         bar = bars.get(node.index)
         if bar is not None and node.index not in wanted and node.args and node.op not in _FLAT:
-            if node.index in tape.settled and bar.args:
-                tape.settled.add(bar.index)
             _push_back(tape, node, bar, depends, push)
     return [bars.get(node.index, tape.zero) for node in inputs]
 
@@ -323,9 +319,7 @@ def substitute(outputs: Sequence[Node], replacements: Mapping[Node, Scalar], tap
     new: dict[int, Node] = {node.index: target.lift(value) for node, value in replacements.items()}
     for node in live(outputs, new):
         if node.index not in new:
-            made = new[node.index] = rebuild(target, node, [new[arg.index] for arg in node.args])
-            if node.index in node.tape.settled and made.args:
-                target.settled.add(made.index)
+            new[node.index] = rebuild(target, node, [new[arg.index] for arg in node.args])
     return [new[node.index] for node in outputs]
 
 

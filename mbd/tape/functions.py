@@ -11,8 +11,7 @@ from mbd.tape.node import BINARY, UNARY, Node
 
 __all__ = [
     "NUMPY", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp", "floor", "hypot", "log", "maximum",
-    "minimum", "mod", "on_numpy", "on_numpy_function", "pi", "settled", "sign", "sin", "sinh", "sqrt", "tan", "tanh",
-    "where",
+    "minimum", "mod", "on_numpy", "on_numpy_function", "pi", "sign", "sin", "sinh", "sqrt", "tan", "tanh", "where",
 ]  # fmt: skip
 
 _ARRAY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "min": "minimum", "max": "maximum"}
@@ -116,20 +115,6 @@ def mod(x: Any, y: Any) -> Any:
     (1.5, 1.5)
     """
     return x % y
-
-
-def settled(x: Any) -> Any:
-    """An iterate of Newton's method that is written out, which the next one corrects; x itself.
-
-    Its round-off, and that of its derivatives, is that of its size: what the terms of the iterates before lost, the
-    correction finds. Counted by all terms, a result would pass for round-off after few iterations.
-
-    >>> settled(0.5)
-    0.5
-    """
-    if isinstance(x, Node) and x.args:
-        x.tape.settled.add(x.index)
-    return x
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:

@@ -191,8 +191,6 @@ class Tape:
         self._tables: dict[tuple[float, ...], Table] = {}
         self.phases: dict[int, tuple[Node, float, float]] = {}
         """Nodes that `phase` made, by number: what they are a phase of, where its cycle starts, and the period."""
-        self.settled: set[int] = set()
-        """Numbers of iterates, which later ones correct, and of their derivatives: see `mbd.tape.functions.settled`."""
         self._known: dict[Hashable, Node] = {}
         self._numbers: dict[float, Node] = {}
         self.zero = self.constant(0.0)

@@ -10,7 +10,6 @@ from mbd.equations.magnitudes import MAX_SUM_RATIO, magnitudes
 from mbd.equations.programs import accelerations, scales
 from mbd.tape.derivatives import gradient, jvp, substitute
 from mbd.tape.evaluate import evaluate
-from mbd.tape.functions import settled
 from mbd.tape.node import Tape
 from mbd.testing import check_model, trees
 from tests.equations.mechanisms import four_bar, furnished, leg, random_tree, walker
@@ -144,23 +143,44 @@ def test_coordinates_may_be_shared_between_chart_and_increment(equations):
 @given(value=st.floats(0.1, 10.0), steps=st.integers(8, 20))
 def test_round_off_does_not_grow_with_the_iterations_of_newtons_method(value, steps):
     """Of a cube root, its derivatives forward and backward, and those after a substitution."""
+    tape = Tape()
+    x, z = tape.input("q", 0), tape.input("q", 1)
+    found = 0.5 * (1.0 + x)
+    for _ in range(steps):
+        found = found - (found * found * found - x) / (3.0 * found * found)
+    every = [found, *jvp([found], {x: 1.0}), *gradient(found, [x]), *substitute([found], {x: 1.0 * z})]
+    at_value = {("q", 0): value, ("q", 1): value}
+    sizes, values = evaluate(magnitudes(tape, every), at_value), evaluate(every, at_value)
+    exact, slope = value ** (1 / 3), value ** (-2 / 3) / 3
+    np.testing.assert_allclose(values, [exact, slope, slope, exact], rtol=1e-9)
+    assert max(np.array(sizes) / values) <= 16.0 * MAX_SUM_RATIO**2
 
-    def root(x, kept):
-        y = 0.5 * (1.0 + x)
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.Newmark(), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+@pytest.mark.parametrize("steps", [10, 30])
+def test_a_force_that_iterates_moves_as_the_one_that_it_solves_for(scheme, steps):
+    """``T + 0.3 T³ = c(q, v)`` by Newton's method, and by Cardano's formula, in a joint that sticks and slips."""
+
+    def wanted(q, v):
+        return -20.0 * (q - 1.0) - 3.0 * v
+
+    def iterated(q, v):
+        torque = 0.1 * wanted(q, v)
         for _ in range(steps):
-            y = kept(y)
-            y = y - (y * y * y - x) / (3.0 * y * y)
-        return y
+            torque = torque - (torque + 0.3 * torque**3 - wanted(q, v)) / (1.0 + 0.9 * torque * torque)
+        return torque
 
-    ratios = []
-    for kept in settled, lambda y: y:
-        tape = Tape()
-        x, z = tape.input("q", 0), tape.input("q", 1)
-        found = root(x, kept)
-        every = [found, *jvp([found], {x: 1.0}), *gradient(found, [x]), *substitute([found], {x: 1.0 * z})]
-        at_value = {("q", 0): value, ("q", 1): value}
-        sizes, values = evaluate(magnitudes(tape, every), at_value), evaluate(every, at_value)
-        exact, slope = value ** (1 / 3), value ** (-2 / 3) / 3
-        np.testing.assert_allclose(values, [exact, slope, slope, exact], rtol=1e-9)
-        ratios.append(np.array(sizes) / values)
-    assert max(ratios[0]) < 20.0 and min(ratios[1]) > max(ratios[0])
+    def solved(q, v):
+        x = 1.5 * 0.9**0.5 * wanted(q, v)
+        return 2.0 / 0.9**0.5 * mbd.sinh(mbd.log(x + mbd.sqrt(x * x + 1.0)) / 3.0)
+
+    ends = []
+    for law in iterated, solved:
+        model, rod = mbd.Model("arm"), mbd.Link("rod", mass=2.0, length=0.4, center=0.2, inertia=0.03)
+        pin = mbd.Revolute("pin", model.ground.origin, rod.start, loss=mbd.Coulomb(0.05))
+        model.connect(pin)
+        model.apply(mbd.Motor("drive", pin, law, arguments=["pin.angle", "pin.rate"]))
+        run = mbd.simulate(model, mbd.assemble(model, {"pin.angle": -0.5}), scheme, dt=2e-3, until=1.5)
+        ends.append(([event.kind for event in run.events], run["pin.angle"][-1], run["pin.rate"][-1]))
+    assert ends[0][0] == ends[1][0] == ["slipped"] * 3
+    np.testing.assert_allclose(ends[0][1:], ends[1][1:], atol=1e-6)

@@ -10,7 +10,7 @@ from typing import Any
 
 from mbd.forces.muscles.bezier import corner, curve
 from mbd.forces.samples import Samples
-from mbd.tape.functions import cosh, exp, log, minimum, settled, sign, sinh, sqrt
+from mbd.tape.functions import cosh, exp, log, minimum, sign, sinh, sqrt
 
 __all__ = ["CURVES", "Curves", "DeGrooteFregly", "Millard"]
 
@@ -106,7 +106,6 @@ class DeGrooteFregly(Curves):
         u = sign(S) * minimum(size / (P + Q), _asinh(size / Q))
         # corrections after which the velocity of a fiber is exact to 1e-15 for every damping > 0 and activation
         for _ in range(4):
-            u = settled(u)
             bend = Q * sinh(u)
             off, slope = P * u + bend - S, P + Q * cosh(u)
             u = u - 2.0 * off * slope / (2.0 * slope * slope - off * bend)
@@ -183,7 +182,6 @@ class Millard(Curves):
         """Newton's method from rest, where the curve bends the other way, so that it converges from everywhere."""
         slope, v = _slope_of(self._speed), 0.0 * force
         for _ in range(NEWTON_STEPS):
-            v = settled(v)
             v = v - (active * self.speed(v) + damping * v - force) / (active * slope(v) + damping)
         return v
 
