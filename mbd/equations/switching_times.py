@@ -312,9 +312,9 @@ class _Times:
             return times
         node, shift = switch.node, 1e-6 * np.maximum(np.abs(times), self.dt)
         parts = node.args if node.op in ("lt", "le", "min", "max") else _terms(switch.expression)
-        size = sum(np.abs(self.at(part, times)) for part in parts)
-        if node.op == "table" and (phase := node.tape.phases.get(node.args[0].index)):
-            size = size + abs(phase[1]) + phase[2]
+        phase = node.tape.phases.get(node.args[0].index) if node.op == "table" else None
+        own = 0.0 if phase is None else abs(phase[1]) + phase[2]
+        size = own + sum(np.abs(self.at(part, times)) for part in parts)
         change = np.abs(self.at(switch.expression, times + shift) - self.at(switch.expression, times - shift))
         with np.errstate(all="ignore"):
             margin = ROUND_OFF * size * 2.0 * shift / change

@@ -50,7 +50,8 @@ class Applied(OfQuantities, Force):
     by : name of a mode, whose states have forces and torques of their own: ``force={"thrust": (0, 9.0)}, by="phase"``
     axes : the frame along whose axes the components lie, of any body; None: along those of the ground
 
-    Numbers are the run-time parameters 'name.force.x', 'name.torque.z', …
+    Numbers are the run-time parameters 'name.force.x', 'name.torque.z', … Results are 'name.force' [N] and
+    'name.torque' [N m], the components as they are given, along those axes.
     """
 
     name: str
@@ -106,7 +107,7 @@ class Applied(OfQuantities, Force):
         return Action(pairs=tuple(pairs))
 
     def results(self) -> dict[str, Result]:
-        """'force' and 'torque', those that it has."""
+        """'force' and 'torque', those that it has, along the axes in which they are given."""
         fields = [field for field in ("force", "torque") if getattr(self, field) is not None]
         return {field: Result(partial(self._component, field), is_vector=True) for field in fields}
 

@@ -40,7 +40,7 @@ class Action:
 
 
 class Result(NamedTuple):
-    """A result of a force: its value, traced as it is asked for, and whether it is a vector in ground axes."""
+    """A result of a force: its value, traced as it is asked for, and whether it has the components x, y and z."""
 
     value: Callable[[Scope], Scalar | Sequence[Scalar]]
     is_vector: bool = False

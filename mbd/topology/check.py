@@ -15,6 +15,7 @@ from mbd.bodies.point_mass import PointMass
 from mbd.errors import MbdError, ModelError, nearest
 from mbd.forces.base import Force
 from mbd.forces.quantities import INCREMENT_PREFIX
+from mbd.forces.rotor import Rotor
 from mbd.joints.base import Joint
 from mbd.joints.named_angles import orientation_names
 from mbd.joints.screw import Screw
@@ -452,9 +453,10 @@ def _tilts(joint: Joint) -> bool:
 
 
 def _bound(model: Description) -> set[str]:
-    """Bodies and joints that constraints refer to, by objects or by the names of quantities."""
+    """Joints with armature, and bodies and joints that constraints refer to, by objects or by names of quantities."""
     mentions = [mention for word in model.constraints for mention in word.mentions()]
     found = {each.body.name if isinstance(each, Frame) else each.name for each in mentions if not isinstance(each, str)}
+    found |= {force.joint.name for force in model.forces if isinstance(force, Rotor)}
     named = {each for each in mentions if isinstance(each, str)}
     if named:
         found |= {joint.name for joint in model.joints if any(each.startswith(f"{joint.name}.") for each in named)}

@@ -91,3 +91,19 @@ def test_computed_torque_knows_the_rotors():
     model.apply(mbd.Motor("drive", pin, torque=lambda M, h: 3.0 * M[0][0] + h[0], arguments=arguments))
     run = mbd.simulate(model, mbd.assemble(model), mbd.RungeKutta4(), dt=0.01, until=0.2)
     np.testing.assert_allclose(run["pin.acceleration"], 3.0, rtol=1e-12)
+
+
+def test_armature_alone_moves_a_body_without_mass_and_none_is_an_error() -> None:
+    for inertia in (0.5, 0.0):
+        model, point = mbd.Model("slider", gravity=(0.0, 0.0, 0.0)), mbd.PointMass("point", mass=0.0)
+        rail = mbd.Prismatic("rail", model.ground.origin, point.origin, stiffness=10.0)
+        model.connect(rail)
+        model.apply(mbd.Rotor("rotor", rail, inertia, 2.0))
+        assert model.check() == []
+        if inertia:
+            start = mbd.assemble(model, {"rail.displacement": 1.0})
+            run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.5)
+            np.testing.assert_allclose(run["rail.displacement"], np.cos(np.sqrt(5.0) * run.time), atol=1e-12)
+        else:
+            with pytest.raises(mbd.AssemblyError, match=r"nothing determines the motion of 'rail.displacement'"):
+                mbd.assemble(model, {"rail.displacement": 1.0})
