@@ -233,13 +233,21 @@ class _AsItIs(Reader):
             return f"{kind.__name__} {id(item)}", self.of_object(item)
 
     def of_object(self, item: Any) -> list[Any]:
-        """The code of a class of a user's, and what functions read of an object, a class or a module."""
+        """What functions read of an object, a class or a module; of a user's object the methods that they call, too.
+
+        Of a word, which the library calls, all methods.
+        """
         own = [kind for kind in type(item).__mro__ if not isinstance(item, type) and not _is_installed(kind.__module__)]
-        methods = [each for kind in own for each in vars(kind).values() if isinstance(each, types.FunctionType)]
-        for method in methods:
-            self.know(method)
+        methods = {
+            name: each for kind in own[::-1] for name, each in vars(kind).items() if type(each) is types.FunctionType
+        }
+        is_word, read = callable(getattr(item, "mentions", None)), list[Any]()
+        while asked := [name for name in methods if is_word or name in self.names or name == "__call__"]:
+            for name in asked:
+                read.append(methods.pop(name))
+                self.know(read[-1])
         held = getattr(item, "__dict__", {})
-        return [*methods, *(part for name in sorted(self.names & held.keys()) for part in (name, held[name]))]
+        return [*read, *(part for name in sorted(self.names & held.keys()) for part in (name, held[name]))]
 
     def know(self, function: types.FunctionType) -> None:
         """Note which attributes a function may ask for."""

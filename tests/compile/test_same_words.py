@@ -201,6 +201,22 @@ class Pull(mbd.forces.Force):
         return mbd.forces.Action(pairs=((rate, self.size),))
 
 
+class Holder:
+    """An object one of whose methods is a law, and another one keeps runs."""
+
+    def __init__(self) -> None:
+        self.size, self.runs = 2.0, list[Any]()
+
+    def torque(self, t: Any) -> Any:
+        return self.half() * 2.0 * mbd.sin(t)
+
+    def half(self) -> float:
+        return 0.5 * self.size
+
+    def keep(self, run: Any) -> None:
+        self.runs.append(run)
+
+
 def _laws_that_change() -> Iterator[tuple[str, Any, Any]]:
     """(what changes, a law of size 2, what makes its size 3)."""
     numbers, table, array = [2.0], {"size": 2.0}, np.array([1.0, 2.0])
@@ -272,6 +288,13 @@ def test_what_runs_call_and_what_no_law_reads_leaves_equations_as_they_are(monke
     angle = mbd.measure(lambda q: q - 0.05, "hinge.angle", unit="rad")
     model.constrain(mbd.Event("passing", angle, direction=0, reset=lambda v: log.append(1.0) or {}))
     first = mechanism_of(model)
+    holder = Holder()
+    drive = rod(holder.torque)
+    made = mechanism_of(drive)
+    holder.runs.append(np.zeros(3))  # what other methods keep
+    assert mechanism_of(drive) is made
+    holder.size = 3.0
+    assert mechanism_of(drive) is not made
     monkeypatch.setitem(globals(), "sin", 2.0)  # the name of an attribute that the law asks mbd for
     log.append(0.0)
     assert mechanism_of(model) is first
