@@ -102,7 +102,7 @@ def speed_round_off(K: Motion, row: int) -> float:
         mass = abs(K.acc[i * n + i])
         if slope > 0.0 and 2.0 * slope * slope * energy > speed * speed * mass and mass > 0.0:
             speed = slope * sqrt(2.0 * energy / mass)
-    return ROUND_OFF_RTOL * speed
+    return float(ROUND_OFF_RTOL * speed)
 
 
 def load_accepted(K: Equations) -> None:

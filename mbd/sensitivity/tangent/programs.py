@@ -138,9 +138,9 @@ def _made(
         columns.append(column)
     entries = iter(substitute([entry for column in columns for entry in column], system.known))
     lines = [tape.zero for _ in outputs]
-    for k, column in enumerate(columns):
+    for k, each_column in enumerate(columns):
         lane = tape.input("lane", k)
-        for line in range(len(column)):
+        for line in range(len(each_column)):
             lines[line] = lines[line] + next(entries) * lane
     load = partial(_loaded, mechanism) if mechanism.backend.name == "llvm" else None
     answer = answer_of(lines if system.answer is None else system.answer(lines), own, first, load)
