@@ -66,8 +66,8 @@ def without_pins(model: Any) -> tuple[Any, tuple[Pin, ...]]:
                 f"coordinates; leave it out by model.without('{joint.name} loss')"
             )
         pins += [Pin(joint.name, owner, part) for owner, part in own if isinstance(part, PinFriction)]
-        rest: tuple[Any, ...] = tuple(part for _, part in parts if part not in [pin for _, pin in own])
-        left = None if not rest else rest[0] if len(rest) == 1 else LossSum(rest)
+        rest = [(owner.removeprefix(f"{joint.name} loss."), part) for owner, part in parts if (owner, part) not in own]
+        left = LossSum(tuple(part for _, part in rest), tuple(name for name, _ in rest)) if rest else None
         bare.append(replace(joint, loss=left) if own else joint)
     other = copy.copy(model)
     other.joints = bare

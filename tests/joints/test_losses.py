@@ -112,3 +112,11 @@ def test_equal_valves_with_memory_are_one_loss():
 def test_valves_of_unlike_memories_are_refused(backward, forward):
     with pytest.raises(ModelError, match="share one deflection"):
         mbd.Valves(backward, forward)
+
+
+def test_what_is_left_of_a_sum_keeps_the_names_of_its_parts():
+    """The second of two alike was called as the first one, and read its parameters."""
+    whole = mbd.Coulomb(2.0) + mbd.Coulomb(0.5, smoothing=0.1) + mbd.Viscous(1.0)
+    left = whole.smooth
+    assert len(left.losses) == 2
+    assert left.parameters("knee loss").items() <= whole.parameters("knee loss").items()

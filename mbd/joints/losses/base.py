@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from typing import Any, TypeAlias
 
 from mbd.bodies.algebra import derivatives_at
@@ -89,6 +90,11 @@ class Loss(ABC):
         """Whether a part of it truly sticks."""
         return self.smooth is not self
 
+    @property
+    def is_directed(self) -> bool:
+        """Whether ``F(−v) = −F(v)`` does not hold, so that it needs a direction that is positive."""
+        return False
+
     def domains(self) -> dict[str, Domain]:
         """Domains of its fields: all of them ≥ 0, unless a loss says otherwise."""
         return dict.fromkeys(self.fields(), DISSIPATES)
@@ -139,12 +145,15 @@ class LossSum(Loss):
     """
 
     losses: tuple[Loss, ...]
+    names: tuple[str, ...] = field(default=(), repr=False)
 
     def named(self, owner: str) -> list[tuple[str, Loss]]:
-        """Each part with the owner of its parameters."""
-        kinds = [loss.kind for loss in self.losses]
-        counts = [kinds[: k + 1].count(kind) for k, kind in enumerate(kinds)]
-        names = [kind if count == 1 else f"{kind} {count}" for kind, count in zip(kinds, counts, strict=True)]
+        """Each part with the owner of its parameters; what is left of a sum has the names that it had there."""
+        names = self.names
+        if not names:
+            kinds = [loss.kind for loss in self.losses]
+            counts = [kinds[: k + 1].count(kind) for k, kind in enumerate(kinds)]
+            names = tuple(kind if count == 1 else f"{kind} {count}" for kind, count in zip(kinds, counts, strict=True))
         return [(f"{owner}.{name}", loss) for name, loss in zip(names, self.losses, strict=True)]
 
     def force(self, rate: Scalar, scope: Scope, owner: str) -> Scalar:
@@ -186,8 +195,13 @@ class LossSum(Loss):
     @property
     def smooth(self) -> Loss | None:
         """Those of its parts that are smooth, with the names of their parameters."""
-        parts = tuple(part for loss in self.losses if (part := loss.smooth) is not None)
-        return LossSum(parts) if parts else None
+        parts = [(name[1:], part) for name, loss in self.named("") if (part := loss.smooth) is not None]
+        return LossSum(tuple(part for _, part in parts), tuple(name for name, _ in parts)) if parts else None
+
+    @property
+    def is_directed(self) -> bool:
+        """Whether one of its parts is."""
+        return any(loss.is_directed for loss in self.losses)
 
     @property
     def sticks(self) -> bool:

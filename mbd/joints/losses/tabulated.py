@@ -58,6 +58,12 @@ class Tabulated(Loss):
             faults.append(f"'{owner}': its rates have one sign only; give the torque at rates of both signs")
         return faults
 
+    @property
+    def is_directed(self) -> bool:
+        """Unless each point stands with both signs."""
+        points = {(v, F) for v, F in zip(self.rate, self.torque, strict=True)}
+        return points != {(-v, -F) for v, F in points}
+
     def pieces(self) -> Pieces:
         """Breaks and rows of coefficients as the tape stores them."""
         points = dict(zip(self.rate, self.torque, strict=True)) | ({} if 0.0 in self.rate else {0.0: 0.0})

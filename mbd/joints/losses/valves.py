@@ -88,6 +88,11 @@ class Valves(Loss):
         """Whether one of both does."""
         return any(loss.has_states for loss in self.parts().values())
 
+    @property
+    def is_directed(self) -> bool:
+        """Unless both directions have one loss."""
+        return self.forward != self.backward or self.forward.is_directed
+
     def fields(self) -> dict[str, float]:
         """Those of both: 'backward.coefficient', 'forward.coefficient'."""
         return {
