@@ -188,11 +188,15 @@ class Run(RunData):
         return self._finish()
 
     def _finish(self) -> tuple[str, str]:
-        """Store the row after the event that ends the run."""
-        save(self)
-        status = call(self, self.now, np.inf)
-        self.collect()
-        if status not in (codes.DONE, codes.EVENT, codes.NEW_MODE):
+        """Store the row after the event that ends the run, and take others that happen at the same instant."""
+        status = codes.EVENT
+        while status == codes.EVENT:
+            save(self)
+            known = len(self.events)
+            status = call(self, self.now, np.inf)
+            self.collect()
+            self._react(self.events[known:])
+        if status not in (codes.DONE, codes.NEW_MODE):
             return self._explained(status), ""
         return "", f"ended by {self.ended!r} at t = {self.now:.6g} s"
 

@@ -27,10 +27,13 @@ __all__ = [
     "is_at_event",
     "keep_at_zero",
     "log_crossings",
+    "next_crossing",
     "settle_sides",
     "striking_contact",
 ]
 
+AWAITS_EVENT = 2
+"""Of K.passing: the guard is at zero at the event of another one, and has its own next."""
 REACH_SHARE = 1e-3
 """Part of a step within which a guard must reach zero at its rate, for its round-off to be looked at [-]."""
 REST_RATE_RTOL = 1e-10
@@ -40,16 +43,39 @@ RESET_ROUND_OFFS = 2.0**20
 
 
 def find_crossings(K: Switching) -> None:
-    """Mark the guards that cross zero at the event just found, with their values and rates, before it does anything."""
+    """Mark the guards that cross zero at the event just found, with their values and rates, before it does anything.
+
+    Those that a guard's event finds at zero have events of their own, one after the other (`next_crossing`).
+    """
     kind = K.event_kind
+    if kind == CROSS and K.passing[K.event_index] == AWAITS_EVENT:
+        K.passing[K.event_index] = 1
+        return
     for e in range(K.n_guards):
         K.passing[e] = 0
     if kind == CROSS or kind == CROSS_BACK:
         mark(K, K.event_index)
+        for e in range(K.n_guards if is_observed(K, K.event_index) else 0):
+            if e != K.event_index and is_observed(K, e) and reaches_zero(K, e):
+                mark(K, e)
+                K.passing[e] = AWAITS_EVENT
     elif kind == STICK or (kind == CLOSE and K.kind[K.event_index] == 0):
         for e in range(K.n_guards):
             if reaches_zero(K, e):
                 mark(K, e)
+
+
+def is_observed(K: Events, e: int) -> bool:
+    """Whether guard e is that of an event of its own: of no transition, and of no force that bends there."""
+    return bool(K.guard_kink[e] == 0 and (K.n_machines == 0 or K.guard_machine[e] < 0))
+
+
+def next_crossing(K: Events) -> int:
+    """A guard that was at zero at the event of another one, and has not had its own yet; −1: none."""
+    for e in range(K.n_guards):
+        if K.passing[e] == AWAITS_EVENT:
+            return e
+    return -1
 
 
 def mark(K: Events, e: int) -> None:
@@ -128,8 +154,8 @@ def log_crossings(K: Switching) -> None:
 
 
 def settle_sides(K: Switching) -> None:
-    """The sides of the guards that have crossed at this instant, after impact, reset and restart."""
-    for e in range(K.n_guards):
+    """The sides of the guards that have crossed at this instant, after all impacts, resets and restarts of it."""
+    for e in range(K.n_guards if next_crossing(K) < 0 else 0):
         if K.passing[e] == 0:
             continue
         K.passing[e] = 0

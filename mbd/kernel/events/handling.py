@@ -100,7 +100,7 @@ def update_other_sides(K: Switching) -> None:
     """Users' guards that have gone back before this event may fire again; those that are zero at it stay as is."""
     fired = K.event_index if K.event_kind == CROSS or K.event_kind == CROSS_BACK else -1
     for e in range(K.n_guards):
-        if e != fired and not is_at_event(K, e):
+        if e != fired and K.passing[e] == 0 and not is_at_event(K, e):
             update_side(K, e)
 
 
@@ -129,7 +129,7 @@ def handle_event(K: Kernel) -> int:
     if kind == CROSS or kind == CROSS_BACK:
         unheeded = K.n_machines > 0 and K.guard_machine[index] >= 0 and not is_allowed(K, index)
         if unheeded or K.guard_kink[index] == 1:
-            K.passing[index] = 0
+            K.passing[: K.n_guards] = 0
             K.restart_due = 2
             if kind == CROSS:
                 K.side[index] = -K.side[index]

@@ -69,7 +69,7 @@ class Events(SchemeAbilities):
     guards0: Reals = reals(lambda s: s.n_watched, kept=True)  # at the accepted state
     guards1: Reals = reals(lambda s: s.n_watched)  # at the candidate
     side: Reals = reals(lambda s: s.n_guards, kept=True)  # sign of each user guard since it last crossed
-    passing: Integers = integers(lambda s: s.n_guards, kept=True)  # 1: crosses at this instant, its side is not known
+    passing: Integers = integers(lambda s: s.n_guards, kept=True)  # 1: crosses at this instant; 2: has its event next
     met: Reals = reals(lambda s: 2 * s.n_guards, kept=True)  # values and rates of these before the event did anything
     direction: Integers = integers()
     machine_start: Integers = integers()  # anchor that holds the number of the state of each machine

@@ -19,12 +19,12 @@ from mbd.kernel.contact.cone_steps import (
 )
 from mbd.kernel.contact.contact_log import room_to_log
 from mbd.kernel.contact.nonsmooth_cones import hold_for_step
-from mbd.kernel.events.guard_sides import settle_sides
+from mbd.kernel.events.guard_sides import next_crossing, settle_sides
 from mbd.kernel.events.transitions import find_due, has_happened, is_due, settle_fresh, take_transitions
 from mbd.kernel.records import Kernel
 from mbd.kernel.singular.step_pairs import ALONE, FIRST
 from mbd.kernel.stepping.charts import divides_further, turned_end
-from mbd.kernel.stepping.judge_step import MAX_SHORTENINGS, end_timer, judge_step
+from mbd.kernel.stepping.judge_step import MAX_SHORTENINGS, end_crossing, end_timer, judge_step
 from mbd.kernel.stepping.observe import is_awaited, store_row
 from mbd.kernel.stepping.starting import find_mode, restart
 from mbd.kernel.stepping.step_retry import is_shortened, part_end, step_end, tried_step
@@ -35,6 +35,24 @@ __all__ = ["advance"]
 
 def begin(K: Kernel) -> int:
     """What comes before a step: room for its rows, a start of the scheme, code of the mode; −1 if it can be taken."""
+    status = start_again(K)
+    while status < 0 and K.n_guards > 0 and next_crossing(K) >= 0:
+        status = end_crossing(K, next_crossing(K))
+        if status < 0:
+            status = start_again(K)
+    if status >= 0:
+        return status
+    if K.time >= K.until - 1e-12 * K.dt:
+        return DONE
+    if K.mode_id < 0:
+        K.mode_id = find_mode(K)
+        if K.mode_id < 0:
+            return NEW_MODE
+    return -1
+
+
+def start_again(K: Kernel) -> int:
+    """Room for the rows of a step, and a start of the scheme where one is due; −1, or a status for the caller."""
     if K.n_stored + 4 + 2 * K.n_guards > K.capacity or K.n_logged + room_to_log(K) > K.event_capacity:
         return FULL
     while K.restart_due > 0:
@@ -60,12 +78,6 @@ def begin(K: Kernel) -> int:
             store_row(K)
         if is_awaited(K, first):
             return EVENT
-    if K.time >= K.until - 1e-12 * K.dt:
-        return DONE
-    if K.mode_id < 0:
-        K.mode_id = find_mode(K)
-        if K.mode_id < 0:
-            return NEW_MODE
     return -1
 
 

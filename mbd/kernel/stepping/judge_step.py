@@ -35,7 +35,7 @@ from mbd.kernel.stepping.step_retry import is_shortened, tried_step
 from mbd.kernel.stepping.trial_step import try_step
 from mbd.kernel.tangent_rules import follow_candidate, follow_event, follows_rows
 
-__all__ = ["MAX_SHORTENINGS", "end_timer", "judge_step"]
+__all__ = ["MAX_SHORTENINGS", "end_crossing", "end_timer", "judge_step"]
 
 MAX_SHORTENINGS = 5
 """Tries of shorter steps as sliding begins or ends [-]."""
@@ -181,8 +181,19 @@ def end_timer(K: Kernel, h: float) -> int:
     """The event of the timer that is due at the end of a candidate of h, or at the accepted state where h is none."""
     if h <= 0.0:
         event_at_start(K)
+    return end_with_guard(K, K.due_guard, h)
+
+
+def end_crossing(K: Kernel, e: int) -> int:
+    """The event of guard e at the accepted state, that of another event (`guard_sides.next_crossing`)."""
+    event_at_start(K)
+    return end_with_guard(K, e, 0.0)
+
+
+def end_with_guard(K: Kernel, e: int, h: float) -> int:
+    """The event of guard e at the end of a candidate of h."""
     K.event_kind = CROSS
-    K.event_index = K.due_guard
+    K.event_index = e
     K.event_after = h
     status = handle_event(K)
     return PAUSE if crowds(K) and status < 0 else status

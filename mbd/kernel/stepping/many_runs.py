@@ -84,13 +84,18 @@ def advance_to_end(K: Kernel) -> int:
 
 
 def finish(K: Kernel) -> int:
-    """Start the scheme after the event that ended the run; EVENT, or a failure."""
+    """Start the scheme after the event that ended the run; EVENT, or a failure.
+
+    Where somebody waits for others that happen at the same instant Python must judge.
+    """
     K.chunk = K.chunk_of_runs
     K.until = K.time
     K.end = NEVER
     status = advance(K)
     see_events(K)
-    return EVENT if status == DONE or status == EVENT or status == NEW_MODE else status
+    if status == EVENT:
+        return NEEDS_PYTHON
+    return EVENT if status == DONE or status == NEW_MODE else status
 
 
 def note(K: Kernel, out: bool) -> None:

@@ -29,7 +29,7 @@ OPEN_TIMES = [TABLE.places[name][1] for name in ("last_switch", "singular_time")
 """Places in `clock` that may be infinite."""
 FLAGS = {
     "closed": (0, 1), "armed": (-1, 2), "touched": (0, 1), "dropped": (0, 1), "sticks": (0, 1), "loose": (0, 3),
-    "passing": (0, 1),
+    "passing": (0, 2),
 }  # fmt: skip
 """Least and largest value of each flag that is kept."""
 
