@@ -155,7 +155,7 @@ def test_a_hertzian_penalty_does_not_fail_just_outside():
         (lambda: mbd.Penalty("stop", FOOT, stiffness=1.0, release="never"), "'gap' or 'pull'"),
         (lambda: mbd.Penalty("stop", FOOT, stiffness="hard"), "must be a number"),
         (lambda: mbd.When(3), "name of another contact"),
-        (lambda: mbd.Event("fall", HINGE), "needs a measure"),
+        (lambda: mbd.Event("fall", HINGE), "is a measure, the name of a quantity"),
         (lambda: mbd.Event("fall", FOOT, direction=2), "-1, 0 or 1"),
         (lambda: mbd.Event("fall", FOOT, reset=3.0), "maps names to values"),
         (lambda: mbd.Controller("knee", None, period=0.01), "update"),

@@ -51,7 +51,7 @@ from mbd.kernel.stepping.restart import (
     largest_force,
     limit_of,
 )
-from mbd.kernel.stepping.scales import FORCE_ULPS, speed_round_off
+from mbd.kernel.stepping.scales import FORCE_ULPS, speed_round_off, unseen_force
 
 __all__ = [
     "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
@@ -225,6 +225,8 @@ def judge(K: Switching, h: float) -> bool:
             if K.opens[c] == 0:
                 pull = pull_of(K, c, h)
                 if pull > 0.0:
+                    evaluate(K, K.time, K.q, K.y)
+                if pull > 0.0 and pull > unseen_force(K, K.normal[c]):
                     consider(K, OPEN_PULL, c, crossing(-K.lam[K.normal[c]], -pull), 0.0)
         else:
             low = 0.0

@@ -21,13 +21,13 @@ from __future__ import annotations
 
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
-from mbd.kernel.codes import ACCELERATIONS, SCALES
+from mbd.kernel.codes import ACCELERATIONS, EPS, SCALES
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Motion
 
 __all__ = [
     "FORCE_ULPS", "HORIZON_STEPS", "add_force_floors", "load_accepted", "note_extent", "restore_iterate", "size_of",
-    "speed_round_off", "still_energy", "still_speed",
+    "speed_round_off", "still_energy", "still_speed", "unseen_force",
 ]  # fmt: skip
 
 HORIZON_STEPS = 1000.0
@@ -103,6 +103,18 @@ def speed_round_off(K: Motion, row: int) -> float:
         if slope > 0.0 and 2.0 * slope * slope * energy > speed * speed * mass and mass > 0.0:
             speed = slope * sqrt(2.0 * energy / mass)
     return float(ROUND_OFF_RTOL * speed)
+
+
+def unseen_force(K: Motion, row: int) -> float:
+    """Force along a row that changes the speeds of its cluster by no unit of the last place in a step [N, N m].
+
+    Where nothing acts all forces are round-off of such a size, of either sign. M in K.acc.
+    """
+    largest = 0.0
+    for i in range(K.n_v):
+        if K.cluster[i] == K.cluster[K.n + row] and K.unit[i] == K.row_unit[row]:
+            largest = max(largest, EPS * abs(K.acc[i * K.n + i] * K.y[i]) / K.dt)
+    return largest
 
 
 def load_accepted(K: Equations) -> None:
