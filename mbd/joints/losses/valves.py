@@ -90,8 +90,8 @@ class Valves(Loss):
 
     @property
     def is_directed(self) -> bool:
-        """Unless both directions have one loss."""
-        return self.forward != self.backward or self.forward.is_directed
+        """Always: each direction has run-time parameters of its own."""
+        return True
 
     def fields(self) -> dict[str, float]:
         """Those of both: 'backward.coefficient', 'forward.coefficient'."""
