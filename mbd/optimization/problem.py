@@ -120,7 +120,8 @@ class Problem:
             error = self.last_error
             raise error if error is not None else GaitError(f"the guess fails: {failure.outcome}") from None
         steep = float(np.max(np.abs(slopes[0]), initial=0.0))
-        self.size = max(abs(self.objective(first)) if not self.squares else 0.0, steep) or 1.0
+        least = HALF_PRECISION_RTOL * steep**2 if self.squares else steep
+        self.size = max(abs(self.objective(first)), least) or 1.0
         ends = np.array([[limit.low, limit.high] for limit in self.limits]).reshape(-1, 2)
         ends = np.where(np.isfinite(ends), np.abs(ends), 0.0).max(axis=1, initial=0.0)
         steep_limits = np.max(np.abs(slopes[1]), axis=1, initial=0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -105,15 +106,16 @@ def _squares(problem: Problem, box: tuple[Vector, Vector], accuracy: float) -> t
     from scipy.optimize import least_squares
 
     assert problem.best is not None
+    size = math.sqrt(problem.size)
 
     def residuals(u: Vector) -> Vector:
         try:
-            return problem.at(u).parts / problem.size
+            return problem.at(u).parts / size
         except FailedTrial:
             return np.full(len(problem.parts), np.inf)
 
     def slopes(u: Vector) -> Any:
-        return problem.slopes(_known(problem, u))[0] / problem.size
+        return problem.slopes(_known(problem, u))[0] / size
 
     found = least_squares(
         residuals, problem.best.u, slopes, box, xtol=accuracy,

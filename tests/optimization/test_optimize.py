@@ -103,6 +103,30 @@ def test_a_sum_of_squares_is_a_fit_and_passes_by_trials_that_fail():
         assert found.success
 
 
+@pytest.mark.parametrize("method", ["SLSQP", "least_squares"])
+def test_sums_of_squares_have_their_optimum_in_any_unit(method):
+    """Of random functions, with a constraint that does not act where the method takes one."""
+    rng = np.random.default_rng(7)
+    compared = 0
+    for _ in range(3):
+        A, b = rng.normal(size=(3, 2)), rng.normal(size=3)
+        exact = np.linalg.lstsq(A, b, rcond=None)[0]
+
+        def numbers(given, A=A, b=b):
+            x = np.array([given["x"], given["y"]])
+            return dict(zip("abc", A @ x - b, strict=True))
+
+        unknowns = {name: (x + 0.8, x - 2.0, x + 3.0) for name, x in zip("xy", exact, strict=True)}
+        limits = {} if method == "least_squares" else {"x": (exact[0] - 1.0, None)}
+        for unit in (1e-6, 1.0, 1e6):
+            parts = [lambda n, name=name, unit=unit: unit * n[name] for name in "abc"]
+            found = mbd.optimize(numbers, unknowns, minimize=parts, constraints=limits, method=method)
+            assert found.success
+            np.testing.assert_allclose([found["x"], found["y"]], exact, rtol=0.0, atol=1e-5)
+            compared += 1
+    assert compared == 9
+
+
 def test_a_function_of_the_unknowns_may_give_numbers_derivatives_or_nothing():
     def valley(x):
         if x["a"] > 2.0:
