@@ -57,7 +57,7 @@ def without_pins(model: Any) -> tuple[Any, tuple[Pin, ...]]:
     pins: list[Pin] = []
     bare: list[Joint] = []
     for joint in joints:
-        loss = getattr(joint, "loss", None)
+        loss: Any = getattr(joint, "loss", None)
         parts = loss.named(f"{joint.name} loss") if isinstance(loss, LossSum) else [(f"{joint.name} loss", loss)]
         own = [(owner, part) for owner, part in parts if isinstance(part, PinFriction) and part.needs_reaction]
         if not own and any(part.needs_reaction for _, _, part in joint.losses()):
