@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from mbd.bodies.domains import Domain, at_least_zero, positive
 from mbd.bodies.scope import Scope
@@ -64,7 +64,8 @@ class Penalty(Constraint):
     friction : μ ≥ 0, opposite to the velocity γ along the surface, ``f = −μ p γ/√(‖γ‖² + creep²)``: under a load T
         below μ p it creeps with ``creep T/√((μ p)² − T²)``. `mbd.Bristles` stick elastically, a `Unilateral` truly
     creep : speed at which friction is 1/√2 of μ p [m/s]
-    only_while : name of a contact that must be closed, or a measure that must be positive, for it to begin to act
+    only_while : name of a contact that must be closed, or what must be positive (a measure, a function of named
+        quantities, an expression), for it to begin to act
     """
 
     name: str
@@ -78,7 +79,7 @@ class Penalty(Constraint):
     effective_mass: float | None = None
     friction: float | Bristles = 0.0
     creep: float = CREEP_SPEED
-    only_while: str | Measure | None = None
+    only_while: Any = None
 
     kind = "penalty"
 

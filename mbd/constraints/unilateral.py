@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 from mbd.bodies.domains import Domain
 from mbd.bodies.scope import Scope
@@ -54,7 +54,8 @@ class Unilateral(Constraint):
         'name.mu', or 'name friction.coefficient', …
     release : `When` another contact closes (or several of them), instead of on pull, or besides (`may_pull=False`);
         while it pulls it has no friction
-    only_while : name of a contact that must be closed, or a measure that must be positive, for this one to be watched
+    only_while : name of a contact that must be closed, or what must be positive (a measure, a function of named
+        quantities, an expression), for this one to be watched
     spin_friction : ρ ≥ 0 of friction against spin about the normal, ``|M| ≤ ρ p`` [m], the parameter 'name.mu_spin'; it
         sticks and slips by itself, as 'name spin', and 'name.spin.torque' is M on the body [N m]. Of feet of bodies
         that turn in space: `touchdown` and `sphere_touchdown`. A round patch of radius R has ρ = ⅔ μ R under even load
@@ -65,7 +66,7 @@ class Unilateral(Constraint):
     restitution: float = 0.0
     friction: float | Loss | None = None
     release: When | tuple[When, ...] | None = None
-    only_while: str | Measure | None = None
+    only_while: Any = None
     spin_friction: float = 0.0
 
     kind = "unilateral"
