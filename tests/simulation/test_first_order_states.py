@@ -93,18 +93,3 @@ def test_twins_take_the_same_steps_over_zero(scheme):
     assert runs[0]["push.second"].min() < 0.0 < runs[0]["push.second"].max()
     np.testing.assert_allclose(runs[0].t, runs[1].t, rtol=1e-9)
     np.testing.assert_allclose(runs[0].record.z, runs[1].record.z, rtol=1e-7, atol=1e-12)
-
-
-@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.GeneralizedAlpha(0.8), mbd.Newmark()], ids=repr)
-def test_bristles_break_away_under_a_force_that_begins_at_nothing(scheme):
-    """Their rate vanished at the start, beside which it was judged for good: steps of 0.1 ms ended at break-away."""
-    model, body = mbd.Model("pushed bristles", gravity=(0, 0, 0)), mbd.PointMass("body", mass=1.0)
-    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, loss=mbd.LuGre(1.5, 1.0, 0.01, 1e4, 100.0))
-    model.connect(rail)
-    model.apply(mbd.Motor("push", rail, lambda time: 30.0 * time**3))
-    start = mbd.assemble(model)
-    exact = mbd.simulate(model, start, mbd.RadauIIA(), dt=1e-3, until=0.6)
-    off = [
-        abs(mbd.simulate(model, start, scheme, dt=dt, until=0.6).final.q[0] - exact.final.q[0]) for dt in (1e-3, 1e-4)
-    ]
-    assert off[1] < 0.02 * off[0] < 1e-6

@@ -244,8 +244,7 @@ def renew_scales(K: DependentRows) -> None:
     """Magnitudes of forces down to those of the accepted state, by a hundred at most.
 
     After larger forces residuals are judged too mildly otherwise. The more they have fallen, the sooner the next time.
-    Never up: what is light hangs on residuals far below the forces on what is heavy. Rates of first-order states, which
-    may have vanished at the start, stand for themselves and go up as well.
+    Never up: what is light hangs on residuals far below the forces on what is heavy.
     """
     note_scales(K)
     fill_block(K, K.time, K.q, K.y)
@@ -253,9 +252,7 @@ def renew_scales(K: DependentRows) -> None:
     fall = 1.0
     for i in range(K.n):
         fall = max(fall, K.known[i] / K.scale[i])
-        K.scale[i] = max(K.scale[i], K.known[i] / MAX_MAGNITUDE_RATIO)
-        if i < K.n_v:
-            K.scale[i] = min(K.scale[i], K.known[i])
+        K.scale[i] = min(max(K.scale[i], K.known[i] / MAX_MAGNITUDE_RATIO), K.known[i])
     K.scales_age = MAX_SCALES_AGE - max(int(MAX_SCALES_AGE / min(fall, MAX_MAGNITUDE_RATIO)), 1)
     weigh(K)
 
