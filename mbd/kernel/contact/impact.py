@@ -24,6 +24,7 @@ from mbd.kernel.contact.impact_solve import (
     is_held_through,
     let_rebound,
     loosen,
+    prepare,
     restitution_of,
     solve_impact,
     speed,
@@ -33,18 +34,19 @@ from mbd.kernel.records import ContactForces, Contacts, Switching
 from mbd.kernel.stepping.restart import row_speed
 from mbd.kernel.tangent_rules import note_order, note_zero
 
-__all__ = ["impact_together"]
+__all__ = ["impact"]
 
 MAX_IMPACTS = 1000
 """Impacts of the sequential law at one instant [-]."""
 
 
-def impact_together(K: Switching, slow: bool) -> int:
-    """The jump of velocities in K.jump, impulses, negative where they push, in K.impulse, after `prepare`.
+def impact(K: Switching, slow: bool) -> int:
+    """The velocities in K.y jump, by K.jump; impulses, negative where they push, are left in K.impulse.
 
     A slow impact (below the rest speed) sticks; in non-smooth steps, whose speeds are of the size of dt, only where
     that takes no pull. Afterwards K.active says which contacts are closed.
     """
+    prepare(K)
     status = 0
     if slow or K.impact_law == 0 or K.plastic_impact == 1:
         over_step = K.strategy == 1 and K.n_cones > 0  # impulses of the whole step, none of which pulls
@@ -72,6 +74,9 @@ def impact_together(K: Switching, slow: bool) -> int:
             return ENERGY_GAIN
     if slow and K.strategy == 0:
         rest(K)
+    for i in range(K.n):
+        K.y[i] += K.jump[i]
+    K.n_impacts += 1
     return 0
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import LOG_OPENED, LOG_PUSHED
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
-from mbd.kernel.contact.impacts_apart import impact
+from mbd.kernel.contact.impact import impact
 from mbd.kernel.records import Contacts, Switching
 from mbd.kernel.stepping.restart import evaluate
 

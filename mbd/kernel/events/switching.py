@@ -18,8 +18,8 @@ from mbd.kernel.codes import (
 )
 from mbd.kernel.contact.cones import aim_as_pulled, friction_size, leads_group, set_loose, set_sticking, speed_of
 from mbd.kernel.contact.contact_log import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, log_event
+from mbd.kernel.contact.impact import impact
 from mbd.kernel.contact.impact_solve import strikes
-from mbd.kernel.contact.impacts_apart import impact
 from mbd.kernel.events.guards import gap_scale, is_watched
 from mbd.kernel.events.impulses import AFTER, BEFORE, BESIDE, push
 from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Mechanism, Switching

@@ -27,7 +27,7 @@ class Complementarity(SchemeAbilities):
     trial: Reals = reals(lambda s: s.n_rows)
     trial_given: Reals = reals(lambda s: s.n_rows)
     trial_jump: Reals = reals(lambda s: s.n)
-    kept: Reals = reals(  # what a non-smooth step began from; impacts of clusters one after the other
+    kept: Reals = reals(  # what a non-smooth step began from
         lambda s: s.n_q + 2 * s.n + s.n_rows + s.n_watched + s.n_anchors + s.n_frictions
     )
     kept_flags: Integers = integers(

@@ -34,7 +34,7 @@ __all__ = [
 MAX_MAGNITUDE_RATIO = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
 MAX_SCALES_AGE = 16
-"""Steps after which magnitudes are found again [-]."""
+"""Steps after which magnitudes are found anew [-]."""
 MAX_ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
 MAX_LOAD_ITERATIONS = 30
