@@ -50,7 +50,7 @@ class Model(SchemeAbilities):
     orders: Integers = integers(lambda s: 1)  # all of them
     mode_id: int = place("state")  # the present mode, −1: not known yet
     order_start: int = place("state")  # where the order of the factors in kkt begins, 0 if pivots were searched for
-    scales_age: int = place("state")  # steps since magnitudes were those of the accepted state
+    scales_raised: int = place("state")  # 1: magnitudes were raised far above those of the accepted state
     scales_of_start: int = place("state")  # 1: magnitudes are those of a start, which no step has confirmed
     uneven_masses: int = place("state")  # 1: they differ so much that small residuals do not tell small errors
 

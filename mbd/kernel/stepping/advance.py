@@ -168,5 +168,4 @@ def take_step(K: Kernel) -> int:
     if K.adaptive == 1 or K.paired_step == FIRST or K.paired_step == ALONE:
         full = h
     K.n_steps += 1
-    K.scales_age += 1
     return judge_step(K, h, full, t1, cut, within)

@@ -30,7 +30,7 @@ from mbd.kernel.codes import (
 from mbd.kernel.hooks import scheme_error
 from mbd.kernel.records import Balance, Kernel, SchemeAbilities, SingularSteps, State, Steps
 from mbd.kernel.singular.step_size import is_too_noisy, noise_share, singular_step_size
-from mbd.kernel.stepping.restart import compose, consistent, fill_block, renew_scales
+from mbd.kernel.stepping.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["controlled_step", "first_step", "smallest_step"]
@@ -140,7 +140,7 @@ def controlled_step(K: Kernel, h: float) -> int:
                 return 0
             h *= factor
             K.estimates_twice = 1
-            renew_scales(K)
+            lower_scales(K)
         elif is_to_shorten(status):
             h *= 0.5  # a long step may also have left the region where forces are defined
         else:

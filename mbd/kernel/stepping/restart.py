@@ -25,16 +25,14 @@ from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 from mbd.kernel.stepping.scales import load_accepted, note_extent, restore_iterate
 
 __all__ = [
-    "MAX_SCALES_AGE", "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate",
-    "evaluate_loaded", "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_to_step",
-    "measure_accepted", "minimum_norm_multipliers", "note_scales", "raise_scales", "refresh_scales", "renew_scales",
-    "restore_scales", "retain_scales", "row_speed", "share_loads", "stepping_rows", "take_consistent",
+    "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "evaluate_loaded",
+    "fill_block", "holds_rows", "largest_force", "limit_of", "load_accelerations", "lower_scales", "lower_to_step",
+    "measure_accepted", "minimum_norm_multipliers", "note_scales", "raise_scales", "refresh_scales", "restore_scales",
+    "retain_scales", "row_speed", "share_loads", "stepping_rows", "take_consistent",
 ]  # fmt: skip
 
 MAX_MAGNITUDE_RATIO = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
-MAX_SCALES_AGE = 16
-"""Steps after which magnitudes are found anew [-]."""
 MAX_ROW_GROWTH = 16.0
 """Most by which the terms of a row may grow in a step: beyond that an iterate was thrown far away [-]."""
 MAX_LOAD_ITERATIONS = 30
@@ -103,7 +101,7 @@ def refresh_scales(K: Model) -> None:
         size = far
         speed = 1e-3
         for i in range(K.n_v):
-            if K.unit[i] == K.row_unit[k] and K.cluster[i] == K.cluster[K.n + k]:
+            if K.unit[i] == K.row_unit[k]:
                 speed = max(speed, abs(K.block[K.o_v + i]))
                 if K.vector == 1:
                     size = max(size, abs(K.block[K.o_q + i]))
@@ -115,7 +113,6 @@ def measure_accepted(K: DependentRows) -> None:
     """The block and magnitudes at the accepted state."""
     fill_block(K, K.time, K.q, K.y)
     measure(K)
-    note_extent(K)
 
 
 def measure(K: Equations) -> None:
@@ -132,6 +129,7 @@ def measure(K: Equations) -> None:
     refresh_scales(K)
     K.block[K.o_a : K.o_a + K.n_v] = K.work[: K.n_v]
     measure_rates(K)
+    note_extent(K)
 
 
 def measure_rates(K: Equations) -> None:
@@ -217,10 +215,10 @@ def restore_scales(K: Model) -> None:
 
 
 def retain_scales(K: Model) -> None:
-    """Go on with raised magnitudes, those of a candidate; for one step where they are far above what was known."""
+    """Go on with raised magnitudes, those of a candidate; K.scales_raised where they are far above what was known."""
     for i in range(K.n):
         if K.scale[i] > MAX_MAGNITUDE_RATIO * K.known[i]:
-            K.scales_age = MAX_SCALES_AGE
+            K.scales_raised = 1
 
 
 def lower_to_step(K: Equations) -> bool:
@@ -240,20 +238,19 @@ def lower_to_step(K: Equations) -> bool:
     return lowered
 
 
-def renew_scales(K: DependentRows) -> None:
-    """Magnitudes of forces down to those of the accepted state, by a hundred at most.
+def lower_scales(K: DependentRows) -> None:
+    """Magnitudes of forces down towards those of the accepted state, by a hundred at most.
 
-    After larger forces residuals are judged too mildly otherwise. The more they have fallen, the sooner the next time.
-    Never up: what is light hangs on residuals far below the forces on what is heavy.
+    After a moment of huge forces residuals are judged too mildly otherwise.
     """
     note_scales(K)
-    fill_block(K, K.time, K.q, K.y)
-    measure(K)
-    fall = 1.0
+    measure_accepted(K)
+    K.scales_raised = 0
     for i in range(K.n):
-        fall = max(fall, K.known[i] / K.scale[i])
-        K.scale[i] = min(max(K.scale[i], K.known[i] / MAX_MAGNITUDE_RATIO), K.known[i])
-    K.scales_age = MAX_SCALES_AGE - max(int(MAX_SCALES_AGE / min(fall, MAX_MAGNITUDE_RATIO)), 1)
+        floor = K.known[i] / MAX_MAGNITUDE_RATIO
+        if floor > K.scale[i]:
+            K.scale[i] = floor
+            K.scales_raised = 1
     weigh(K)
 
 

@@ -22,7 +22,7 @@ from mbd.kernel.singular.step_pairs import ALONE, FIRST, LONG_PART, SECOND, SHOR
 from mbd.kernel.singular.step_size import is_resolved, is_too_noisy, singular_step_size
 from mbd.kernel.stepping.control import controlled_step
 from mbd.kernel.stepping.resolution import judge_change
-from mbd.kernel.stepping.restart import MAX_SCALES_AGE, consistent, renew_scales
+from mbd.kernel.stepping.restart import consistent, lower_scales
 from mbd.kernel.stepping.trial_step import try_step
 
 __all__ = ["is_shortened", "part_end", "step_end", "tried_step"]
@@ -77,8 +77,8 @@ def tried_step(K: Kernel, h: float, t1: float) -> int:
 
     A singular configuration is stepped over by a pair of steps, or a shortened one; stiff places get smaller.
     """
-    if K.scales_age >= MAX_SCALES_AGE and (K.explicit == 0 or K.n_watched > 0):  # else nothing is judged by them
-        renew_scales(K)
+    if K.scales_raised == 1:
+        lower_scales(K)
     if K.adaptive == 1:
         return controlled_step(K, h)
     if K.paired_step == FIRST or K.paired_step == ALONE:  # the step is taken once more

@@ -14,12 +14,11 @@ from mbd.kernel.contact.cones import HOLD_DIRECTION, leads_group, sliding_force,
 from mbd.kernel.hooks import call, scheme_step
 from mbd.kernel.records import (
     Balance,
-    ContactRows,
     DependentRows,
     Frictions,
+    Guards,
     Kernel,
     Motion,
-    Reals,
 )
 from mbd.kernel.stepping.charts import turns_too_far
 from mbd.kernel.stepping.restart import (
@@ -44,28 +43,9 @@ def try_step(K: Kernel, h: float, t1: float) -> int:
     There an implicit step would divide the round-off of positions by h²; an explicit scheme takes it as any other.
     A scheme leaves velocities, rates and multipliers of the candidate in the block; only its positions are centered.
     """
-    coarse = 0.0
-    if K.n_cones > 0:
-        K.blur = blur_of(K, K.guards0)
-    while True:  # called from one place, the scheme stays in one piece
-        status = try_with_blur(K, h, t1)
-        if coarse == 0.0:
-            if status != 0 or K.n_cones == 0 or K.estimates == 1 or K.blur <= K.tolerance:
-                return status
-            blur = max(blur_of(K, K.guards1), K.tolerance)
-            if blur > 0.5 * K.blur:
-                return status
-            coarse = K.blur  # γ has grown: the balance at the end of the step can be as exact as this γ
-            K.blur = blur
-        elif status == 0 or K.blur == coarse:
-            return status
-        else:
-            K.blur = coarse
-
-
-def try_with_blur(K: Kernel, h: float, t1: float) -> int:
-    """The same, with the balance as exact as K.blur lets it be."""
     full = K.step
+    if K.n_cones > 0:
+        K.blur = blur_of(K)
     if h >= 1e-3 * full or (K.n_active == 0 and h >= 1e-9 * full) or K.explicit == 1:
         status = scheme_step(K, h, t1)
         if status != 0:
@@ -99,10 +79,10 @@ def try_with_blur(K: Kernel, h: float, t1: float) -> int:
     return 0
 
 
-def blur_of(K: ContactRows, values: Reals) -> float:
+def blur_of(K: Guards) -> float:
     """Part of a friction in a plane that is not known: that of γ over γ, or over what stands for it at the onset.
 
-    values : of the guards, among them γ
+    γ may fall in a step to a part of what it is before it.
     """
     largest = 0.0
     for f in range(K.n_frictions):
@@ -111,7 +91,7 @@ def blur_of(K: ContactRows, values: Reals) -> float:
             for g in range(f, f + K.group_size[f]):
                 size = max(size, K.scale[K.n + K.n_rows + K.friction_row[g]])
             least = 4.0 * K.hold[f] if K.hold[f] > 0.0 else 0.0
-            speed = speed_of(K, f, values, K.at_slip) + least
+            speed = speed_of(K, f, K.guards0, K.at_slip) + least
             largest = max(largest, SLIP_RTOL * size / (speed + EPS * size))
     return min(largest, NOMINAL_RTOL)
 

@@ -152,7 +152,7 @@ def _of_state(v: Kernel) -> dict[str, tuple[int, int]]:
         "steps_since_row": (0, NO_LIMIT), "failure_index": (-1, indices), "n_dropped": (0, v.n_rows),
         "near_singular": (0, 2), "short_steps": (0, NO_LIMIT), "n_repeats": (0, NO_LIMIT), "plastic_impact": (0, 1),
         "halvings": (0, 16), "halves_left": (0, 1 << 17), "paired_step": (0, 3), "in_substeps": (0, 1),
-        "scales_age": (0, NO_LIMIT), "scales_of_start": (0, 1), "restarted_here": (0, 1), "fallback": (0, 2),
+        "scales_raised": (0, 1), "scales_of_start": (0, 1), "restarted_here": (0, 1), "fallback": (0, 2),
         "estimates_twice": (0, 1),
     }  # fmt: skip
 
