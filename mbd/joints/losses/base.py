@@ -195,8 +195,11 @@ class LossSum(Loss):
     @property
     def smooth(self) -> Loss | None:
         """Those of its parts that are smooth, with the names of their parameters."""
-        parts = [(name[1:], part) for name, loss in self.named("") if (part := loss.smooth) is not None]
-        return LossSum(tuple(part for _, part in parts), tuple(name for name, _ in parts)) if parts else None
+        parts = [(name, part) for name, loss in self.named("") if (part := loss.smooth) is not None]
+        left = LossSum(tuple(part for _, part in parts))
+        if [name for name, _ in left.named("")] != [name for name, _ in parts]:
+            left = LossSum(left.losses, tuple(name[1:] for name, _ in parts))
+        return left if parts else None
 
     @property
     def is_directed(self) -> bool:
