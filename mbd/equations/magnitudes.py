@@ -38,7 +38,7 @@ def of_directions(values: Iterable[Scalar]) -> dict[int, float]:
 
 
 def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] | None = None) -> list[Node]:
-    """Σ|terms| through sums and products, bounded by their root of squares and by the largest of them.
+    """Σ|terms| through sums and products, bounded by their root of squares, in iterations by the largest of them.
 
     Where a vector is turned, Σ|terms| of its components is up to √2 times as long as the vector, and in recursions up
     and down a chain of n links this grows like 2ⁿ: beyond some twenty links every residual would pass for round-off.
