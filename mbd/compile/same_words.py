@@ -14,6 +14,7 @@ import dis
 import functools
 import sys
 import types
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from hashlib import sha256
@@ -237,21 +238,29 @@ class _AsItIs(Reader):
 
         Of a word, which the library calls, all methods.
         """
-        own = [kind for kind in type(item).__mro__ if not isinstance(item, type) and not _is_installed(kind.__module__)]
-        methods = {
-            name: each for kind in own[::-1] for name, each in vars(kind).items() if type(each) is types.FunctionType
-        }
+        is_class = isinstance(item, type)
+        held = dict[str, Any]()
+        for kind in (item if is_class else type(item)).__mro__[::-1]:
+            held |= {} if _is_installed(kind.__module__) else vars(kind)
+        methods = {} if is_class else {name: each for name in held if (each := _function_of(held[name])) is not None}
         is_word, read = callable(getattr(item, "mentions", None)), list[Any]()
         while asked := [name for name in methods if is_word or name in self.names or name == "__call__"]:
             for name in asked:
+                del held[name]
                 read.append(methods.pop(name))
                 self.know(read[-1])
-        held = getattr(item, "__dict__", {})
-        return [*read, *(part for name in sorted(self.names & held.keys()) for part in (name, held[name]))]
+        held |= {} if is_class else getattr(item, "__dict__", {})
+        for name in sorted(self.names & held.keys()):
+            value = held[name]
+            read += [name, getattr(item, name, None) if type(value) is types.MemberDescriptorType else value]
+        if isinstance(item, dict):
+            read += [part for pair in item.items() for part in pair]
+        return [*read, *item] if isinstance(item, (list, tuple, deque)) else read
 
     def know(self, function: types.FunctionType) -> None:
         """Note which attributes a function may ask for."""
-        self.names.update(name for code in codes_of(function.__code__) for name in code.co_names)
+        for code in codes_of(function.__code__):
+            self.names.update(code.co_names, [each for each in code.co_consts if type(each) is str])  # also of getattr
 
     def of_function(self, function: types.FunctionType) -> list[Any]:
         self.know(function)
@@ -261,6 +270,18 @@ class _AsItIs(Reader):
             return [function.__code__, *values_of(function), *held]
         except CannotTellError:  # something captured has no value yet
             return [function.__code__, *held]
+
+
+def _function_of(member: Any) -> types.FunctionType | None:
+    """What runs as a member of a class is asked for or called; None for a value."""
+    kind = type(member)
+    if kind is property:
+        member = member.fget
+    elif kind is functools.cached_property:
+        member = member.func
+    elif kind in (staticmethod, classmethod):
+        member = member.__func__
+    return member if type(member) is types.FunctionType else None
 
 
 def _name_of(item: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import types
+from collections import defaultdict, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
@@ -217,6 +218,32 @@ class Holder:
         self.runs.append(run)
 
 
+class Base:
+    """What objects of a user inherit and have in one more form each."""
+
+    __slots__ = ("inner",)
+    gain = 1.0
+
+    def __init__(self):
+        self.inner = 2.0
+
+    @property
+    def size(self):
+        return self.inner
+
+    @staticmethod
+    def scaled(t):
+        return Inherits.gain * mbd.sin(t)
+
+
+class Inherits(Base):
+    """Without slots of its own."""
+
+
+class Table(dict):
+    """A dict of a kind of its own."""
+
+
 def _laws_that_change() -> Iterator[tuple[str, Any, Any]]:
     """(what changes, a law of size 2, what makes its size 3)."""
     numbers, table, array = [2.0], {"size": 2.0}, np.array([1.0, 2.0])
@@ -234,6 +261,8 @@ def _laws_that_change() -> Iterator[tuple[str, Any, Any]]:
         return size * mbd.sin(t)
 
     law.size, module.SIZE = 2.0, 2.0
+    slotted, other, third, own = Base(), Inherits(), Inherits(), Table(size=2.0)
+    counted, queue = defaultdict(float, size=2.0), deque([2.0])
     yield "list", lambda t: numbers[0] * mbd.sin(t), lambda: numbers.__setitem__(0, 3.0)
     yield "dict", lambda t: table["size"] * mbd.sin(t), lambda: table.update(size=3.0)
     yield "array", lambda t: array[1] * mbd.sin(t), lambda: array.__setitem__(1, 3.0)
@@ -246,6 +275,16 @@ def _laws_that_change() -> Iterator[tuple[str, Any, Any]]:
     yield "method", law.__call__, lambda: setattr(law, "size", 3.0)
     yield "partial", partial(lambda held, t: held[0] * mbd.sin(t), numbers), lambda: numbers.__setitem__(0, 3.0)
     yield "inner", lambda t: scaled(t), lambda: globals().update(SIZE=3.0)
+    yield "slot", lambda t: slotted.inner * mbd.sin(t), lambda: setattr(slotted, "inner", 3.0)
+    yield "property", lambda t: other.size * mbd.sin(t), lambda: setattr(other, "inner", 3.0)
+    yield "getattr", lambda t: getattr(third, "size") * mbd.sin(t), lambda: setattr(third, "inner", 3.0)  # noqa: B009
+    yield "own dict", lambda t: own["size"] * mbd.sin(t), lambda: own.update(size=3.0)
+    yield "default dict", lambda t: counted["size"] * mbd.sin(t), lambda: counted.update(size=3.0)
+    yield "deque", lambda t: queue[0] * mbd.sin(t), lambda: queue.__setitem__(0, 3.0)
+    Base.gain = 2.0
+    yield "base class", lambda t: other.gain * mbd.sin(t), lambda: setattr(Base, "gain", 3.0)
+    Base.gain = 2.0
+    yield "static method", lambda t: third.scaled(t), lambda: setattr(Base, "gain", 3.0)
     members = {2.0}
     yield "set", lambda t: max(members) * (1.0 if "a" in {"a", "b"} else 0.0) * mbd.sin(t), lambda: members.add(3.0)
 
