@@ -12,10 +12,10 @@ from mbd.tape.node import Node, Scalar, Tape
 __all__ = ["magnitudes", "of_directions"]
 
 MAX_SUM_RATIO = 16.0
-"""How far the sum of the terms of a force may lie above the root of their squares, and that above the largest of them:
-as far as those of 256 equal ones do."""
+"""How far the sum of the terms of a force may lie above the root of their squares, and in iterations that above the
+largest of them: as far as those of 256 equal ones do."""
 ITERATION_RATIO = 2.0**36
-"""The sum of terms over the largest of them beyond which they are those of an iteration."""
+"""The sum of terms over the largest of them beyond which they are those of an iteration [-]."""
 MIN_SINE = 0.1
 """Share of its amplitude that a sine has at least: round-off of its argument when it vanishes."""
 

@@ -53,7 +53,7 @@ def test_its_instant_moves_with_the_strike_or_has_no_derivative(kind: str) -> No
     if kind == "comes by chance":
         with pytest.raises(mbd.errors.OneSidedError, match="'other.time' is the instant of an event .* by chance"):
             sensitivities(*ball(INERT[kind]), *SCHEMES[0], **asked)
-    elif kind != "follows":  # of which the strike is told alone
+    elif kind != "follows":  # the log has the strike alone
         found = sensitivities(*ball(INERT[kind]), *SCHEMES[0], **asked).matrix
         np.testing.assert_allclose(found[0], [FALL / 2.0, 0.0, FALL / 2.0 / 9.81, 0.0], rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(found[1], found[0], rtol=1e-12, atol=1e-14)

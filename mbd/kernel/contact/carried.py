@@ -1,4 +1,4 @@
-"""What sticks on rows that prescribe its motion slides from the instant on at which they move it.
+"""What sticks on rows that prescribe its motion slides from the instant at which they move it.
 
 There the row of the friction holds nothing, and has no force of its own that could reach its limit. As a drive leaves
 its rest smoothly, what it moves has neither speed nor acceleration yet; the motion of a step tells that it slides, and

@@ -178,7 +178,7 @@ def _refuse_chance(rows: RunRows, programs: Programs, row: int, mode: Mode, fire
 
 
 def refuse_edge(rows: RunRows, kind: float, first: int, second: int, time: float) -> None:
-    """Raise a `OneSidedError` where a change decides how an impact goes on (see `follow_impacts.note`)."""
+    """Raise a `OneSidedError` where a change decides how an impact continues (see `follow_impacts.note`)."""
     if not kind:
         return
     equations = rows.mechanism.equations
