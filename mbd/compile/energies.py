@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
+from mbd.compile.many import at_inputs
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.equations.equations import Equations
 from mbd.tape.derivatives import live
@@ -60,12 +59,6 @@ class Energies:
         rows = len(inputs["t"])
         if self._machine is None or self.calls <= MIN_CALLS or rows > MIN_STATES:
             return self._arrays(inputs, parameters)
-        block, out = np.zeros((rows, self._layout.size)), np.empty((rows, 2))
-        for kind in self.kinds & inputs.keys():
-            place, values = self._layout.place(kind, 0), np.asarray(inputs[kind], dtype=float)
-            block[:, place : place + (values.shape[1] if values.ndim == 2 else 1)] = values.reshape(rows, -1)
-        given = np.ascontiguousarray(parameters, dtype=float)
-        several = [given] * rows if given.ndim == 1 else given
-        for k in range(rows):
-            self._function(block[k], several[k], out[k])
+        given = {kind: inputs[kind] for kind in (self.kinds | {"t"}) & inputs.keys()}
+        out = at_inputs(self._function, self._layout, given, parameters)
         return [out[:, 0].copy(), out[:, 1].copy()]
