@@ -148,12 +148,6 @@ def test_it_moves_alike_in_absolute_coordinates(name):
 
 
 # everything else that asks ------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("name", SCENES)
-def test_a_law_of_ones_own_runs_in_machine_code_as_in_plain_python(name):
-    fast, plain = (run_of(name, until=0.15, backend=backend) for backend in ("auto", "python"))
-    assert plain.settings["backend"] == "python" and fast.settings["backend"] == "llvm"
-    np.testing.assert_allclose(plain.final.q, fast.final.q, **LOOSE)
-    np.testing.assert_allclose(plain.final.v, fast.final.v, **LOOSE)
 
 
 @pytest.mark.parametrize("name", SCENES)

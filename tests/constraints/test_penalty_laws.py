@@ -17,7 +17,6 @@ from tests.problems import case
 SCHEMES = [mbd.Newmark(), mbd.HHT(), mbd.GeneralizedAlpha(0.9)]
 PUBLISHED = {"hunt-crossley": 0.663, "lankarani-nikravesh": 0.725, "flores": 0.470, "gonthier": 0.488}
 """What the classics give where 0.5 is asked."""
-GROUND = mbd.Model("bench").ground.origin
 POINT = mbd.height(mbd.PointMass("ball", mass=1.0).origin)
 
 
@@ -192,18 +191,6 @@ def test_each_blow_remembers_its_own_approach_speed():
     assert len(ratios) >= 3
     assert len({round(speed, 1) for speed in speeds}) == len(ratios) + 1
     np.testing.assert_allclose(ratios, 0.6, atol=3e-3)
-
-
-def test_a_run_cut_within_a_blow_goes_on_as_if_it_were_whole():
-    advice = mbd.penalty_parameters(0.5, 1e-3, 2.0, 1.0)
-    model, dt = ball(stiffness=advice.stiffness, restitution=0.5), advice.largest_dt / 8.0
-    whole = thrown(model, 1.0, dt, 64 * dt)
-    first = thrown(model, 1.0, dt, 16 * dt)
-    assert first.final.mode.closed == {"mat"}
-    np.testing.assert_allclose(first.final.anchors, [1.0], rtol=1e-9)
-    second = mbd.simulate(model, first.final, SCHEMES[0], dt=dt, until=64 * dt)
-    assert second["fall.rate"][-1] == pytest.approx(whole["fall.rate"][-1], rel=1e-3)
-    assert second["mat.force"][0] == pytest.approx(first["mat.force"][-1], rel=1e-9)
 
 
 def test_a_start_inside_the_mat_takes_its_speed_there_as_the_approach_speed():

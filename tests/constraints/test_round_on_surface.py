@@ -173,13 +173,6 @@ def test_ground_that_rises_and_falls_carries_the_ball_along():
     assert np.max(np.abs(run.energy.numerical)) < 1e-9
 
 
-def test_machine_code_is_the_plain_twin():
-    model = ball_on(lambda x, z: waves(x, z), 0.3)
-    start = mbd.assemble(model, {"float.y": 0.5}, {"float.angular_velocity": (2.0, 1.0, -9.0)})
-    ends = [read(mbd.simulate(model, start, mbd.HHT(0.05), dt=5e-3, until=0.3, backend=b)) for b in ("auto", "python")]
-    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9, atol=1e-9)
-
-
 def test_a_valley_that_is_narrower_than_the_ball_ends_the_run_by_name():
     model = ball_on(lambda x, z: 12.0 * x * x, 0.3)
     start = mbd.assemble(model, {"float.x": 0.35, "float.y": 2.6}, {"float.x": -1.5})

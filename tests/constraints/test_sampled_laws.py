@@ -78,15 +78,6 @@ def test_values_are_rounded_to_their_resolution() -> None:
     np.testing.assert_allclose(torque, 0.5 * np.round(torque / 0.5), atol=1e-12)
 
 
-def test_a_run_that_goes_on_samples_as_the_whole_one_to_the_bit() -> None:
-    model, start = arm(delay=0.013)
-    whole = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.004, until=0.3)
-    first = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.004, until=0.127)
-    second = mbd.simulate(model, first.final, mbd.RungeKutta853(), dt=0.004, until=0.3)
-    for name in ("q", "v", "anchors"):
-        np.testing.assert_array_equal(getattr(second.final, name), getattr(whole.final, name))
-
-
 def test_derivatives_go_through_samples() -> None:
     model, start = arm(delay=0.0035)
     names, of = ["hinge.angle", "PID.period", "PID.delay", "rod.mass"], ["hinge.angle", "hinge.rate", "PID.sum"]

@@ -143,18 +143,6 @@ def test_a_sample_reads_the_load_just_before_its_outputs_change():
     assert again.final["hinge.angle"] == pytest.approx(y[0], abs=1e-11)
 
 
-@pytest.mark.parametrize("scheme", [mbd.RungeKutta853(), mbd.HHT(0.05)], ids=repr)
-def test_python_and_machine_code_agree_and_a_run_continues(scheme):
-    model = arm_on_a_hub(LAWS["saturating"], ["foot.force"])
-    plain, whole = (
-        mbd.simulate(model, stands(model), scheme, dt=2e-3, until=0.04, backend=b) for b in ("python", "auto")
-    )
-    half = mbd.simulate(model, stands(model), scheme, dt=2e-3, until=0.02)
-    again = mbd.simulate(model, half.final, scheme, dt=2e-3, until=0.04)
-    np.testing.assert_array_equal(plain["hinge.angle"], whole["hinge.angle"])
-    assert again.final["hinge.angle"] == whole.final["hinge.angle"]
-
-
 def test_derivatives_go_through_the_law():
     model = arm_on_a_hub(LAWS["saturating"], ["foot.force"])
     for scheme, dt in (mbd.RungeKutta853(), 5e-3), (mbd.HHT(0.05), 2e-3):

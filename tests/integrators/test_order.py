@@ -161,7 +161,6 @@ def system_of(scene, scheme):
     return Stepper(mechanism, manager, scheme, mechanism.parameters(), 1e-3, {"capacity": 8}).system
 
 
-# stability ----------------------------------------------------------------------------------------------------------
 def energies(scheme, omega, steps):
     """Twice the energy of an undamped oscillator with ω dt = omega at every step."""
     model = mbd.Model("oscillator", gravity=(0, 0, 0))
@@ -176,28 +175,6 @@ def amplification(scheme, omega, steps=60):
     """Growth of the energy norm per step."""
     energy, third = energies(scheme, omega, steps), steps // 3
     return (energy[-third:].max() / energy[-2 * third : -third].max()) ** (0.5 / third)
-
-
-@pytest.mark.parametrize(
-    "scheme", [mbd.HHT(0.1), mbd.GeneralizedAlpha(0.8), mbd.GeneralizedAlpha(0.6), mbd.Newmark(0.36, 0.7)], ids=repr
-)
-def test_fast_modes_decay_by_the_promised_radius(scheme):
-    assert amplification(scheme, 1e3) == pytest.approx(scheme.coefficients.rho_inf, abs=0.03)
-
-
-@pytest.mark.parametrize("scheme", [mbd.Newmark(), mbd.GeneralizedAlpha(1.0), mbd.HHT(0.0)], ids=repr)
-@pytest.mark.parametrize("omega", [0.1, 1.0, 30.0])
-def test_undamped_schemes_keep_the_energy_of_an_oscillator(scheme, omega):
-    assert amplification(scheme, omega, 600) == pytest.approx(1.0, abs=1e-4 if omega < 1.0 else 1e-12)
-
-
-@pytest.mark.parametrize("omega", [0.01, 0.3, 3.0, 100.0])
-@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.HHT(1 / 3), mbd.GeneralizedAlpha(0.0), mbd.Newmark(0.36, 0.7)],
-                         ids=repr)  # fmt: skip
-def test_damped_schemes_are_stable_at_every_step(scheme, omega):
-    energy = energies(scheme, omega, 300)
-    assert energy[100:].max() < energy[:20].max()
-    assert energy[-100:].max() <= energy[:-100].max()
 
 
 def forces_of_a_driven_table(scheme, steps):

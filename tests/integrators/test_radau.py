@@ -11,7 +11,6 @@ import mbd
 from mbd.analysis.amplification import oscillated
 from mbd.analysis.numerical import spectrum
 from mbd.hardcases.mass_ratios import heavy_below_light
-from mbd.simulation.simulate import prepared
 from mbd.state import Mode
 from mbd.testing.problems import problem
 from tests.integrators.test_order import SCENES, T, observed, started
@@ -120,20 +119,6 @@ def test_the_error_estimate_does_not_see_what_is_infinitely_fast():
     assert max(sizes) < 2.0
 
 
-def test_machine_code_estimates_the_same_error_as_the_interpreted_kernel():
-    scene = "double pendulum in absolute coordinates"
-    model, start = started(scene)
-    found = []
-    for backend in ("auto", "python"):
-        options = {"contact": "auto", "impact": "newton", "locate": "root", "store": 1, "rest_speed": 1e-6,
-                   "backend": backend}  # fmt: skip
-        once = prepared(model, start, mbd.RadauIIA(), 0.02, 0.06, {}, options)
-        once.complete()
-        found.append(once.kernel.error.copy())
-    np.testing.assert_allclose(*found, rtol=1e-6, atol=1e-16)
-    assert np.max(np.abs(found[0])) > 1e-8
-
-
 # switching ----------------------------------------------------------------------------------------------------------
 def test_bounces_are_found_where_a_parabola_meets_the_floor():
     bounced = run(ball(restitution=0.5), {"fall.displacement": 1.0}, integrator=mbd.RadauIIA(), dt=0.03, until=1.0)
@@ -172,23 +157,3 @@ def test_a_tolerance_out_of_range_is_refused():
     with pytest.raises(mbd.CapabilityError, match="between 0 and 1e-3, not 0"):
         mbd.RadauIIA(tolerance=0)
     assert repr(mbd.RadauIIA()) == "RadauIIA()" and repr(mbd.RadauIIA(1e-8)) == "RadauIIA(tolerance=1e-08)"
-
-
-def test_a_run_is_read_between_its_rows_as_accurately_as_at_them(tmp_path):
-    """On polynomials of degree 5, also from a file; rates are one order less."""
-    model, start = started("double pendulum")
-    fine = mbd.simulate(model, start, mbd.RungeKutta853(), dt=2e-3, until=1.0)
-    instants = np.linspace(0.0, 1.0, 87)
-    names = list(start.names)
-
-    def errors(dt):
-        coarse = mbd.simulate(model, start, mbd.RadauIIA(), dt=dt, until=1.0)
-        loaded = mbd.load(coarse.save(tmp_path / "run.npz"))
-        return [
-            max(np.abs(read.at(times)[name] - fine.at(times)[name]).max() for name in names)
-            for read, times in ((coarse, coarse.time), (coarse, instants), (loaded, instants))
-        ]
-
-    for dt in (0.04, 0.02):
-        at_rows, between, loaded = errors(dt)
-        assert between < 2.0 * at_rows and loaded < 2.0 * at_rows

@@ -115,13 +115,6 @@ def test_between_its_rows_a_run_is_as_accurate_as_at_them(scene):
         assert np.max(error) < 2.0 * np.max(error[:: FINEST // 28]) + 1e-13
 
 
-def test_a_file_is_read_between_its_rows_as_the_run_itself(tmp_path):
-    coarse = fixed("double pendulum", 28)
-    loaded = mbd.load(coarse.save(tmp_path / "run"))
-    assert loaded.at(0.5 * T / 28)["u.angle"] == coarse.at(0.5 * T / 28)["u.angle"]
-    np.testing.assert_array_equal(loaded["u.angle"], coarse["u.angle"])
-
-
 # events -------------------------------------------------------------------------------------------------------------
 def test_impacts_of_a_ball_are_located_to_round_off_by_steps_longer_than_its_flights():
     bouncing = run(ball(restitution=0.5), {"fall.displacement": 1.0}, integrator=SCHEME, dt=0.9, until=1.3)

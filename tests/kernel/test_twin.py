@@ -19,7 +19,7 @@ from mbd.simulation.run.stepper import Stepper
 from mbd.state import Mode
 from mbd.testing.mechanisms import random_body, random_frame
 from tests.comparisons import at_least, compared
-from tests.equations.mechanisms import four_bar, furnished, random_tree
+from tests.equations.mechanisms import furnished, random_tree
 from tests.joints.quaternion_ball import CayleyBall, QuaternionBall
 from tests.simulation.mechanisms import ball, box, falling, kneed_walker, kneed_walker_start, pendulum, run
 
@@ -183,18 +183,6 @@ def test_integrator_advance_and_the_compiled_kernel_agree_on_random_mechanisms(s
     np.testing.assert_allclose(result.state.q, fast.record.q[-1], rtol=0, atol=1e-11 * speed * rate)
     np.testing.assert_allclose(result.state.v, fast.record.v[-1], rtol=0, atol=1e-10 * speed * rate)
     np.testing.assert_allclose(result.memory.rate, fast.record.a[-1], rtol=0, atol=1e-6 * rate)
-
-
-def test_a_four_bar_turns_alike_on_both_paths():
-    for scheme in ("hht", "generalized alpha index 3", "radau"):
-        trajectories = []
-        for backend in ("auto", "python"):
-            model = four_bar()
-            start = mbd.assemble(model, backend=backend)
-            trajectories.append(mbd.simulate(model, start, SCHEMES[scheme], dt=1e-3, until=0.1, backend=backend))
-        fast, plain = trajectories
-        np.testing.assert_allclose(fast.record.q, plain.record.q, rtol=0, atol=1e-11)
-        np.testing.assert_allclose(fast.record.lam, plain.record.lam, rtol=0, atol=1e-5)
 
 
 @settings(max_examples=2)

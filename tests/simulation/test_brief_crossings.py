@@ -54,15 +54,6 @@ def test_every_crossing_is_an_event_however_long_the_step(up, direction, depth, 
     np.testing.assert_allclose(found, expected, atol=1e-7)
 
 
-@pytest.mark.parametrize("direction", [0, 1, -1])
-def test_twins_find_the_same_crossings(direction):
-    found = [
-        run_over(1, direction, 1e-5, mbd.HHT(0.05), dt=0.05, until=0.4, backend=each) for each in ("llvm", "python")
-    ]
-    np.testing.assert_allclose(found[0][0], found[1][0], rtol=1e-12)
-    assert len(found[0][0]) == len(found[0][1])
-
-
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("lead", [-1e-3, 1e-3])
 def test_another_event_before_or_between_the_crossings_takes_none_of_them(direction, lead):

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.special import ellipj
 
 import mbd
 from mbd.analysis.accuracy.reference import RungeKuttaReference
@@ -90,64 +89,6 @@ def test_the_order_does_not_hang_on_the_chart(scheme):
     assert np.log2(errors[1] / errors[2]) == pytest.approx(scheme.order(), abs=0.15)
 
 
-def test_a_free_body_of_no_symmetry_turns_as_jacobi_says():
-    moments, w0 = np.array([0.02, 0.05, 0.07]), np.array([4.0, 0.0, 3.0])
-    model = mbd.Model("free body", gravity=(0.0, 0.0, 0.0))
-    body = mbd.RigidBody("body", 1.0, tuple(map(float, moments)))
-    model.connect(QuaternionBall("ball", model.ground.origin, body.origin))
-    run = mbd.simulate(model, mbd.assemble(model, velocity=named(w0, SPINS)), mbd.RungeKutta853(), tol=1e-9, until=5.0)
-    (A, B, C), (p, _, r) = moments, w0  # 2T = A p² + C r², L² = A² p² + C² r², at ω₂ = 0
-    twice, square = A * p * p + C * r * r, (A * p) ** 2 + (C * r) ** 2
-    assert square > twice * B  # about the axis of the largest moment
-    rate = np.sqrt((C - B) * (square - twice * A) / (A * B * C))
-    part = (B - A) * (twice * C - square) / ((C - B) * (square - twice * A))
-    sn, cn, dn, _ = ellipj(rate * run.time, part)
-    exact = np.column_stack([p * cn, -np.sqrt((twice * C - square) / (B * (C - B))) * sn, r * dn])
-    found = np.column_stack([run[name] for name in SPINS])
-    sign = np.sign(found[1, 1]) * np.sign(exact[1, 1])
-    np.testing.assert_allclose(found, exact * [1.0, sign, 1.0], atol=2e-7)
-    turned = [np.array(rotation(q)) @ (moments * w) for q, w in zip(run.record.q, found, strict=True)]
-    np.testing.assert_allclose(turned, np.broadcast_to(moments * w0, (len(turned), 3)), atol=2e-8)
-
-
-def chained(by_balls):
-    """Two heavy bodies, each on a ball joint or on three hinges with massless bodies between."""
-    model = mbd.Model("two bodies in space")
-    frame, start = model.ground.origin, {}
-    for number, (center, angles) in enumerate(
-        (((0.1, -0.3, 0.0), (0.4, 0.3, -0.2)), ((0.0, -0.2, 0.1), (0.2, -0.4, 0.5)))
-    ):
-        body = mbd.RigidBody(f"body {number}", 1.0 + number, (0.05, 0.06, 0.03), center=center)
-        if by_balls:
-            model.connect(QuaternionBall(f"ball {number}", frame, body.origin))
-            q = [1.0, 0.0, 0.0, 0.0]
-            for axis, angle in zip(np.eye(3), angles, strict=True):
-                q = product(q, axis_angle(axis, angle))
-            start |= named(q, [f"ball {number}.{part}" for part in "wxyz"])
-        else:
-            for axis, angle in zip(((1, 0, 0), (0, 1, 0)), angles[:2], strict=True):
-                link = mbd.RigidBody(f"link {number} {axis}", 0.0, (0.0, 0.0, 0.0))
-                model.connect(mbd.Revolute(f"hinge {number} {axis}", frame, link.origin, axis=axis))
-                frame, start = link.origin, start | {f"hinge {number} {axis}.angle": angle}
-            model.connect(mbd.Revolute(f"hinge {number} z", frame, body.origin, axis=(0, 0, 1)))
-            start[f"hinge {number} z.angle"] = angles[2]
-        frame = body.point(0.0, -0.5, 0.0, name="end")
-    model.constrain(mbd.Event("crossing", mbd.measure(lambda place: place[1] + 0.92, frame, unit="m")))
-    return model, mbd.assemble(model, start)
-
-
-def test_balls_move_as_chains_of_three_hinges():
-    runs = [mbd.simulate(*chained(by_balls), mbd.RungeKutta853(), dt=0.01, until=0.6) for by_balls in (True, False)]
-    times = np.linspace(0.05, 0.55, 7)
-    for name in ("body 0.end", "body 1.end"):
-        np.testing.assert_allclose(runs[0].at(times)[name], runs[1].at(times)[name], atol=1e-9)
-    instants = [[event.time for event in run.events] for run in runs]
-    assert len(instants[0]) > 0
-    np.testing.assert_allclose(*instants, atol=1e-10)
-    np.testing.assert_allclose(runs[0]["ball 0.reaction_force"][-1], runs[1]["hinge 0 (1, 0, 0).reaction_force"][-1],
-                               rtol=1e-7)  # fmt: skip
-
-
 @cache
 def bouncing(ball):
     """A pendulum in space, on a ball joint or a universal joint and a hinge, whose tip bounces on the ground."""
@@ -175,12 +116,6 @@ def test_impacts_of_a_ball_joint_are_those_of_three_hinges(scheme):
     np.testing.assert_allclose(*[[e.time for e in run.events] for run in runs], atol=1e-8)
     np.testing.assert_allclose(runs[0].at(0.85)["bob.tip"], runs[1].at(0.85)["bob.tip"], atol=1e-7)
     assert np.max(np.abs(runs[0].energy.numerical)) < 1e-7
-
-
-def test_a_compiled_impact_of_a_ball_joint_is_the_interpreted_one():
-    runs = [mbd.simulate(*bouncing(True), mbd.HHT(0.05), dt=0.01, until=0.5, backend=b) for b in ("auto", "python")]
-    np.testing.assert_allclose(runs[0].final.q, runs[1].final.q, atol=1e-8)
-    assert [e.time for e in runs[0].events] == pytest.approx([e.time for e in runs[1].events], abs=1e-9)
 
 
 def test_non_smooth_steps_move_positions_along_the_joint():
@@ -235,39 +170,6 @@ def test_a_run_is_as_accurate_between_its_rows_live_and_from_a_file(scheme, coun
     assert unit("ball.spin x.acceleration", saved.facts) == "rad/s²"
 
 
-def test_a_run_taken_up_again_goes_on_to_the_bit():
-    model, start = top()
-    for scheme in (mbd.GeneralizedAlpha(0.8), mbd.RadauIIA(), mbd.RungeKutta853()):
-        whole = mbd.simulate(model, start, scheme, dt=1.0 / 64.0, until=1.0)
-        first = mbd.simulate(model, start, scheme, dt=1.0 / 64.0, until=0.5)
-        again = mbd.simulate(model, first.final, scheme, dt=1.0 / 64.0, until=1.0)
-        np.testing.assert_array_equal(again.final.q, whole.final.q)
-        np.testing.assert_array_equal(again.final.v, whole.final.v)
-
-
-def test_a_tolerance_is_kept_by_increments():
-    model, start = top()
-    for scheme, tol in ((mbd.GeneralizedAlpha(0.8), 1e-4), (mbd.RadauIIA(), 1e-7), (mbd.RungeKutta853(), 1e-9)):
-        run = mbd.simulate(model, start, scheme, tol=tol, until=1.0)
-        assert np.max(np.abs(np.abs(run.final.q) - np.abs(end_of_top(1.0)[:4]))) < tol
-
-
-def test_a_cut_ball_joint_moves_as_one_of_the_tree():
-    ends = []
-    for cut in (("ball",), ("hinge",)):
-        model = mbd.Model("closed", cut=cut)
-        arm = mbd.RigidBody("arm", 1.0, (0.05, 0.06, 0.03), center=(0.3, 0.0, 0.0))
-        bar = mbd.RigidBody("bar", 2.0, (0.05, 0.06, 0.03), center=(0.1, -0.2, 0.1))
-        model.connect(mbd.Revolute("hinge", model.ground.origin, arm.origin, axis=(0, 0, 1)))
-        model.connect(mbd.Universal("cross", arm.point(0.6, 0.0, 0.0), bar.origin))
-        model.connect(QuaternionBall("ball", model.ground.point(0.5, -0.7, 0.2), bar.point(0.0, -0.6, 0.3)))
-        start = mbd.assemble(model)
-        run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.005, until=0.5)
-        assert run.violation.length < 1e-12
-        ends.append([run["hinge.angle"][-1], *run["bar.center"][-1], *(run[name][-1] for name in SPINS)])
-    np.testing.assert_allclose(*ends, atol=1e-8)
-
-
 @pytest.mark.parametrize("spin", [0.0, 30.0])
 def test_the_spectrum_of_a_sleeping_top_is_that_of_its_equations(spin):
     """``I s² − i J Ω s − m g l = 0`` in axes that stand, s − iΩ in those of the body."""
@@ -289,14 +191,6 @@ def test_the_reference_of_the_accuracy_lab_turns_a_body_exactly():
     model, start = top()
     run = mbd.simulate(model, start, RungeKuttaReference(), dt=0.1, until=1.0)
     assert off(run.final, end_of_top(1.0)) < 1e-10
-
-
-@pytest.mark.slow
-def test_the_accuracy_lab_measures_orders_of_a_ball_joint():
-    model, start = top()
-    lab = mbd.accuracy(model, start, 0.25, ["ball.x", "ball.spin z"], [mbd.RadauIIA(tolerance=1e-12)], [0.05, 0.025])
-    coarse, fine = (point.error for point in lab.points)
-    assert np.log2(coarse / fine) == pytest.approx(5.0, abs=0.5)
 
 
 def test_a_state_whose_quaternion_is_none_is_refused_by_name():

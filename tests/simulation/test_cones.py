@@ -191,20 +191,6 @@ def test_a_block_on_three_feet_stops_sliding_and_turning_at_once(scheme, how, bo
         assert np.max(np.diff(total)) < 1e-6
 
 
-def test_the_plain_twin_a_cut_run_and_a_file_tell_the_same(tmp_path):
-    whole = slid(on_incline(), (0.2, 0.3), until=0.5)
-    plain = slid(on_incline(), (0.2, 0.3), until=0.5, backend="python")
-    assert np.allclose(whole["slide.x"], plain["slide.x"], atol=1e-7)
-    first = slid(on_incline(), (0.2, 0.3), until=0.1)
-    rest = mbd.simulate(on_incline(), first.final, mbd.HHT(0.05), dt=1e-2, until=0.5)
-    assert np.array_equal(place(rest), place(whole))
-    whole.save(tmp_path / "run.npz")
-    kept = mbd.load(tmp_path / "run.npz")
-    for name in ("foot.friction.forward", "foot.friction.sideways", "foot friction.power"):
-        assert np.array_equal(kept[name], whole[name])
-    assert kept.energy["foot friction"][-1] == whole.energy["foot friction"][-1]
-
-
 @pytest.mark.parametrize("speed", [(1.0, 2.0), (3.0, -1.0), (1.0, 1.0)])
 @pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.Newmark(), mbd.RadauIIA(), mbd.RungeKutta4()], ids=str)
 def test_a_block_may_stop_at_the_end_of_a_step(scheme, speed):

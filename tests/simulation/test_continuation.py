@@ -1,4 +1,4 @@
-"""Going on from the end of a run, prescribed motions, stored rows, determinism."""
+"""Going on from the end of a run, stored rows, and what they cost."""
 
 from __future__ import annotations
 
@@ -8,32 +8,9 @@ import numpy as np
 import pytest
 
 import mbd
-from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, pendulum, point, run
-
+from tests.simulation.mechanisms import G, ball, falling, kneed_walker, kneed_walker_start, pendulum, run
 
 # going on -----------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("pause", [0.2, 0.5643, 0.7, 1.0])
-def test_a_walk_continued_from_its_end_has_the_same_events(pause):
-    walker = kneed_walker()
-    start, scheme = kneed_walker_start(walker), mbd.HHT(0.05)
-    whole = mbd.simulate(walker, start, scheme, dt=1e-3, until=2.0)
-    first = mbd.simulate(walker, start, scheme, dt=1e-3, until=pause)
-    second = mbd.simulate(walker, first.final, scheme, dt=1e-3, until=2.0)
-    events = first.events + second.events
-    assert [(e.name, e.kind) for e in events] == [(e.name, e.kind) for e in whole.events]
-    np.testing.assert_allclose([e.time for e in events], [e.time for e in whole.events], atol=1e-6)
-    np.testing.assert_allclose(second.final.q, whole.final.q, atol=1e-5)
-    assert second.time[0] == first.time[-1] == pause
-
-
-def test_a_run_continued_right_after_an_impact_does_not_repeat_it():
-    walker = kneed_walker()
-    start, scheme = kneed_walker_start(walker), mbd.HHT(0.05)
-    first = mbd.simulate(walker, start, scheme, dt=1e-3, until="right foot")
-    second = mbd.simulate(walker, first.final, scheme, dt=1e-3, until=first.time[-1] + 0.1)
-    assert first.events[-2].name == "right foot" and second.events == []
-    np.testing.assert_allclose(second.record.a[0], first.record.a[-1], atol=1e-9)
-    np.testing.assert_allclose(second.record.lam[0], first.record.lam[-1], atol=1e-9)
 
 
 def test_a_released_contact_stays_ignored_in_the_continued_run():
@@ -58,35 +35,6 @@ def test_changed_parameters_travel_with_the_state():
     first = mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=0.5)
     second = mbd.simulate(model, first.final, mbd.HHT(0.05), dt=0.01, until=1.0)
     assert second.parameters["rod.length"] == 2.0
-
-
-# prescribed motion --------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("formulation", ["ggl", "index3"])
-def test_a_prescribed_motion_is_followed_and_its_force_is_that_of_newton(formulation):
-    model, body = point()
-    model.constrain(mbd.Bilateral("lift", mbd.height(body.origin), value=lambda t: 0.1 * mbd.sin(6.0 * t)))
-    scheme = mbd.HHT(0.1, formulation=formulation)
-    start = mbd.assemble(model)
-    assert start["place.y.rate"] == pytest.approx(0.6), "the start moves as prescribed"
-    errors = []
-    for dt in (4e-3, 2e-3):
-        trajectory = mbd.simulate(model, start, scheme, dt=dt, until=1.0)
-        t = trajectory.time
-        np.testing.assert_allclose(trajectory["place.y"], 0.1 * np.sin(6.0 * t), atol=1e-13)
-        force = G - 3.6 * np.sin(6.0 * t)
-        errors.append(abs(-trajectory.record.lam[-1, 0] - force[-1]))
-    assert max(errors) < 1e-3 and errors[0] / errors[1] == pytest.approx(4.0, abs=0.8)
-
-
-def test_a_prescribed_point_with_a_contact_below_lands_on_the_moving_schedule():
-    """A table rises under a hanging ball: contact where its height reaches the ball."""
-    model, body = falling()
-    model.constrain(
-        mbd.Bilateral("thread", mbd.height(body.origin), value=0.3),
-        mbd.Event("met", mbd.measure(lambda p, t: p[1] - t * t, body.origin, "t")),
-    )
-    trajectory = run(model, until=1.0)
-    assert [event.time for event in trajectory.events] == [pytest.approx(np.sqrt(0.3), abs=1e-12)]
 
 
 # rows ---------------------------------------------------------------------------------------------------------------
@@ -129,20 +77,7 @@ def test_the_memory_of_a_long_run_grows_with_its_stored_rows_only():
     assert peaks[1] < peaks[0] + 50_000
 
 
-# the same again -----------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("backend", ["auto", "python"])
-def test_the_same_run_gives_the_same_bits(backend):
-    trajectories = []
-    for _ in range(2):
-        walker = kneed_walker()
-        start = kneed_walker_start(walker, backend=backend)
-        trajectories.append(mbd.simulate(walker, start, mbd.HHT(0.05), dt=5e-3, until=0.7, backend=backend))
-    first, second = (trajectory.record for trajectory in trajectories)
-    for part in ("time", "q", "v", "a", "lam", "closed"):
-        assert np.array_equal(getattr(first, part), getattr(second, part)), part
-    for a, b in zip(first.events, second.events, strict=True):
-        assert (a.time, a.name, a.kind, a.energy_loss) == (b.time, b.name, b.kind, b.energy_loss)
-        assert np.array_equal(a.impulse, b.impulse)
+# what a run leaves alone ---------------------------------------------------------------------------------------------
 
 
 def test_a_state_is_never_changed_by_a_run():

@@ -83,20 +83,6 @@ def test_blows_without_end_and_without_a_rest_speed_end_at_rest():
 
 
 # interruptions ------------------------------------------------------------------------------------------------------
-def test_ctrl_c_keeps_the_run():
-    calls = []
-
-    def impatient(t, state):
-        calls.append(t)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-
-    model = pendulum()
-    with pytest.raises(mbd.SimulationError, match="interrupted") as stopped:
-        run(model, {"hinge.angle": 1.0}, dt=1e-6, until=100.0, store=10_000, observers=[impatient])
-    kept = stopped.value.run
-    assert kept.final.time == calls[1] > 0.0 and not kept.success
-    assert mbd.simulate(model, kept.final, mbd.HHT(0.05), dt=1e-3, until=kept.final.time + 0.1).success
 
 
 def test_a_signal_from_the_keyboard_reaches_a_compiled_run():

@@ -1,4 +1,4 @@
-"""Dry friction in joints, in chains and loops; both forms of the kernel, files and pictures."""
+"""Dry friction in joints, in chains and loops; tables and pictures of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mbd
-from tests.simulation.frictions import brick, check_friction, four_bar, stops
+from tests.simulation.frictions import brick, check_friction, four_bar
 from tests.simulation.mechanisms import pendulum, run
 
 
@@ -68,34 +68,6 @@ def test_pin_friction_that_was_left_out_cannot_be_had_at_run_time():
 
 
 # around ------------------------------------------------------------------------------------------------------------
-TWINS = [(brick(0.4), 1e-9), (four_bar(mbd.PinFriction(0.3, 0.05)), 1e-4), (four_bar(mbd.Coulomb(0.4)), 1e-9)]
-
-
-@pytest.mark.parametrize(("model", "slack"), TWINS, ids=["contacts", "load-dependent pins", "dry pins"])
-def test_plain_python_gives_the_same_stick_and_slip(model, slack):
-    """To round-off, but for pins whose friction follows the force: the tangents of both forms, by which positions are
-    corrected, are taken at different iterates."""
-    if model.name == "brick":
-        position, velocity = {"place.y": 0.4, "place.angle": 0.3}, {"place.x": 1.0}
-    else:
-        position, velocity = {"pin 0.angle": 0.9}, {"pin 0.angle": 3.0}
-    scheme = mbd.HHT(0.05, tolerance=1e-13)
-    one, two = (
-        run(model, position, velocity, until=0.5, dt=0.01, backend=backend, integrator=scheme)
-        for backend in ("auto", "python")
-    )
-    assert [(e.kind, e.name) for e in one.events] == [(e.kind, e.name) for e in two.events]
-    np.testing.assert_allclose([e.time for e in one.events], [e.time for e in two.events], rtol=0, atol=slack)
-    np.testing.assert_allclose(one.record.v[-1], two.record.v[-1], rtol=0, atol=10.0 * slack)
-
-
-def test_a_run_goes_on_from_where_it_stuck():
-    model = pendulum(mbd.Coulomb(2.0))
-    first = run(model, {"hinge.angle": 0.1}, {"hinge.angle": 0.8}, until=1.0)
-    assert stops(first) == [("stuck", "hinge")]
-    second = mbd.simulate(model, first.final, mbd.HHT(0.05), dt=0.01, until=2.0)
-    assert second.events == []
-    np.testing.assert_allclose(second["hinge.angle"], first["hinge.angle"][-1], rtol=0, atol=1e-14)
 
 
 def test_friction_is_kept_in_files_tables_and_pictures(tmp_path):

@@ -203,28 +203,6 @@ def test_a_contact_that_pulls_over_a_step_has_let_go_before_it():
 
 
 # order, schemes, forms ----------------------------------------------------------------------------------------------
-def tumbling(reverse=False, restitution=0.4, **more):
-    model = box(0.3, restitution, reverse=reverse)
-    velocity = {"place.x": 0.5, "place.y": -1.0, "place.angle": -0.7}
-    return nonsmooth(model, {"place.y": 0.3, "place.angle": 0.15}, velocity, until=0.8, dt=4e-3, **more)
-
-
-def test_the_order_of_contacts_changes_nothing():
-    one, other = tumbling(), tumbling(reverse=True)
-    np.testing.assert_allclose(one.record.q, other.record.q, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(one.record.v, other.record.v, rtol=0, atol=1e-10)
-    assert sorted((e.time, e.name, e.kind) for e in one.events) == sorted(
-        (e.time, e.name, e.kind) for e in other.events
-    )
-
-
-def test_machine_code_and_plain_python_take_the_same_steps():
-    one = tumbling(integrator=mbd.HHT(0.05, tolerance=1e-13))
-    other = tumbling(integrator=mbd.HHT(0.05, tolerance=1e-13), backend="python")
-    assert one.stats["compiled"] and not other.stats["compiled"]
-    assert [(e.time, e.name, e.kind) for e in one.events] == [(e.time, e.name, e.kind) for e in other.events]
-    np.testing.assert_allclose(one.record.q, other.record.q, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(one.record.lam, other.record.lam, rtol=0, atol=1e-7)
 
 
 SCHEMES = [

@@ -74,59 +74,6 @@ def test_a_ball_rolls_down_a_slope_or_slips(friction, rolls):
     assert run.stats["cone_residual"] <= 1e-10
 
 
-def test_a_block_on_three_feet_stops_sliding_and_turning_at_once():
-    model, feet = cones.three_feet(), ["foot 0", "foot 1", "foot 2"]
-    speed = {"float.x.rate": 1.2, "float.y.rate": 0.3, "float.angular_velocity.z": 8.0}
-    start = mbd.assemble(model, position={"float.z": 0.05}, velocity=speed, closed=feet)
-    for dt in (4e-3, 2e-3):
-        run = mbd.simulate(model, start, mbd.HHT(0.05), dt=dt, until=0.5, **STEPS)
-        assert [event.kind for event in run.events] == ["stuck"] * 3
-        assert abs(run.events[0].time - 0.4462068377620775) <= dt
-        yaw = 2.0 * np.arctan2(run["float.orientation.z"][-1], run["float.orientation.w"][-1])
-        assert [run["float.x"][-1], run["float.y"][-1], yaw] == pytest.approx(
-            [0.2796055695309647, 0.06853206174213983, 0.8296938955141766], abs=0.05 * dt
-        )
-        total = run.energy["total"]
-        assert total[-1] - total[0] == pytest.approx(-1.85, abs=1e-9)
-        push, pull = loads(run, 3)
-        assert np.all(pull <= 0.3 * push * (1.0 + 1e-9))
-
-
-def pushed(feet, force, friction, dt=5e-3, until=0.25, **build):
-    model = on_feet(feet, friction=friction, **build)
-    closed = [f"foot {k}" for k in range(len(feet))]
-    values = {"push.force.x": force * np.cos(0.3), "push.force.y": force * np.sin(0.3)}
-    start = mbd.assemble(model, position={"float.z": build["center"]}, closed=closed, parameters=values)
-    return mbd.simulate(model, start, mbd.HHT(0.05), dt=dt, until=until, parameters=values, **STEPS)
-
-
-TABLE = {"mass": 12.0, "inertia": (1.2, 1.1, 0.9), "center": 0.5}
-LEGS = ((0.4, 0.0), (-0.2, 0.35), (-0.2, -0.35))
-
-
-@pytest.mark.parametrize(("force", "slips"), [(20.0, False), (32.30, False), (32.31, True), (36.0, True)])
-def test_a_table_slips_where_no_friction_within_all_cones_holds_it(force, slips):
-    """The smallest push is 32.30288 N: limit analysis, the least over all centers of rotation."""
-    run = pushed(LEGS, force, 0.35, **TABLE)
-    moved = np.hypot(run["float.x"][-1], run["float.y"][-1])
-    assert moved > 1e-6 if slips else moved < 1e-15
-    push, pull = loads(run, 3)
-    assert np.all(pull <= 0.35 * push * (1.0 + 1e-8) + 1e-7)
-    assert np.all(push > 0.0)
-    assert run.stats["cone_residual"] <= 1e-10
-
-
-def test_a_table_of_four_legs_stands_although_nothing_tells_how_its_feet_share_the_load():
-    feet = ((0.4, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.4, -0.3))
-    for force in (30.0, 42.0):  # μ m g = 41.2 N
-        run = pushed(feet, force, 0.35, **TABLE)
-        moved = np.hypot(run["float.x"][-1], run["float.y"][-1])
-        assert moved > 1e-2 if force > 41.2 else moved < 1e-15
-        push, pull = loads(run, 4)
-        assert np.sum(push, axis=0) == pytest.approx(12.0 * G, rel=1e-9)
-        assert np.all(pull <= 0.35 * push * (1.0 + 1e-8) + 1e-7)
-
-
 @settings(max_examples=4)
 @given(
     friction=st.sampled_from([0.1, 0.8]), restitution=st.sampled_from([0.0, 0.5]), seed=st.integers(0, 10**6),
@@ -241,48 +188,3 @@ def test_feet_of_all_kinds_and_dry_joints_are_solved_together():
     early = (run.time > 0.01) & (run.time < 0.1)
     assert np.diff(speed[early]) == pytest.approx(-4.0 * np.diff(run.time[early]), abs=1e-9)
     assert abs(run["rail.rate"][-1]) < 1e-12 and np.hypot(run["float.x.rate"][-1], run["float.y.rate"][-1]) < 1e-12
-
-
-@pytest.mark.slow
-def test_a_person_lands_on_six_points_of_two_feet_by_both_strategies():
-    person = mbd.human(mass=75.0, height=1.8)
-    model = mbd.Model("person")
-    model.connect(*person.joints)
-    feet = [f"{side} {place}" for side in ("left", "right") for place in ("heel", "inner ball", "outer ball")]
-    for name in feet:
-        side, _, place = name.partition(" ")
-        ground = mbd.touchdown(person.bodies[f"{side} foot"].frame(place))
-        model.constrain(mbd.Unilateral(name, ground, friction=0.6))
-    pose = dict(person.standing(knees=0.2))
-    start = mbd.assemble(model, position=pose | {"trunk.y": pose["trunk.y"] + 0.02}, velocity={"trunk.x": 0.5})
-    left = []
-    for contact in ("events", "nonsmooth"):
-        run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=0.4, contact=contact)
-        for name in feet:
-            pull = np.hypot(run[f"{name}.friction.forward"], run[f"{name}.friction.sideways"])
-            assert np.all(pull <= 0.6 * run[f"{name}.force"] + 1e-6)
-            assert run[f"{name}.gap"].min() > -1e-9
-        left.append(run.energy["total"][-1])
-    assert left[1] == pytest.approx(left[0], abs=0.5)
-
-
-def test_the_plain_twin_lands_on_redundant_feet_as_machine_code_does():
-    model, how = on_feet(FOUR), {"dt": 5e-3, "until": 0.1, "contact": "nonsmooth"}
-    velocity = {"float.x.rate": 0.8, "float.z.rate": -0.5, "float.angular_velocity": (0.6, 0.3, -0.9)}
-    start = mbd.assemble(model, position={"float.z": 0.055}, velocity=velocity)
-    one, other = (mbd.simulate(model, start, mbd.HHT(0.05), backend=backend, **how) for backend in ("llvm", "python"))
-    assert [(e.kind, e.name, e.time) for e in one.events] == [(e.kind, e.name, e.time) for e in other.events] != []
-    for name in ("float.x", "float.y", "float.z", "float.x.rate"):
-        assert np.allclose(one[name], other[name], atol=1e-9)
-
-
-def test_the_plain_twin_a_cut_run_and_the_automatic_choice():
-    how = {"until": 0.4, "contact": "nonsmooth"}
-    whole = cones.slid(cones.on_incline(), (0.2, 0.3), **how)
-    plain = cones.slid(cones.on_incline(), (0.2, 0.3), backend="python", **how)
-    assert [event.kind for event in plain.events] == [event.kind for event in whole.events] == ["stuck"]
-    assert np.allclose(whole["slide.x"], plain["slide.x"], atol=1e-7)
-    first = cones.slid(cones.on_incline(), (0.2, 0.3), until=0.1, contact="nonsmooth")
-    rest = mbd.simulate(cones.on_incline(), first.final, mbd.HHT(0.05), dt=1e-2, **how)
-    assert np.array_equal(cones.place(rest), cones.place(whole))
-    assert cones.slid(cones.on_incline(), (0.2, 0.3), until=0.1, contact="auto").settings["contact"] == "events"

@@ -231,26 +231,6 @@ def test_penalties_and_user_events_are_located_beside_contacts_that_are_not():
 
 
 # stopping and going on ----------------------------------------------------------------------------------------------
-def test_a_run_goes_on_from_where_another_ended():
-    model = ball(restitution=0.5)
-    whole = nonsmooth(model, {"fall.displacement": 1.0}, until=2.0)
-    part = nonsmooth(model, {"fall.displacement": 1.0}, until=1.0)
-    rest = mbd.simulate(model, part.final, mbd.HHT(0.05), dt=0.01, until=2.0, contact="nonsmooth")
-    assert [e.time for e in part.events + rest.events] == pytest.approx([e.time for e in whole.events], abs=1e-9)
-    np.testing.assert_allclose(rest.record.q[-1], whole.record.q[-1], rtol=0, atol=1e-9)
-
-
-def test_an_interrupted_run_keeps_what_it_has():
-    def interrupt(time, state):
-        raise KeyboardInterrupt
-
-    model = ball(restitution=0.5)
-    trajectory = nonsmooth(
-        model, {"fall.displacement": 1.0}, until=50.0, dt=1e-4, observers=[interrupt],
-        on_failure="return",
-    )  # fmt: skip
-    assert not trajectory.success and "interrupted" in trajectory.message
-    assert trajectory["floor.gap"].min() > -1e-12
 
 
 @pytest.mark.parametrize("until_works", [1, 2, 3, 4])

@@ -65,17 +65,6 @@ def test_halves_of_random_mechanisms_over_the_ground_are_the_whole(seed, part):
     assert_halves_are_the_whole(whole, *halves(model, start, mbd.GeneralizedAlpha(0.8), whole.time[row], **how))
 
 
-def test_many_pieces_are_the_whole():
-    model, start = scene("kneed walker")
-    whole = mbd.simulate(model, start, dt=2e-3, until=1.0)
-    state, rows = start, [whole.record.q[:1]]
-    for time in [*np.unique(whole.time)[1::7].tolist(), 1.0]:
-        piece = mbd.simulate(model, state, dt=2e-3, until=time)
-        rows.append(piece.record.q[1:])
-        state = piece.final
-    np.testing.assert_array_equal(np.concatenate(rows), whole.record.q)
-
-
 @pytest.mark.parametrize("pause", [0.3, 0.7, 1.1, 1.3])
 def test_a_round_number_of_seconds_cuts_on_the_grid(pause):
     """A sum of steps differs from it by round-off; the step is the same, its row has the time that was asked for."""

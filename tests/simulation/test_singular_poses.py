@@ -83,18 +83,6 @@ def test_nothing_is_kicked_next_to_a_singular_pose(dt, scheme):
     assert np.max(bends) < 20.0 * dt**2 + 1e-14 / dt**2  # the second slope of the rate is 8 rad/s³
 
 
-@pytest.mark.covering
-@pytest.mark.parametrize("scheme", [mbd.HHT(0.05), mbd.Newmark()], ids=repr)
-@pytest.mark.parametrize("name", ["one four-bar", "slider-crank", "row on velocities", "three cranks, redundant"])
-def test_plain_python_passes_them_like_machine_code(name, scheme):
-    found, _ = passage(name)
-    fast, plain = (
-        mbd.simulate(*found.start, scheme, dt=5e-3, until=0.8, backend=backend) for backend in ("llvm", "python")
-    )
-    assert plain.stats["singular_steps"] == fast.stats["singular_steps"] > 0
-    assert abs(plain[found.angle][-1] - fast[found.angle][-1]) < 1e-9
-
-
 def test_a_step_that_would_end_next_to_the_pose_is_shortened():
     found, exact = passage("slider-crank")
     whole = mbd.simulate(*found.start, mbd.Newmark(), dt=1e-4, until=0.5)

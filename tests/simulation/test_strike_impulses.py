@@ -88,11 +88,6 @@ def test_the_ledger_closes_where_rows_take_an_impulse(order):
     assert abs(run.final["place.x.rate"]) < 1e-12 and np.max(np.abs(run.energy.numerical)) < 1e-12
 
 
-def test_twins_agree_on_impulses():
-    runs = [mbd.simulate(*wheel(), mbd.HHT(), dt=5e-3, until=0.5, backend=each) for each in ("llvm", "python")]
-    np.testing.assert_allclose(runs[0]["float.x"], runs[1]["float.x"], rtol=1e-9)
-
-
 def test_a_size_may_follow_the_motion_and_is_a_parameter():
     doubled = mbd.simulate(
         *wheel(), mbd.RungeKutta4(), dt=0.01, until=0.7, parameters={f"push {k}.size": 0.4 for k in range(8)}

@@ -256,7 +256,7 @@ def following(model, start, scheme, until, allowed=1e-6, backend="auto"):
 
 @pytest.mark.covering
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("scheme", SCHEMES[:2], ids=repr)
+@pytest.mark.parametrize("scheme", [*SCHEMES[:2], mbd.RadauIIA(tolerance=1e-13)], ids=repr)
 def test_the_interpreted_kernel_takes_the_steps_of_the_compiled_one(scene, scheme):
     model, start, _, _ = reference(scene)
     fast, slow = (following(model, start, scheme, 0.3) for _ in range(2))
