@@ -14,13 +14,10 @@ from mbd.analysis.accuracy import choices, lab as laboratory, points
 from mbd.analysis.accuracy.points import MIN_REPORTED_OVER_BOUND
 from mbd.cli import Script
 from mbd.hardcases.knees import leg as knee_leg
-from mbd.hardcases.long_run import long_pendulum
 from tests.analysis.test_numerical import ALL as OSCILLATING, DISCRETE, Unsquared, spring_and_dashpot
 from tests.cases.double_pendulums import FORMS as DOUBLE
 from tests.cases.flexible import NAMES, flexible_slider_crank
-from tests.cases.pendulums import FORMS
 from tests.cases.walkers import compass, kneed, standing, strikes
-from tests.cases.wheels import RimlessWheel
 from tests.problems import Case, case
 
 SCHEMES = (mbd.HHT(alpha=0.05), mbd.RadauIIA(), mbd.RungeKutta853())
@@ -87,17 +84,6 @@ A1, A2, A3, A4 = (case(name) for name in ("a1-simple-pendulum", "a2-double-pendu
                                           "a4-coulomb-pendulum"))  # fmt: skip
 
 
-@pytest.mark.parametrize("which", [0, 1])
-def test_a1_a_wide_swing(which: int) -> None:
-    swing, reference = FORMS["minimal"](), A1["theta(t)"]
-    found = assert_ends_agree(Scene(
-        swing.model, swing.start(A1.start["theta0"]), float(reference.t[which]),
-        ends(reference, ["pivot.angle"], which), float(reference.t[which]) / 400,
-    ))  # fmt: skip
-    errors = [point.at_most for point in found.points]
-    assert errors[0] > 100.0 * errors[1] and errors[1] < 1e-5 and errors[2] < 1e-7
-
-
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_a2_a_double_pendulum(which: int) -> None:
     swing, reference = DOUBLE["Lagrange"](), A2["[theta1, theta2"]
@@ -105,27 +91,6 @@ def test_a2_a_double_pendulum(which: int) -> None:
     until = float(reference.t[which])
     names = ["upper", "lower", "upper.rate", "lower.rate"]
     assert_ends_agree(Scene(swing.model, start, until, ends(reference, names, which), 2e-3))
-
-
-@pytest.mark.slow
-def test_a2_places_with_rows() -> None:
-    swing, reference = DOUBLE["elbow cut"](), A2["[x1,z1,x2,z2"]
-    start = swing.start([A2.start[name] for name in ("theta1", "theta2", "thetadot1", "thetadot2")])
-    names = [f"{body}.end.{part}" for body in ("upper", "lower") for part in ("x", "y")]
-    names += [f"{body}.end.v{part}" for body in ("upper", "lower") for part in ("x", "y")]
-    schemes = (*SCHEMES, mbd.HHT(alpha=0.05, formulation="index3"))
-    assert_ends_agree(Scene(swing.model, start, float(reference.t), ends(reference, names), 2e-3, schemes))
-
-
-@pytest.mark.parametrize("which", [0, 1, 2])
-def test_a3_a_damped_bar(which: int) -> None:
-    m, J, d, c, g = (A3.definition[name] for name in ("m", "I_com", "d", "c", "g"))
-    model = mbd.Model("bar", gravity=(0.0, -g, 0.0))
-    body = mbd.RigidBody("bar", mass=m, inertia=(0.2, 0.1, J), center=(0.0, -d, 0.0))
-    model.connect(mbd.Revolute("pivot", model.ground.origin, body.origin, loss=mbd.Viscous(c)))
-    start, reference = mbd.assemble(model, position={"pivot.angle": A3.start["theta0"]}), A3["[theta, thetadot]"]
-    names = ["pivot.angle", "pivot.angle.rate"]
-    assert_ends_agree(Scene(model, start, float(reference.t[which]), ends(reference, names, which), 5e-3))
 
 
 # events -------------------------------------------------------------------------------------------------------------
@@ -149,22 +114,6 @@ def assert_instants_agree(
         if all_published:
             assert point.event_time == pytest.approx(true, abs=1.001 * room)
     return found
-
-
-@pytest.mark.slow
-def test_a4_a_pendulum_that_sticks_at_last() -> None:
-    J, K, tau = (A4.definition[name] for name in ("J", "K_mgd", "tau_friction"))
-    model = mbd.Model("pendulum", gravity=(0.0, -K / J, 0.0))
-    rod = mbd.Link("rod", mass=J, length=1.0, center=1.0)
-    model.connect(mbd.Revolute("hinge", model.ground.origin, rod.start, loss=mbd.Coulomb(tau)))
-    start, rest = mbd.assemble(model, position={"hinge.angle": A4.start["theta0"]}), A4["rest angle"]
-    times, end = A4["turning times"], {"hinge.angle": (float(rest.value), rest.accuracy)}
-    scene = Scene(model, start, float(times.value[-1]) + 0.3, end, 5e-3)
-    assert_ends_agree(scene)
-    assert_instants_agree(
-        scene, times.value[1:], times.accuracy,
-        lambda run: [event.time for event in run.events if event.kind in ("slipped", "stuck") and event.time > 0.1],
-    )  # fmt: skip
 
 
 GAITS = {"f2-compass-gait-3deg": (compass, False), "f3-kneed-walker-chen": (kneed, True)}
@@ -193,25 +142,6 @@ def test_f2_f3_a_step_of_a_walker(name: str) -> None:
     room = rates * truth.event_bound + 10.0 * truth.error
     assert strike.after == pytest.approx(fixed, abs=room + reference["fixed point"].accuracy)
     assert strike.before == pytest.approx(before.value, abs=room + before.accuracy)
-
-
-@pytest.mark.slow
-def test_f4_a_rimless_wheel() -> None:
-    reference = case("f4-rimless-wheel")
-    p = reference.definition
-    wheel = RimlessWheel(int(p["n_spokes"]), p["L"], p["g"], p["slope"], p["r_gyr2_over_L2"])
-    model, after, period = wheel.model(), reference["w just after"], reference["step period"]
-    start = wheel.start(model, float(after.value))
-    scene = Scene(model, start, 3.2 * float(period.value), {"roll.angle.rate": (0.0, 0.0)}, 2e-3)
-
-    def touches(run: mbd.Trajectory) -> list[float]:
-        return [event.time for event in run.events if event.kind == "closed"]
-
-    found = assert_instants_agree(scene, period.value * np.arange(1, 4), period.accuracy, touches)
-    truth = found.reference
-    assert truth is not None
-    speeds = -truth.run.at(touches(truth.run))["roll.angle.rate"]
-    assert speeds == pytest.approx(np.full(3, after.value), abs=10.0 * (truth.event_bound + truth.error) + 1e-10)
 
 
 @pytest.mark.parametrize(
@@ -326,14 +256,6 @@ def test_i3_the_square_of_beta_decides_whether_stiff_modes_decay_or_grow() -> No
 
 
 # very long times ----------------------------------------------------------------------------------------------------
-@pytest.mark.slow
-def test_j12_a_thousand_periods() -> None:
-    id = "j12-long-time-1e3-periods"
-    model, start = long_pendulum(case=id)
-    until, exact = float(case(id)["end time"].value), case(id)["theta("]
-    scene = Scene(model, start, until, {"pivot.angle": (float(exact.value), 1e-9)}, until / 1000 / 100)
-    found = assert_ends_agree(scene)
-    assert found.points[0].error > 100.0 * found.points[1].at_most
 
 
 def long_lab(periods: int, steps: Sequence[int], integrators: Any = None, store: int | None = None) -> mbd.Accuracy:
@@ -367,10 +289,3 @@ def test_j12_energy_is_bounded_and_phase_adds_up_by_the_published_values(periods
     assert undamped[-1].order == pytest.approx(2.0, abs=0.05)
     assert all(point.end_errors["energy"] > 5.0 * undamped[-1].errors["energy"] for point in damped)
     assert all(point.at_most < 1e-3 * undamped[-1].error for point in eighth)
-
-
-@pytest.mark.slow
-def test_j12_rho_one_of_the_generalized_scheme_is_the_trapezoidal_rule() -> None:
-    found = long_lab(100_000, (50,), [mbd.Newmark(), mbd.GeneralizedAlpha(rho_inf=1.0)])
-    one, other = found.points
-    assert one.errors == pytest.approx(other.errors, rel=1e-6)

@@ -146,15 +146,6 @@ def test_dry_friction_takes_its_force_times_the_path():
     assert abs(run.energy.numerical[-1]) < 1e-6
 
 
-def test_the_amplitude_of_a_dry_oscillator_falls_by_twice_the_friction_over_the_stiffness():
-    """Each half swing takes 2 F x̄ = ½ k (x₀² − x₁²): the column after n of them."""
-    force, k, x0, mass = 1.0, 100.0, 0.2, 2.0
-    half = math.pi * math.sqrt(mass / k)
-    run = run_of(slider(stiffness=k, loss=mbd.Coulomb(force)), dt=2e-4, until=3.0 * half, q=x0)
-    left = x0 - 3.0 * 2.0 * force / k
-    assert run.energy["rail friction"][-1] == pytest.approx(-0.5 * k * (x0**2 - left**2), rel=1e-5)
-
-
 def test_an_impact_takes_half_m_v_squared_times_one_less_e_squared():
     mass, g, height, e = 2.0, 10.0, 0.8, 0.6
     model = slider(gravity=g, mass=mass)

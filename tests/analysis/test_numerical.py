@@ -115,32 +115,11 @@ def test_the_radius_at_infinity_is_reached_though_roots_are_multiple_there(name)
     assert measured(name).rho_inf == pytest.approx(I1[f"rho_infinity | {name}"].value, abs=2e-5)
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_stiff_modes_keep_the_promised_share_per_step(name):
-    """The limit of the radius as ω dt → ∞, by a polynomial in (ω dt)^(−2/3), for a threefold root splits like that."""
-    reference, turns = I1[f"rho_infinity | {name}"], 250.0 * 2.0 ** np.arange(5)
-    radii = [spectrum(ALL[name], turn).radius for turn in turns]
-    limit = np.polynomial.Polynomial.fit(turns ** (-2 / 3), radii, 4)(0.0)
-    assert limit == pytest.approx(reference.value, abs=reference.accuracy)
-
-
 def extrapolated(value):
     """The limit at zero of a function of Ω², from Ω = 0.08, 0.04, 0.02."""
     a, b, c = (value(turn) for turn in (0.08, 0.04, 0.02))
     ab, bc = (4 * b - a) / 3, (4 * c - b) / 3
     return (16 * bc - ab) / 15
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_errors_of_period_and_damping_have_their_asymptotic_coefficients(name):
-    scheme, power = ALL[name], 1 if "damped" in name else 3
-    longer = I2[f"lim of (T_bar/T - 1)/Omega^2 | {name}"]
-    damping = I2[f"lim of damping ratio/Omega{f'^{power}' if power > 1 else ''} | {name}"]
-    found = extrapolated(lambda turn: spectrum(scheme, turn).elongation / turn**2)
-    assert found == pytest.approx(longer.value, abs=longer.accuracy)
-    found = extrapolated(lambda turn: spectrum(scheme, turn).damping / turn**power)
-    assert found == pytest.approx(damping.value, abs=damping.accuracy)
-    assert scheme.order() == (1 if power == 1 else 2)
 
 
 @pytest.mark.parametrize("name", SCHEMES)

@@ -31,46 +31,21 @@ def first_step(scheme: NewmarkFamily, form: str) -> float:
     return 2e-3 if scheme.formulation == "index3" else 1e-3
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(("form", "scheme"), PAIRS)
-def test_angles_and_rates_meet_the_reference_to_second_order(form: str, scheme: NewmarkFamily) -> None:
+def test_motion_and_rod_tensions_meet_the_references_to_second_order(form: str, scheme: NewmarkFamily) -> None:
     swing = FORMS[form]()
-    start, reference = swing.start(START), A2["[theta1, theta2"]
+    start, angles, places, pulls = swing.start(START), A2["[theta1, theta2"], A2["[x1,z1,x2,z2"], A2["rod tensions"]
 
     def errors(dt: float) -> list[float]:
-        runs = [last(swing, start, scheme, dt, t) for t in reference.t]
+        runs = [last(swing, start, scheme, dt, t) for t in angles.t]
         found = np.array([[column[-1] for column in swing.motion(run)] for run in runs])
-        return [float(np.linalg.norm(each)) for each in (found - reference.value)]
+        end = last(swing, start, scheme, dt, places.t)
+        bobs, tensions = (np.array([column[-1] for column in read(end)]) for read in (swing.bobs, swing.tensions))
+        turned = [float(np.linalg.norm(each)) for each in (found - angles.value)]
+        return [*turned, float(np.linalg.norm(bobs - places.value)), *(tensions - pulls.value)]
 
     assert_second_order(errors, first_step(scheme, form))
-
-
-@pytest.mark.sampled(3)
-@pytest.mark.parametrize(("form", "scheme"), PAIRS)
-def test_places_and_rod_tensions_meet_the_reference_to_second_order(form: str, scheme: NewmarkFamily) -> None:
-    swing = FORMS[form]()
-    start, places, tensions = swing.start(START), A2["[x1,z1,x2,z2"], A2["rod tensions"]
-
-    def errors(dt: float) -> list[float]:
-        run = last(swing, start, scheme, dt, places.t)
-        found = np.array([column[-1] for column in swing.bobs(run)])
-        pulls = np.array([column[-1] for column in swing.tensions(run)])
-        return [float(np.linalg.norm(found - places.value)), *(pulls - tensions.value)]
-
-    assert_second_order(errors, first_step(scheme, form))
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_energy_is_kept_to_second_order(form: str) -> None:
-    swing = FORMS[form]()
-    start = swing.start(START)
-
-    def error(dt: float) -> float:
-        run = mbd.simulate(swing.model, start, mbd.HHT(alpha=0.05), dt=dt, until=2.0)
-        total = run["kinetic_energy"] + run["potential_energy"]
-        return float(np.max(np.abs(total - A2["total energy"].value)))
-
-    assert_second_order(error, 2e-3)
 
 
 @pytest.mark.sampled(3)
@@ -87,12 +62,3 @@ def test_unequal_rods_started_with_speed_follow_lagranges_equations(form: str, s
         return [float(np.linalg.norm(each)) for each in found - exact]
 
     assert_second_order(errors, first_step(scheme, form))
-
-
-def test_every_kind_of_coordinates_gives_one_motion_and_one_pair_of_tensions() -> None:
-    found = []
-    for form in FORMS.values():
-        swing = form()
-        run = last(swing, swing.start(START), mbd.GeneralizedAlpha(0.9), 1e-4, 1.0)
-        found.append([column[-1] for column in (*swing.bobs(run), *swing.tensions(run))])
-    assert np.ptp(found, axis=0) == pytest.approx(0.0, abs=4e-6)

@@ -77,23 +77,6 @@ def test_any_rolling_speed_returns_to_the_steady_one_by_the_square_of_eta(wheel:
         assert wheel.eta**2 == pytest.approx(F4["multiplier of the return map"].value, abs=1e-13)
 
 
-def test_the_wheel_travels_at_the_published_mean_speed() -> None:
-    model, reference = WHEEL.model(), F4["mean speed along slope"]
-    run = mbd.simulate(model, WHEEL.start(model, F4["w just after"].value), mbd.HHT(), dt=1e-3, until=8.0)
-    times = [touch.time for touch in touchdowns(run)]
-    places = run.at(times)["roll.x"]
-    assert len(times) == 10
-    assert (places[-1] - places[0]) / (times[-1] - times[0]) == pytest.approx(reference.value, abs=2e-6)
-
-
-def test_the_wheel_passes_the_top_only_above_the_published_speed() -> None:
-    model, least = WHEEL.model(), F4["smallest w+ that passes the apex"].value
-    over = mbd.simulate(model, WHEEL.start(model, least * 1.001), mbd.HHT(), dt=1e-3, until=4.0)
-    back = mbd.simulate(model, WHEEL.start(model, least * 0.999), mbd.HHT(), dt=1e-3, until=4.0)
-    assert touchdowns(over)[0].name == "spoke 1"
-    assert touchdowns(back)[0].name == "spoke 7"
-
-
 # rest -------------------------------------------------------------------------------------------------------------
 def rocking(wheel: RimlessWheel, speed: float) -> tuple[list[float], float]:
     """Instants of the impacts of a rocking wheel by hand, by DOP853, and the instant at which they pile up."""
@@ -154,10 +137,3 @@ def test_a_slow_wheel_rocks_with_ever_shorter_strokes_to_rest_on_two_spokes(whee
     assert feet[1] == pytest.approx(np.full(np.sum(resting), rear), rel=1e-8)
     total = run["kinetic_energy"] + run["potential_energy"]
     assert np.max(np.diff(total)) < 1e-9
-
-
-def test_a_wheel_at_rest_on_two_spokes_stays_there() -> None:
-    model = WHEEL.model()
-    run = mbd.simulate(model, WHEEL.start(model, 0.0), mbd.GeneralizedAlpha(0.9), dt=1e-3, until=1.0)
-    assert np.max(np.abs(run["roll.angle"] - WHEEL.half)) < 1e-10
-    assert run.final.mode.closed == {"spoke 0", "spoke 7"}
