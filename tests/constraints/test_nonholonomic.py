@@ -10,14 +10,13 @@ import sympy
 
 import mbd
 from mbd.equations import derive
-from mbd.equations.programs import ActiveSet, accelerations, constraint_jacobian, newton, residual
+from mbd.equations.programs import constraint_jacobian
 from tests.cases.sleighs import Sleigh, blade_row, rolling_wheel, tractor
-from tests.equations.numbers import at, block, derivative, inputs
+from tests.equations.numbers import at, inputs
 from tests.helpers import assert_second_order
 
 NAMES = ("body.x.rate", "body.y.rate", "body.angle")
 SLEIGH = Sleigh(mass=1.7, inertia=0.31, ahead=-0.23, pull=0.9)
-FORMULATIONS = pytest.mark.parametrize("stabilized", [False, True], ids=["index 3", "stabilized"])
 
 
 def skater(bias=0.0, **options) -> mbd.Model:
@@ -42,53 +41,9 @@ SCENES = {
     "moving belt": lambda: skater(lambda t: mbd.sin(3.0 * t), row=lambda vx, x: (1 + x**2) * vx,
                                   arguments=("body.x.rate", "body.x")),
 }  # fmt: skip
-every_scene = pytest.mark.parametrize("scene", SCENES)
 
 
 # equations ----------------------------------------------------------------------------------------------------------
-@FORMULATIONS
-@every_scene
-def test_newton_matrix_is_the_derivative_of_the_residual(scene, stabilized):
-    equations = derive(SCENES[scene]())
-    n, m = equations.n_v, len(equations.rows)
-    point = inputs(equations, 5, x=0.2)
-    c0, c1 = point["c", 0], point["c", 1]
-    sizes = (n + m, n + m), (n + m + stabilized * m,), (stabilized * m, n)
-    K, *rest = block(at(newton(equations, ActiveSet(range(m), (), stabilized)), point), *sizes)
-    out = residual(equations, ActiveSet(range(m), (), stabilized))
-    np.testing.assert_allclose(at(out, point), rest[0], rtol=1e-12, atol=1e-12)
-    for j in range(n):
-        change = derivative(out, point, {("a", j): 1.0, ("v", j): c0, ("x", j): c1})
-        np.testing.assert_allclose(K[:n, j], change[:n], rtol=1e-6, atol=1e-6)
-        for k, row in enumerate(equations.rows):
-            held = change[n + m + k] / c0 if stabilized else change[n + k] / (c0 if row.is_velocity else c1)
-            assert K[n + k, j] == pytest.approx(held, abs=1e-6)
-    for k in range(m):
-        change = derivative(out, point, {("lam", k): 1.0})
-        np.testing.assert_allclose(K[:n, n + k], change[:n], rtol=1e-9, atol=1e-9)
-    assert not K[n:, n:].any()
-
-
-@every_scene
-def test_accelerations_program_has_the_slopes_of_each_rate(scene):
-    """B = ∂rate/∂v, its transpose as forces, and the bias d rate/dt at constant velocities."""
-    equations = derive(SCENES[scene]())
-    n, R = equations.n_v, len(equations.rows)
-    point = inputs(equations, 7, x=0.1)
-    sizes = ((n, n), (n,), (n, R), (R, n), (R,), (R,), (R,))
-    values = at(accelerations(equations), point)
-    M, f, Rm, B, h, hv, bias = block(values[: sum(int(np.prod(s)) for s in sizes)], *sizes)
-    rates = [row.rate for row in equations.rows]
-    for j in range(n):
-        np.testing.assert_allclose(B[:, j], derivative(rates, point, {("v", j): 1.0}), atol=1e-8)
-    np.testing.assert_allclose(Rm, B.T, atol=1e-12)
-    np.testing.assert_allclose(hv, at(rates, point), atol=1e-14)
-    motion = {("x", k): point["v", k] for k in range(n)} | {("t", 0): 1.0}
-    np.testing.assert_allclose(bias, derivative(rates, point, motion), atol=1e-7)
-    out = at(residual(equations, ActiveSet(range(R))), point)
-    lam, a = (np.array([point[kind, k] for k in range(size)]) for kind, size in (("lam", R), ("a", n)))
-    np.testing.assert_allclose(M @ a + f + Rm @ lam, out[:n], rtol=1e-10, atol=1e-10)
-    assert not h[[row.is_velocity for row in equations.rows]].any()
 
 
 def test_a_blade_and_the_same_row_by_hand_are_one_row():
@@ -209,20 +164,6 @@ def turning_tractor(cut="auto") -> tuple[mbd.Model, mbd.State]:
     return model, mbd.assemble(model, position=position, velocity={"body.x.rate": 0.6, "body.angle.rate": 1.1})
 
 
-def test_rows_by_cuts_move_alike():
-    """The tractor in tree coordinates, with its hitch cut, and in absolute coordinates."""
-    finals = []
-    for cut in "auto", ["hitch"], "all":
-        model, start = turning_tractor(cut)
-        run = mbd.simulate(model, start, mbd.GeneralizedAlpha(0.8), dt=1e-3, until=2.0)
-        names = ("body.x", "body.y", "hitch.angle", "front blade.force", "back blade.force", "hitch.reaction_force.x")
-        finals.append([run[name][-1] for name in names])
-        assert max(np.abs(run[f"{end} blade.residual"]).max() for end in ("front", "back")) < 1e-10
-        assert run.energy.drift < 1e-5
-    np.testing.assert_allclose(finals[1], finals[0], atol=1e-5)
-    np.testing.assert_allclose(finals[2], finals[0], atol=1e-5)
-
-
 # runs ---------------------------------------------------------------------------------------------------------------
 SCHEMES = {
     "newmark": mbd.Newmark(),
@@ -232,21 +173,6 @@ SCHEMES = {
     "generalized alpha index 3": mbd.GeneralizedAlpha(0.5, formulation="index3", tolerance=1e-13),
 }
 every_scheme = pytest.mark.parametrize("scheme", SCHEMES)
-
-
-@every_scheme
-def test_machine_code_and_plain_python_agree(scheme):
-    """With rows on positions and on velocities together."""
-    model, start = turning_tractor(["hitch"])
-    one, two = (
-        mbd.simulate(model, start, SCHEMES[scheme], dt=5e-3, until=0.25, backend=backend)
-        for backend in ("auto", "python")
-    )
-    assert one.stats["compiled"] and not two.stats["compiled"]
-    for part in "q", "v", "a":
-        ours, twin = getattr(one.record, part), getattr(two.record, part)
-        np.testing.assert_allclose(ours, twin, rtol=1e-8, atol={"q": 1e-11, "v": 1e-10, "a": 1e-7}[part])
-    np.testing.assert_allclose(one.record.lam, two.record.lam, rtol=1e-7, atol=1e-7)
 
 
 @every_scheme
@@ -266,26 +192,6 @@ def test_rows_of_both_kinds_together_keep_second_order(scheme):
         return [float(np.linalg.norm((found - reference)[:4])), float(np.linalg.norm((found - reference)[4:]))]
 
     assert_second_order(errors, 0.01)
-
-
-def test_energies_and_bodies_give_one_motion():
-    model, other = SLEIGH.model(), SLEIGH.energies()
-    start = SLEIGH.start(model, 0.8, 0.5, -1.6)
-    velocity = {name: float(value) for name, value in zip(("x", "y", "angle"), start.v, strict=True)}
-    begin = mbd.assemble(other, position={"angle": 0.8}, velocity=velocity)
-    one, two = (mbd.simulate(m, s, mbd.HHT(), dt=1e-2, until=2.0) for m, s in ((model, start), (other, begin)))
-    np.testing.assert_allclose(two["angle"], one["body.angle"], atol=1e-9)
-    np.testing.assert_allclose(two["blade.force"], one["blade.force"], atol=1e-8)
-    assert "blade" not in other.without("blade").nonholonomic
-
-
-def test_undamped_index_3_is_refused_only_beside_rows_on_positions():
-    scheme = mbd.Newmark(formulation="index3")
-    model = SLEIGH.model()
-    assert mbd.simulate(model, SLEIGH.start(model, 0.8, 0.5, -1.6), scheme, dt=1e-2, until=0.1).success
-    model, start = turning_tractor(["hitch"])
-    with pytest.raises(mbd.CapabilityError, match="no damping"):
-        mbd.simulate(model, start, scheme, dt=1e-2, until=0.1)
 
 
 def test_a_row_driven_in_time_does_work_and_its_bias_is_a_parameter():

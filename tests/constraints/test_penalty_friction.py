@@ -58,21 +58,10 @@ def test_under_a_load_below_the_limit_it_creeps_as_the_law_says(load):
     assert abs(run["slide.y"][-1]) < 1e-15
 
 
-def test_beyond_the_limit_it_slides_down():
-    run = slid(pressed(0.4), (0.0, 0.0), slope=0.4)
-    fall = G * (np.sin(0.4) - MU * np.cos(0.4))
-    assert run["slide.x.rate"][-1] == pytest.approx(fall * 0.8, abs=CREEP_SPEED * 5.0)
-
-
 def test_in_a_plane_it_is_that_of_space():
     one, other = slid(pressed(), (1.0, 0.0), until=0.3), slid(pressed(spatial=False), (1.0, None), until=0.3)
     assert np.allclose(one["slide.x"], other["slide.x"], atol=1e-14)
     assert np.allclose(one["mat.friction.forward"], other["mat.friction.forward"], atol=1e-12)
-
-
-def test_a_belt_takes_it_along():
-    run = slid(pressed(ground=mbd.Plane(normal=(0.0, 0.0, 1.0), velocity=(0.4, 0.3, 0.0))), (0.0, 0.0))
-    assert [run["slide.x.rate"][-1], run["slide.y.rate"][-1]] == pytest.approx([0.4, 0.3], abs=1e-9)
 
 
 def test_a_ball_on_a_mat_slides_then_rolls():

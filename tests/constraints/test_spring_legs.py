@@ -1,17 +1,14 @@
-"""Spring legs without mass: the motion beside an integration by hand, phase by phase."""
+"""Spring legs without mass: time on the ground, derivatives, and ends by name; gaits on them are in `tests/gait`."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import mbd
 
 MASS, STIFFNESS, LENGTH, G = 80.0, 20e3, 1.0, 9.81
-TIGHT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
 
 
 def runner(angle: float) -> tuple[mbd.Model, mbd.State]:
@@ -21,41 +18,6 @@ def runner(angle: float) -> tuple[mbd.Model, mbd.State]:
     model.constrain(mbd.SpringLeg("leg", body.origin, STIFFNESS, LENGTH, angle))
     model.constrain(mbd.Event("apex", mbd.measure("place.y.rate"), direction=-1))
     return model, mbd.assemble(model, {"place.y": 1.0}, {"place.x": 5.0, "place.y": 0.0})
-
-
-def apexes(angle: float, steps: int) -> list[tuple[float, float]]:
-    """(x, y) of the next apexes, by flight and stance in turn."""
-    state, found = np.array([0.0, 1.0, 5.0, 0.0]), []
-    for _ in range(steps):
-        fall = math.sqrt(2.0 * (state[1] - LENGTH * math.sin(angle)) / G)
-        state = state + fall * np.array([state[2], -0.5 * G * fall, 0.0, -G])
-        foot = state[0] + LENGTH * math.cos(angle)
-
-        def rates(_, z, foot=foot):
-            r = math.hypot(z[0] - foot, z[1])
-            push = STIFFNESS * (LENGTH - r) / MASS / r
-            return [z[2], z[3], push * (z[0] - foot), push * z[1] - G]
-
-        def off(_, z, foot=foot):
-            return math.hypot(z[0] - foot, z[1]) - LENGTH
-
-        off.terminal, off.direction = True, 1.0
-        state = solve_ivp(rates, (0.0, 2.0), state, events=off, **TIGHT).y[:, -1]
-        rise = state[3] / G
-        state = state + rise * np.array([state[2], 0.5 * state[3], 0.0, -G])
-        found.append((state[0], state[1]))
-    return found
-
-
-@pytest.mark.parametrize("degrees", [66.0, 67.0, 68.0])
-def test_a_runner_moves_as_its_phases_by_hand(degrees):
-    model, start = runner(math.radians(degrees))
-    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=5e-3, until=1.5)
-    times = [event.time for event in run.events if event.name == "apex"][:3]
-    found = np.column_stack([run.at(times)["place.x"], run.at(times)["place.y"]])
-    np.testing.assert_allclose(found, apexes(math.radians(degrees), 3), atol=1e-9)
-    assert run.energy.drift < 1e-9
-    assert {part.kind for part in run.energy.parts} == {"penalty"}
 
 
 def test_it_hops_in_place_on_an_upright_leg():

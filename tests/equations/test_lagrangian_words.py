@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import pickle
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
-from sympy import cos, sin
 
 import mbd
 from mbd.equations import derive
@@ -86,68 +84,6 @@ def test_they_can_be_checked_described_printed_pickled_and_saved(scene: Any, tmp
     assert np.array_equal(second.final.q, whole.final.q)
     for word in model.words:
         assert word.name not in [w.name for w in model.without(word.name).words]
-
-
-# the simplest walker ----------------------------------------------------------------------------------------------
-PERIOD = 3.882463752851374
-"""Step period of the long gait at γ = 0.009, in √(L/g): two independent solutions that agree to 3e-15."""
-FIXED = {"theta": 0.20031090054424708, "phi": 0.40062180108849416}
-SPEEDS = {"theta": -0.19983247300495235, "phi": -0.01582299994830938}
-
-
-def simplest_walker(by_function: bool = False) -> mbd.Lagrangian:
-    theta, phi = mbd.Coordinate("theta"), mbd.Coordinate("phi")
-    gamma, beta = sympy.symbols("gamma beta")
-    x, y = sin(phi.q - theta.q) + sin(theta.q), cos(theta.q) - cos(phi.q - theta.q)
-    vx, vy = (sum(place.diff(c.q) * c.v for c in (theta, phi)) for place in (x, y))
-    walker = mbd.Lagrangian(
-        "simplest walker", [theta, phi], theta.v**2 / 2 + beta * (vx**2 + vy**2) / 2,
-        cos(theta.q - gamma) + beta * (y * cos(gamma) + x * sin(gamma)), parameters={gamma: 0.009, beta: 1e-9},
-    )  # fmt: skip
-    walker.constrain(mbd.Event("heel strike", phi.q - 2 * theta.q, direction=1, reset=relabel if by_function else {
-        theta.q: -theta.q, phi.q: -2 * theta.q, theta.v: cos(2 * theta.q) * theta.v,
-        phi.v: cos(2 * theta.q) * (1 - cos(2 * theta.q)) * theta.v,
-    }))  # fmt: skip
-    return walker
-
-
-def relabel(named: Any) -> dict[str, float]:
-    theta, rate = named["theta"], named["theta.rate"]
-    turn = math.cos(2.0 * theta)
-    return {"theta": -theta, "phi": -2.0 * theta, "theta.rate": turn * rate, "phi.rate": turn * (1.0 - turn) * rate}
-
-
-@pytest.mark.parametrize("by_function", [False, True], ids=["expressions", "a function"])
-def test_the_simplest_walker_keeps_its_published_gait(by_function: bool) -> None:
-    """M. Garcia et al., J. Biomech. Eng. 120 (1998) 281; the fixed point has 15 digits."""
-    walker = simplest_walker(by_function)
-    start = mbd.assemble(walker, FIXED, SPEEDS)
-    run = mbd.simulate(walker, start, mbd.RungeKutta853(), tol=1e-8, until=16.0)
-    strikes = [event.time for event in run.events]
-    assert [event.name for event in run.events] == ["heel strike"] * 4
-    assert np.diff([0.0, *strikes]) == pytest.approx(PERIOD, abs=1e-6)
-    after = run.at(strikes[-1], side="right")
-    assert after["theta"] == pytest.approx(FIXED["theta"], abs=1e-7)
-    assert after["theta.rate"] == pytest.approx(SPEEDS["theta"], abs=1e-7)
-
-
-def test_its_multipliers_are_the_published_ones() -> None:
-    """Floquet multipliers −0.19010 ± 0.55760 i of the return map in (θ, θ̇), by differences."""
-    walker = simplest_walker()
-
-    def strike(theta: float, rate: float) -> np.ndarray:
-        turn = math.cos(2.0 * theta)  # what an impact leaves of (θ, θ̇)
-        start = mbd.assemble(walker, {"theta": theta, "phi": 2.0 * theta}, {"theta": rate, "phi": (1.0 - turn) * rate})
-        run = mbd.simulate(walker, start, mbd.RungeKutta853(), dt=0.01, until=5.0)
-        after = run.at(run.events[0].time, side="right")
-        return np.array([after["theta"], after["theta.rate"]])
-
-    place, d = np.array([FIXED["theta"], SPEEDS["theta"]]), 1e-5
-    columns = [(strike(*(place + step)) - strike(*(place - step))) / (2.0 * d) for step in d * np.eye(2)]
-    found = np.linalg.eigvals(np.array(columns).T)
-    assert np.sort_complex(found) == pytest.approx(
-        [-0.19009983913121842 - 0.5575987841244362j, -0.19009983913121842 + 0.5575987841244362j], abs=1e-4
-    )
 
 
 # words and what is wrong with them -----------------------------------------------------------------------------------

@@ -41,14 +41,6 @@ def test_of_a_pendulum(scheme):
     assert compared(model, start, scheme, names, dt=0.01, until=1.005).max() < 1e-9
 
 
-def test_of_a_ball_that_bounces():
-    model = ball(restitution=0.6)
-    start = mbd.assemble(model, {"fall.displacement": 1.0})
-    names = ["fall.displacement", "fall.displacement.rate", "gravity.y"]
-    assert compared(model, start, mbd.HHT(0.05), names, dt=0.01, until=0.8).max() < 1e-9
-    assert compared(model, start, mbd.HHT(0.05), names, dt=0.01, until="floor").max() < 1e-9
-
-
 @pytest.mark.parametrize("scheme", CONVERGED[:2], ids=repr)
 def test_of_a_closed_loop_in_long_steps(scheme):
     """Corrections of positions are large there, in the metric of the tangent where each step is predicted."""

@@ -182,18 +182,6 @@ def test_two_corners_that_land_together_share_one_impact():
     assert trajectory["place.angle"][-1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_motion_does_not_depend_on_the_order_of_contacts():
-    trajectories = [
-        run(box(reverse=reverse), {"place.y": 1.0, "place.angle": 0.2}, {"place.angle": 1.0, "place.x": 0.3}, until=1.5)
-        for reverse in (False, True)
-    ]
-    first, second = trajectories
-    np.testing.assert_allclose(first.record.q[-1], second.record.q[-1], rtol=0, atol=1e-10)
-    assert sorted((round(e.time, 8), e.name, e.kind) for e in first.events) == sorted(
-        (round(e.time, 8), e.name, e.kind) for e in second.events
-    )
-
-
 @pytest.mark.parametrize(("force", "stays"), [(-5.0, True), (0.0, True), (5.0, False)])
 def test_a_contact_that_touches_at_rest_is_decided_by_its_acceleration(force, stays):
     model, body = point(gravity=(0.0, 0.0, 0.0))

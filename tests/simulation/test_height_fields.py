@@ -1,4 +1,4 @@
-"""Points that slide with friction on smooth heights y = H(x, z): Newton's equations by hand, planes, frames, rest."""
+"""Points that slide with friction on smooth heights y = H(x, z): Newton's equations by hand, and rest."""
 
 from __future__ import annotations
 
@@ -80,32 +80,3 @@ def test_it_comes_to_rest_within_the_cone_and_stays():
     after = run.time > run.events[0].time
     assert np.ptp(run["slide.x"][after]) < 1e-12
     assert np.ptp(run["slide.z"][after]) < 1e-12
-
-
-def test_a_plane_as_a_height_is_the_plane():
-    k, q = 0.1, -0.15
-    runs = []
-    for ground in (lambda x, z: k * x + q * z, mbd.Plane((-k, 1.0, -q))):
-        model = on(ground, 0.3)
-        speed = {"slide.x": 1.0, "slide.y": k + 2.0 * q, "slide.z": 2.0}
-        start = mbd.assemble(model, velocity=speed, closed="foot")
-        runs.append(mbd.simulate(model, start, mbd.RadauIIA(), dt=5e-3, until=2.5))
-    one, other = runs
-    assert [event.kind for event in one.events] == [event.kind for event in other.events] == ["stuck"]
-    assert one.events[0].time == pytest.approx(other.events[0].time, abs=1e-11)
-    for name in ("slide.x", "slide.y", "slide.z"):
-        assert np.max(np.abs(one[name] - other[name])) < 1e-11
-
-
-def test_the_directions_of_the_frame_do_not_matter():
-    turn = 0.7
-    c, s = np.cos(turn), np.sin(turn)
-    straight = slid(on(bowl), B, mbd.RadauIIA(), dt=5e-3, until=END)
-    model = on(lambda x, z: bowl(c * x + s * z, c * z - s * x))
-    (x, z), (vx, vz) = START, SPEED
-    place = {"slide.x": c * x - s * z, "slide.y": bowl(x, z), "slide.z": s * x + c * z}
-    speed = {"slide.x": c * vx - s * vz, "slide.y": A * x * vx + B * z * vz, "slide.z": s * vx + c * vz}
-    start = mbd.assemble(model, position=place, velocity=speed, closed="foot")
-    turned = mbd.simulate(model, start, mbd.RadauIIA(), dt=5e-3, until=END)
-    assert np.max(np.abs(c * turned["slide.x"] + s * turned["slide.z"] - straight["slide.x"])) < 1e-11
-    assert np.max(np.abs(turned["slide.y"] - straight["slide.y"])) < 1e-11

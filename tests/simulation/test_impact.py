@@ -12,7 +12,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from mbd.kernel.contact.active_set import ActiveSetManager
 from tests.comparisons import at_least, compared
-from tests.simulation.mechanisms import G, ball, box, falling, kneed_walker, kneed_walker_start, point, run, two_balls
+from tests.simulation.mechanisms import G, box, falling, kneed_walker, kneed_walker_start, point, run, two_balls
 
 
 def impacts(trajectory):
@@ -154,45 +154,6 @@ def test_a_contact_opens_as_a_penalty_contact_closes():
     assert trajectory["b.displacement"][-1] < -0.01
 
 
-# restitution --------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9, 1.0])
-def test_a_ball_rebounds_with_newtons_ratio_of_speeds(restitution):
-    trajectory = run(ball(restitution=restitution), {"fall.displacement": 1.0}, until=0.6)
-    (before, after), *_ = impacts(trajectory)
-    speed = trajectory["fall.rate"]
-    assert speed[after] == pytest.approx(-restitution * speed[before], rel=1e-13)
-    assert speed[before] == pytest.approx(-np.sqrt(2 * G), rel=1e-9)
-
-
-def test_a_box_rattles_to_rest_in_bounded_work():
-    trajectory = run(
-        box(restitution=0.6), {"place.y": 0.5, "place.angle": 0.1}, {"place.angle": 0.2, "place.x": 0.3}, until=4.0
-    )
-    assert trajectory["left.force"][-1] + trajectory["right.force"][-1] == pytest.approx(2.0 * G, rel=1e-9)
-    assert trajectory["place.angle"][-1] == pytest.approx(0.0, abs=1e-9)
-    assert trajectory["place.x.rate"][-1] == pytest.approx(0.3, abs=1e-9), "nothing resists sliding"
-    assert len(trajectory.events) < 400
-    mechanical = trajectory.energy.kinetic + trajectory.energy.potential
-    assert np.max(np.diff(mechanical)) < 1e-8
-
-
-def test_an_impact_that_would_create_energy_takes_the_energetic_law_instead():
-    """Kane & Levinson 1985: Newton's restitution where the tip also sticks can raise the energy."""
-    model = mbd.Model("rod")
-    rod = mbd.RigidBody("rod", mass=1.0, inertia=1.0 / 12.0)
-    model.connect(mbd.Planar("place", model.ground.origin, rod.origin))
-    model.constrain(mbd.Unilateral("tip", mbd.touchdown(rod.point(0.0, -0.5)), restitution=0.9))
-    position = {"place.y": 1.0, "place.angle": 0.6}
-    forward = 0.71 * np.sqrt(2 * G * (1.0 - 0.5 * np.cos(0.6)))
-    for speed, energetic in (-forward, 1), (forward, 0):
-        trajectory = run(model, position, {"place.x": speed}, until="tip")
-        ((before, after),) = impacts(trajectory)
-        assert trajectory.energy.kinetic[after] < trajectory.energy.kinetic[before]
-        assert trajectory["tip.gap_rate"][after] > 0.0
-        assert trajectory.stats["energetic_impacts"] == energetic
-        assert any("Stronge" in note for note in trajectory.stats["notes"]) == bool(energetic)
-
-
 # forces after the impact --------------------------------------------------------------------------------------------
 def test_a_contact_whose_force_would_pull_opens_at_that_instant():
     model, body = point()
@@ -229,43 +190,7 @@ def test_an_impact_on_a_moving_floor_takes_the_speed_of_the_floor():
     assert trajectory["floor.gap"][after:].min() > -1e-12
 
 
-# chains -------------------------------------------------------------------------------------------------------------
-def cradle(count, restitution, apart=0.0, reverse=False, impact="newton"):
-    """Balls in a row on a rail, 0.1 m wide; the first comes with 1 m/s."""
-    model = mbd.Model("cradle", gravity=(0, 0, 0))
-    for k in range(count):
-        body = mbd.PointMass(f"ball {k}", mass=1.0)
-        model.connect(mbd.Prismatic(f"p{k}", model.ground.origin, body.origin))
-    contacts = [
-        mbd.Unilateral(
-            f"c{k}",
-            mbd.measure(lambda a, b: b - a - 0.1, f"p{k}.displacement", f"p{k + 1}.displacement"),
-            restitution=restitution,
-        )
-        for k in range(count - 1)
-    ]
-    model.constrain(*(contacts[::-1] if reverse else contacts))
-    place = {f"p{k}.displacement": 0.1 * k + apart * k for k in range(1, count)} | {"p0.displacement": -0.5}
-    return run(model, place, {"p0.displacement": 1.0}, until=2.0, impact=impact)
-
-
-@pytest.mark.parametrize("reverse", [False, True])
-@pytest.mark.parametrize("apart", [0.0, 1e-3])
-@pytest.mark.parametrize("count", [2, 3, 5])
-def test_a_blow_runs_through_a_cradle_to_its_last_ball(count, apart, reverse):
-    trajectory = cradle(count, 1.0, apart, reverse, impact="newton" if apart else "sequential")
-    np.testing.assert_allclose(trajectory.record.v[-1], [0.0] * (count - 1) + [1.0], atol=1e-12)
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.5, 0.9])
-def test_a_row_of_balls_keeps_its_momentum_and_loses_energy(restitution):
-    trajectory = cradle(4, restitution)
-    np.testing.assert_allclose(trajectory.record.v.sum(axis=1), 1.0, atol=1e-12)
-    kinetic = trajectory.energy.kinetic
-    assert np.all(np.diff(kinetic) < 1e-12)
-    assert kinetic[0] - kinetic[-1] == pytest.approx(sum(event.energy_loss for event in trajectory.events), rel=1e-9)
-    if restitution == 0.0:
-        np.testing.assert_allclose(trajectory.record.v[-1], 0.25, atol=1e-12)
+# contacts of one point ----------------------------------------------------------------------------------------------
 
 
 def test_two_contacts_of_one_point_share_the_blow_and_the_load():
