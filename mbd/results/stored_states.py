@@ -174,16 +174,33 @@ class StoredStates:
         if start is not None and len(start.anchors) == held.shape[1]:
             held[:, :count] = start.anchors[:count]
         guards = {guard.name: guard.transition for guard in self.equations.guards if guard.transition is not None}
-        for event in record.events:
-            taken = guards.get(event.name) if event.kind == "event" else None
-            if taken is None or event.row >= len(held):
-                continue
-            machine, row = machines[taken.machine], np.array([event.row], dtype=np.intp)
-            nodes = [machine.captured[machine.anchors.index(anchor)] for anchor in taken.stored]
-            values = self.evaluate(nodes, record.part(row, held[row]))
-            for anchor, value in zip(taken.stored, values, strict=True):
-                held[event.row :, anchor] = value[0]
-            held[event.row :, machine.anchors[0]] = taken.target
+        changes = [
+            (event.row, guards[event.name]) for event in record.events
+            if event.kind == "event" and event.name in guards and event.row < len(held)
+        ]  # fmt: skip
+        nodes = {anchor: node for each in machines for anchor, node in zip(each.anchors, each.captured, strict=True)}
+        rows = np.array([row for row, _ in changes], dtype=np.intp)
+        # before each change and after the last; from `known` on guesses, as what one stores another may read
+        states = np.repeat(held[:1, :count], len(changes) + 1, axis=0)
+        known, some = 0, len(changes)
+        while known < len(changes):
+            chosen = slice(known, known + some)
+            before = held[rows[chosen]]
+            before[:, :count] = states[:-1][chosen]
+            stored = sorted({anchor for _, taken in changes[chosen] for anchor in taken.stored})
+            values = self.evaluate([nodes[each] for each in stored], record.part(rows[chosen], before))
+            captured = dict(zip(stored, values, strict=True))
+            found = states[known : known + some + 1].copy()
+            for k, (_, taken) in enumerate(changes[chosen]):
+                found[k + 1] = found[k]
+                for anchor in taken.stored:
+                    found[k + 1, anchor] = captured[anchor][k]
+                found[k + 1, machines[taken.machine].anchors[0]] = taken.target
+            wrong = np.flatnonzero(np.any(found[:-1] != before[:, :count], axis=1))
+            states[known : known + some + 1] = found
+            known += max(int(wrong[0]), 1) if len(wrong) else some
+            some = max(some // 2, 1) if len(wrong) else 2 * some
+        held[:, :count] = states[np.searchsorted(rows, np.arange(len(held)), side="right")]
 
     def _turning(self, rows: Rows) -> list[tuple[Vector, Vector]]:
         """Angle and rate of every cut joint whose turns are counted along the motion."""

@@ -6,10 +6,11 @@ name.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from mbd.arrays import Vector
+from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equal import REST_SPEED
 from mbd.equations.equations import Equations
@@ -17,7 +18,7 @@ from mbd.errors import CapabilityError
 from mbd.results.record import EventRecord
 from mbd.sensitivity.run_data import refused, sided
 
-__all__ = ["GRAZING_RTOL", "Trigger", "refused_graze", "trigger"]
+__all__ = ["GRAZING_RTOL", "Numbers", "Trigger", "acts", "refused_graze", "trigger"]
 
 Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped", "watched"]
 
@@ -34,8 +35,37 @@ class Trigger:
     name: str
 
 
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers of contacts and frictions by name, and of guards that happen by themselves, with their names."""
+
+    contacts: Mapping[str, int]
+    frictions: Mapping[str, int]
+    guards: Sequence[tuple[int, str]]
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> Numbers:
+        """Those of a mechanism, found once."""
+        return mechanism.kept(Numbers, lambda: cls._of(mechanism.equations))
+
+    @classmethod
+    def _of(cls, equations: Equations) -> Numbers:
+        contacts = {each.name: k for k, each in enumerate(equations.contacts)}
+        frictions = {each.name: k for k, each in enumerate(equations.frictions)}
+        own = [
+            (e, guard.name) for e, guard in enumerate(equations.guards)
+            if guard.transition is None or ("event", e) in guard.transition.causes
+        ]  # fmt: skip
+        return cls(contacts, frictions, own)
+
+    def firing(self, events: Sequence[EventRecord]) -> list[tuple[int, str]]:
+        """The guards by which some of these events happen: transitions that others cause follow from them."""
+        happened = {event.name for event in events if event.kind == "event"}
+        return [each for each in self.guards if each[1] in happened] if happened else []
+
+
 def trigger(
-    equations: Equations, events: Sequence[EventRecord], gaps: Vector, gap_rates: Vector, slip: Vector, time: float
+    mechanism: Mechanism, events: Sequence[EventRecord], gaps: Vector, gap_rates: Vector, slip: Vector, time: float
 ) -> Trigger:
     """What ended the step, in which frictions slid with these signs.
 
@@ -44,41 +74,32 @@ def trigger(
     CapabilityError
         where several did at one instant, with their names.
     """
-    numbers = {contact.name: c for c, contact in enumerate(equations.contacts)}
+    equations, numbers = mechanism.equations, Numbers.of(mechanism)
     closed = {event.name for event in events if event.kind == "closed"}
-    found = [Trigger("event", e, equations.guards[e].name) for e in firing(equations, events)]
+    found = [Trigger("event", e, name) for e, name in numbers.firing(events)]
     for name in sorted(closed):
-        c = numbers[name]
+        c = numbers.contacts[name]
         if equations.contacts[c].kind == "penalty" or gap_rates[c] < -REST_SPEED:
             pressed = equations.contacts[c].kind == "penalty" and abs(gaps[c]) > 1e-8
             found.append(Trigger("press" if pressed else "closed", c, name))
     others: list[Trigger] = []
     for event in events:
         if event.kind == "opened":
-            contact = equations.contacts[numbers[event.name]]
+            contact = equations.contacts[numbers.contacts[event.name]]
             ruled = any(name in closed for name, _ in contact.when)
             kinds: dict[str, Kind] = {"gap": "gap", "pull": "pull" if contact.kind != "penalty" else "force"}
             if not ruled and contact.opens_on in kinds:
-                others.append(Trigger(kinds[contact.opens_on], numbers[event.name], event.name))
+                others.append(Trigger(kinds[contact.opens_on], numbers.contacts[event.name], event.name))
         elif event.kind in ("stuck", "slipped"):
-            f = [friction.name for friction in equations.frictions].index(event.name)
+            f = numbers.frictions[event.name]
             others.append(Trigger("stuck" if slip[f] != 0.0 else "slipped", f, event.name))
     found = found or others
-    names = " and ".join(dict.fromkeys(repr(each.name) for each in found))
     if len(found) > 1:
+        names = " and ".join(dict.fromkeys(repr(each.name) for each in found))
         raise sided(f"{names} happen at one instant, t = {time:.9g} s, and come in another order on each side of it")
     if not found:
         raise refused(f"what ended the step at t = {time:.9g} s is not known")
     return found[0]
-
-
-def firing(equations: Equations, events: Sequence[EventRecord]) -> list[int]:
-    """Numbers of the guards by which some of these events happen: transitions that others cause follow from them."""
-    happened = {event.name for event in events if event.kind == "event"}
-    return [
-        e for e, guard in enumerate(equations.guards)
-        if guard.name in happened and (guard.transition is None or ("event", e) in guard.transition.causes)
-    ]  # fmt: skip
 
 
 def acts(equations: Equations, e: int, until: Any) -> bool:

@@ -126,7 +126,7 @@ def _require_found_again(rows: RunRows, names: Sequence[str], places: Any, value
     wanted = np.concatenate([record.q[-1], record.v[-1], record.z[-1], [np.nan]])[at]
     if others:
         numbers, nodes = zip(*others, strict=True)
-        wanted[list(numbers)] = np.ravel(stored.evaluate(nodes, record.part(last, rows.anchors[last])))
+        wanted[list(numbers)] = np.ravel(stored.evaluate(nodes, stored.part(last, nodes)))
     off = np.abs(values - wanted)
     for k in map(int, np.flatnonzero(~(off <= RESULT_RTOL * np.maximum(1.0, np.abs(wanted))))):
         size = float(np.abs(stored.at_rows(names[k : k + 1])[0]).max())  # that of a peak before the end
@@ -142,7 +142,7 @@ def _with_turns(rows: RunRows, programs: Programs, anchors: Vector) -> Vector:
     if not counts:
         return anchors
     found = anchors.copy()
-    found[counts] = rows.anchors[-1, counts]
+    found[counts] = rows.stored.anchors[-1, counts]
     return found
 
 

@@ -115,6 +115,8 @@ def tangent_run(
     sizes = np.cumsum([0, 1, layout.n_q, layout.n, layout.n, layout.n_rows])
     names = "clock", "q", "y", "rate", "lam"
 
+    held = rows.watched_anchors if visit is None else rows.stored.anchors
+
     @cache
     def at_row(row: int) -> tuple[Motion, Rates]:
         numbers = np.concatenate(
@@ -124,7 +126,7 @@ def tangent_run(
         found = {
             name: (numbers[a:b], lanes[a:b]) for name, a, b in zip(names, sizes[:-1], sizes[1:], strict=True)
         }  # fmt: skip
-        found["anchors"] = rows.anchors[row], start.anchors if row == 0 else np.zeros((layout.n_anchors, count))
+        found["anchors"] = held[row], start.anchors if row == 0 else np.zeros((layout.n_anchors, count))
         return _motion(charted, found, start.p)
 
     if visit is not None:
@@ -135,7 +137,7 @@ def tangent_run(
         return Passed(end[0], last, end[1])
 
     def time_at(row: int) -> Vector:
-        return np.asarray(joined([run.of_rows[row][:1] for run, _ in runs])[0])
+        return joined([run.of_rows[row][0] for run, _ in runs])
 
     instants = refuse_turning_points(rows, programs, at_row, time_at, end)
     for run, _ in runs:

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
+from mbd.compile.many import at_blocks
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
@@ -39,7 +40,7 @@ from mbd.sensitivity.charts import chart_columns
 from mbd.tape.derivatives import jvps
 from mbd.tape.node import Node
 
-__all__ = ["Columns", "Programs", "Sparse", "State"]
+__all__ = ["Columns", "Programs", "Sparse", "State", "watched_nodes"]
 
 RESULT_SEPARATOR = "\n"
 """Between names of results that one program lists; no name has it."""
@@ -165,9 +166,7 @@ class Programs:
         program, blocks = self.sparse("watched"), np.zeros((len(flow), self.layout.size))
         self.fill(blocks, at)
         size = program.size - len(program.lines)
-        out = np.empty((len(flow), program.size))
-        for block, line in zip(blocks, out, strict=True):
-            program.function(block, self.values, line)
+        out = at_blocks(program.function, blocks, self.values)
         by_line = np.zeros((len(program.lines), size))
         by_line[np.arange(len(program.lines)), program.lines] = 1.0
         terms = out[:, size:] * flow[:, program.columns]
@@ -244,12 +243,7 @@ class Programs:
             values = switched_balance(equations)
             return values + [row.value for row in equations.rows] + [row.rate for row in equations.rows]
         if name == "watched":
-            zero, contacts, frictions = equations.tape.zero, equations.contacts, equations.frictions
-            values = [contact.gap for contact in contacts]
-            values += [zero if contact.force is None else contact.force for contact in contacts]
-            values += [guard.value for guard in equations.guards]
-            values += [friction.rate for friction in frictions] + [friction.sliding for friction in frictions]
-            return values + [each.only_while if isinstance(each.only_while, Node) else zero for each in contacts]
+            return watched_nodes(equations)
         if name == "limits":
             return [friction.limit for friction in equations.frictions]
         if name == "stored":
@@ -257,6 +251,16 @@ class Programs:
         if name == "captured":
             return [value for contact in equations.contacts for value in contact.captured]
         return [equations.output(each) for each in name.removeprefix("results ").split(RESULT_SEPARATOR)]
+
+
+def watched_nodes(equations: Equations) -> list[Node]:
+    """The values of `watched`."""
+    zero, contacts, frictions = equations.tape.zero, equations.contacts, equations.frictions
+    values = [contact.gap for contact in contacts]
+    values += [zero if contact.force is None else contact.force for contact in contacts]
+    values += [guard.value for guard in equations.guards]
+    values += [friction.rate for friction in frictions] + [friction.sliding for friction in frictions]
+    return values + [each.only_while if isinstance(each.only_while, Node) else zero for each in contacts]
 
 
 def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[int]) -> list[list[Node]]:

@@ -22,7 +22,9 @@ from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import First, Mode
+from mbd.sensitivity.programs import watched_nodes
 from mbd.state import State
+from mbd.tape.derivatives import live
 
 __all__ = ["ADVICE", "RunRows", "Source", "held_at", "mode_of", "refused", "sided"]
 
@@ -137,9 +139,16 @@ class RunRows:
         return 1e-3 * min(length, 1.0)
 
     @cached_property
-    def anchors(self) -> Matrix:
-        """What contacts hold at every row."""
-        return self.stored.anchors
+    def watched_anchors(self) -> Matrix:
+        """What contacts and machines hold at every row; 0 where nothing that is watched or limits friction reads it."""
+        equations = self.mechanism.equations
+
+        def reads() -> bool:
+            nodes = live([*watched_nodes(equations), *(friction.limit for friction in equations.frictions)])
+            return any(node.op == "input" and node.data[0] == "anchor" for node in nodes)
+
+        shape = len(self.record.time), self.mechanism.layout.n_anchors
+        return self.stored.anchors if self.mechanism.kept(RunRows, reads) else np.zeros(shape)
 
     @cached_property
     def changes(self) -> dict[int, Vector]:

@@ -245,9 +245,8 @@ class TangentRun(Run):
         rows = self.stepper.tangent("store").reshape(-1, v.width, LANES)
         log = v.log[: logged * v.event_width].reshape(logged, v.event_width)
         near = {0, count - 1} | {int(line[4]) + k for line in log for k in (-1, 0)}
-        for k in range(count) if self.every_row else sorted(near):
-            if 0 <= k < count:
-                self.of_rows[stored + k] = rows[k, :, :DIRECTIONS].copy()
+        chosen = [k for k in (range(count) if self.every_row else near) if 0 <= k < count]
+        self.of_rows.update(zip((stored + k for k in chosen), rows[chosen, :, :DIRECTIONS], strict=True))
         super().collect()
         change = self.moved_with_jump() if count else None
         if change is not None:

@@ -69,6 +69,15 @@ def test_samples_are_held_and_late_as_in_an_integration_beside_it(delay: float, 
     np.testing.assert_allclose(samples, PERIOD * np.arange(1, 51), rtol=0.0, atol=1e-15)
 
 
+def test_what_is_held_at_rows_hangs_on_all_samples_before() -> None:
+    model, start = arm(delay=0.004)
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=PERIOD, until=END)
+    early = mbd.simulate(model, start, mbd.RungeKutta853(), dt=PERIOD, until=0.6 * END)
+    np.testing.assert_array_equal(run.columns.anchors[-1], run.final.anchors)
+    row = int(np.searchsorted(run.time, 0.6 * END)) - 1
+    np.testing.assert_array_equal(run.columns.anchors[row], early.final.anchors)
+
+
 def test_values_are_rounded_to_their_resolution() -> None:
     model, start = arm(resolution={"hinge.angle": 0.01})
     run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=PERIOD, until=END)

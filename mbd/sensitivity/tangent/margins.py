@@ -9,7 +9,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import OneSidedError
-from mbd.sensitivity.guards import GRAZING_RTOL, Trigger, acts, firing, refused_graze, trigger
+from mbd.sensitivity.guards import GRAZING_RTOL, Numbers, Trigger, acts, refused_graze, trigger
 from mbd.sensitivity.motion import Mode, Motion, Rates
 from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_grip, refuse_sided_start
 from mbd.sensitivity.passed import Instant
@@ -75,7 +75,7 @@ def _beside(rows: RunRows, programs: Programs, at_row: AtRow, lead: int, row: in
     """
     equations, event, time = programs.equations, rows.events[row][0], float(rows.record.time[row])
     numbers = [e for e, guard in enumerate(equations.guards) if guard.name == event.name]
-    if lead and event.kind == "event" and numbers and len(firing(equations, rows.events[row])) == 1:
+    if lead and event.kind == "event" and numbers and len(Numbers.of(rows.mechanism).firing(rows.events[row])) == 1:
         before, place = at_row(lead - 1), 2 * len(equations.contacts) + numbers[0]
         closed = [each.name for each in rows.run.events if each.kind == "closed" and each.time == time]
         gaps = [contact.gap for contact in equations.contacts if contact.name in closed]
@@ -122,20 +122,25 @@ def _fired(rows: RunRows, programs: Programs, leads: Sequence[int], at_row: AtRo
     y, rate = np.hstack([record.v[before], record.z[before]]), np.hstack([record.a[before], record.s[before]])
     times = rows.ends[before]
     switches, slips = np.array([mode.switch for mode in modes]), np.array([mode.slip for mode in modes])
-    at = State(times, record.q[before], y, rate, record.lam[before] * active, rows.anchors[before], switches, slips)
+    at = State(
+        times, record.q[before], y, rate, record.lam[before] * active, rows.watched_anchors[before], switches, slips
+    )
     flow = np.zeros((len(leads), c.count))
     flow[:, c.x], flow[:, c.y], flow[:, c.t] = record.v[before], rate, 1.0
     found = list[Trigger]()
     rest_speed = float(record.settings.get("rest_speed", 1e-6))
     for row, mode, values, growth, terms in zip(leads, modes, *programs.watched_flow(at, flow), strict=True):
         now = float(rows.ends[row - 1])
-        fired = trigger(equations, rows.events[row], values[:contacts], growth[:contacts], mode.slip, now)
+        fired = trigger(rows.mechanism, rows.events[row], values[:contacts], growth[:contacts], mode.slip, now)
         k = fired.number
         places = {"closed": k, "gap": k, "force": contacts + k, "press": contacts + k, "event": 2 * contacts + k,
                   "stuck": 2 * contacts + guards + k}  # fmt: skip
         place = places.get(fired.kind)
-        slowest = rest_speed if fired.kind == "closed" and not _comes_to_rest(rows, fired.name, now) else 0.0
-        if place is not None and not abs(growth[place]) > max(GRAZING_RTOL * terms[place], slowest):
+        if place is not None and (
+            not abs(growth[place]) > GRAZING_RTOL * terms[place]
+            or (fired.kind == "closed" and not abs(growth[place]) > rest_speed
+                and not _comes_to_rest(rows, fired.name, now))
+        ):  # fmt: skip
             raise refused_graze(fired, now, float(growth[place]), float(terms[place]))
         if fired.kind == "closed" and equations.contacts[k].kind != "penalty":
             _refuse_chance(rows, programs, row, mode, k, at_row)
