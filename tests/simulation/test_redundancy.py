@@ -58,3 +58,19 @@ def test_at_a_flat_start_nobody_says_that_the_motion_is_unique(scheme):
     assert max(run.violation.length, run.violation.angle) < 1e-7
     notes = " ".join(run.stats["notes"])
     assert run.success or ("the motion is unique" not in notes and "singular configuration" in notes)
+
+
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.Newmark(), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+@pytest.mark.parametrize("steps", [{"dt": 2e-3}, {"tol": 1e-4}], ids=str)
+def test_feet_at_one_place_of_a_driven_table_carry_the_weight_and_give_the_thrust(scheme, steps):
+    """Where something is driven, forces of the Newmark family are solved for again at the end of a step."""
+    model, table, block = mbd.Model("table"), mbd.PointMass("table", 3.0), mbd.PointMass("block", 1.25)
+    rail = mbd.Prismatic("rail", model.ground.origin, table.origin)
+    model.connect(rail, mbd.Translation("block", model.ground.origin, block.origin))
+    model.constrain(mbd.Bilateral("drive", rail, value=lambda t: 0.5 * t * t))
+    ground = mbd.Plane(frame=table.origin)
+    for k in range(3):
+        model.constrain(mbd.Unilateral(f"foot {k}", mbd.touchdown(block.origin, ground), friction=0.3))
+    run = mbd.simulate(model, mbd.assemble(model), scheme, until=0.05, **steps)
+    for part, whole in ("force", 1.25 * 9.81), ("friction", 1.25):
+        assert sum(run[f"foot {k}.{part}"][1:] for k in range(3)) == pytest.approx(whole, rel=1e-6)

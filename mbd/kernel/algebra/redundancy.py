@@ -17,8 +17,8 @@ from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions,
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = [
-    "JOINT_SHARE", "MIN_LIMIT_SHARE", "find_dependence", "find_dependent", "find_shares", "shared", "sharing", "spread",
-    "take_shares",
+    "JOINT_SHARE", "MIN_LIMIT_SHARE", "clear_dependent", "find_dependence", "find_dependent", "find_shares",
+    "shared", "sharing", "spread", "take_shares",
 ]  # fmt: skip
 
 
@@ -257,6 +257,13 @@ def share(K: ContactRows, row: int, largest: float) -> float:
     if f < 0 or largest == 0.0:
         return 1.0
     return float(max(K.limit[f] / largest, MIN_LIMIT_SHARE))
+
+
+def clear_dependent(K: Singular, lam: Reals) -> None:
+    """The multipliers of rows that were left out of a solve are none: those of the others carry the whole load."""
+    for d in range(K.n_rows):
+        if K.dropped[d] == 1:
+            lam[d] = 0.0
 
 
 def spread(K: DependentRows, lam: Reals) -> None:

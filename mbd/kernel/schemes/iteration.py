@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.algebra.ordered import clear_tangent
+from mbd.kernel.algebra.redundancy import clear_dependent
 from mbd.kernel.codes import EPS
 from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
@@ -197,7 +198,7 @@ def runs_away(K: Equations, m: int) -> bool:
     return largest > 1e7 * total and largest > 1e3 * K.work[0]
 
 
-def finish(K: Steps, h: float) -> bool:
+def finish(K: SingularSteps, h: float) -> bool:
     """The converged block becomes the candidate; whether it changes little, so that no other look at it is needed.
 
     That is: it neither `overturns` nor fails the first look of `stepping.resolution`, as in most steps of a motion.
@@ -224,6 +225,7 @@ def finish(K: Steps, h: float) -> bool:
         K.y1[i] = speed
         K.aux1[i] = by_rate * rate + by_last * last - by_aux * a0
     K.lam1[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
+    clear_dependent(K, K.lam1)
     if K.n > K.n_v or error_share(K, h) * most > 0.5:
         return False
     whole = K.step / h if K.step > h else 1.0

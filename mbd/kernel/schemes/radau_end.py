@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.ordered import solve_kkt
+from mbd.kernel.algebra.redundancy import clear_dependent
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import NOT_CONVERGED, SINGULAR
 from mbd.kernel.records import Balance, Kernel, Steps
@@ -62,6 +63,7 @@ def complete(K: Kernel, h: float, t1: float, m: int, renew: bool, slow: bool) ->
         K.y1[i] = K.block[K.o_v + i]
         K.rate1[i] = K.stages[o_W + i]
     K.lam1[: K.n_rows] = K.stages[o_L : o_L + K.n_rows]
+    clear_dependent(K, K.lam1)
     K.changes_little = 1.0 if is_even(K, h) else 0.0
     estimate_error(K, h, m)
     if twice:

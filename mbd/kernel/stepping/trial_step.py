@@ -97,11 +97,8 @@ def blur_of(K: Guards) -> float:
 
 
 def share_multipliers(K: Balance, t1: float) -> int:
-    """Multipliers of dependent rows; a scheme leaves those of the rows that it was solved with."""
+    """Multipliers of least norm with the forces of those that a scheme leaves."""
     if K.explicit == 0:  # an explicit one has shared them out already, and feet kept in their cones have no shares
-        for k in range(K.n_rows):
-            if K.dropped[k] == 1:
-                K.lam1[k] = 0.0
         minimum_norm_multipliers(K, K.lam1)
     K.block[K.o_lam : K.o_lam + K.n_rows] = K.lam1[: K.n_rows]
     if departs(K):
