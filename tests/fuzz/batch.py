@@ -116,12 +116,12 @@ def summary(verdicts: Iterable[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _work(structures: int) -> None:
+def _work(structures: int, forms: bool) -> None:
     """A worker: numbers come as one list, verdicts go out line by line."""
     from tests.fuzz.verdict import verdict
 
     for number in json.load(sys.stdin):
-        print(json.dumps(verdict(number, structures)), flush=True)
+        print(json.dumps(verdict(number, structures, forms)), flush=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -134,10 +134,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--workers", type=int, default=1, help="processes side by side")
     parser.add_argument("--seconds", type=float, default=0.0, help="wall time after which no scene is begun")
     parser.add_argument("--out", default="", help="a file for all verdicts, one a line")
+    parser.add_argument("--forms", action="store_true", help="compare each scene with another form of it alone")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.worker:
-        _work(given.structures)
+        _work(given.structures, given.forms)
         return
     base, above = (DRIVEN, None) if given.driven else (SPACE, DRIVEN) if given.space else (0, SPACE)
     first, end = (int(part) + base for part in given.scenes.split(":"))
@@ -157,8 +158,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for k in range(0, len(mine), 250):
             if given.seconds and time.perf_counter() - began > given.seconds:
                 return
-            run_batch(mine[k : k + 250], hear=hear, command=[*COMMAND, f"--structures={given.structures}"])
+            run_batch(mine[k : k + 250], hear=hear, command=command)
 
+    command = [*COMMAND, f"--structures={given.structures}", *["--forms"] * given.forms]
     threads = [threading.Thread(target=serve, args=(place,)) for place in range(given.workers)]
     for thread in threads:
         thread.start()

@@ -48,7 +48,7 @@ class Scene:
     cut : which joints are cut; start : arguments of `mbd.assemble`
     options : arguments of `mbd.simulate` besides model and start
     check : what is compared beside the laws: '', 'restart', 'file', 'cut', 'twin', 'between', 'step there', 'one ulp',
-        'tolerance', 'schemes'
+        'tolerance', 'schemes', 'form'
     structures : how many mechanisms scenes were drawn from
     """
 

@@ -14,14 +14,15 @@ import numpy as np
 
 import mbd
 from mbd.errors import MbdError
+from tests.fuzz.forms import Form, other_form
 from tests.fuzz.judge import SHARE, between, judge
 from tests.fuzz.scenes import STRUCTURES, Scene, scene
 
 __all__ = ["verdict"]
 
 
-def verdict(number: int, structures: int = STRUCTURES) -> dict[str, Any]:
-    """How the scene of a number ended, of so many mechanisms.
+def verdict(number: int, structures: int = STRUCTURES, forms: bool = False) -> dict[str, Any]:
+    """How the scene of a number ended, of so many mechanisms; with `forms` compared with another form of it.
 
     Returns
     -------
@@ -31,6 +32,7 @@ def verdict(number: int, structures: int = STRUCTURES) -> dict[str, Any]:
     told: dict[str, Any] = {"number": number, "kind": "ok", "reasons": [], "message": "", "scene": "", "check": ""}
     try:
         made = scene(number, structures)
+        made = replace(made, check="form") if forms else made
         told |= {"scene": str(made), "check": made.check}
         told |= _judged(made)
     except MbdError as error:
@@ -90,6 +92,8 @@ def _compared(made: Scene, run: mbd.Trajectory) -> list[str]:
         return _step_there(made, run)
     if check == "cut":
         return _other_cut(made, run)
+    if check == "form":
+        return _moves_alike(made, run, other_form(made.form.number, made.model, dict(made.parameters)))
     if check == "twin":
         return _twin(made, run)
     if check == "one ulp":
@@ -154,39 +158,52 @@ def _step_there(made: Scene, run: mbd.Trajectory) -> list[str]:
 
 
 def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
-    """The same motion whichever joints are cut, within what two thirds of the step change.
-
-    Half of it would change nothing in impacts, whose steps are dt halved until they are short enough.
-    """
+    """The same motion whichever joints are cut."""
     others = [cut for cut in ("auto", *made.form.cuts) if cut != made.cut]
     if not others or run.settings["contact"] == "nonsmooth":
         return []
     cut = others[made.number % len(others)]
+    return _moves_alike(made, run, Form(made.form.with_cut(cut), dict(made.parameters), what=f"other cut {cut!r}"))
+
+
+def _moves_alike(made: Scene, run: mbd.Trajectory, form: Form) -> list[str]:
+    """The same motion in another form, within what two thirds of the step change.
+
+    Half of it would change nothing in impacts, whose steps are dt halved until they are short enough.
+    """
     names = [name for joint in made.model.joints for name in joint.coordinate_names]
     place, speed = _beginning(made.model, run)
-    other_model = made.form.with_cut(cut)
-    again = mbd.assemble(other_model, position=place, velocity=speed, parameters=made.parameters, project=True)
+    position, velocity, parameters = place | form.position, speed | form.velocity, form.parameters
+    again = mbd.assemble(form.model, position=position, velocity=velocity, parameters=parameters, project=True)
     changes: dict[str, Any] = (
         {"dt": made.options["dt"] / 1.5} if "dt" in made.options else {"tol": made.options["tol"] / 4.0}
     )
-    other, finer = run_of(made, model=other_model, start=again), run_of(made, **changes)
-    if not other.success or not finer.success or [e.name for e in finer.events] != [e.name for e in run.events]:
+    other, finer = run_of(made, model=form.model, start=again), run_of(made, **changes)
+    if not other.success or not finer.success or _happened(made, finer) != _happened(made, run):
         return []
-    faults = [f"other cut: with {cut!r} {fault}" for fault in judge(other, other_model, made.parameters).faults]
+    faults = [f"{form.what}: {fault}" for fault in judge(other, form.model, parameters).faults]
+    if _happened(made, other) != _happened(made, run):
+        return faults
     a, b, c = (_ends(names, each, run) for each in (run, other, finer))
     allowed = (
         27.0 * (np.abs(a - c) + np.max(np.abs(a - c))) + 1e-6 * (1.0 + np.abs(a)) + 30.0 * made.options.get("tol", 0.0)
     )
     if np.all(np.abs(a - b) <= allowed):
         return faults
-    near = run_of(made, model=other_model, start=again, **changes)  # its rows may err more than coordinates do
-    if not near.success or [e.name for e in near.events] != [e.name for e in run.events]:
+    near = run_of(made, model=form.model, start=again, **changes)  # its rows may err more than coordinates do
+    if not near.success or _happened(made, near) != _happened(made, run):
         return faults
     allowed += 27.0 * np.abs(b - _ends(names, near, run))
     for k in np.flatnonzero(~(np.abs(a - b) <= allowed)):
         ends_at = f"{names[k]!r} ends at {b[k]:.9g} instead of {a[k]:.9g}, with 2/3 of the step at {c[k]:.9g}"
-        faults.append(f"other cut: with {cut!r} {ends_at}")
+        faults.append(f"{form.what}: {ends_at}")
     return faults
+
+
+def _happened(made: Scene, run: mbd.Trajectory) -> list[str]:
+    """Names of the events of a run that the scene knows."""
+    known = {word.name for word in (*made.model.joints, *made.model.constraints)}
+    return [event.name for event in run.events if event.name in known]
 
 
 def _beginning(model: mbd.Model, run: mbd.Trajectory) -> tuple[dict[str, Any], dict[str, Any]]:

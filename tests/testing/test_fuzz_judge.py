@@ -11,7 +11,8 @@ from mbd.bodies import algebra
 from mbd.equations import kinematics
 from mbd.joints.losses.viscous import Viscous
 from mbd.results.columns import ModelColumns
-from tests.fuzz import batch
+from tests.fuzz import batch, forms
+from tests.fuzz.forms import Form
 from tests.fuzz.geometry import Signal, inverse, product, shift, turn, twist
 from tests.fuzz.judge import between, judge
 from tests.fuzz.scenes import STRUCTURES, scene
@@ -372,6 +373,22 @@ def test_the_judge_sees_accelerations_that_alternate_around_those_of_a_drive():
     place = [c.name for c in run.record.equations.coordinates].index("main.angle")
     wrong = altered(run, "a", np.s_[3::2, place], lambda right: right + 0.2 * np.max(np.abs(right)))
     assert "a drive gives its acceleration" in laws_broken(wrong, model, made.parameters)
+
+
+FORMS = [8, 10000501]
+"""Masses in another unit; a driven table that is turned, in halves and beside others."""
+
+
+@pytest.mark.parametrize("number", FORMS)
+def test_scenes_move_alike_in_other_forms(number):
+    told = verdict(number, 100_000, forms=True)
+    assert told["kind"] == "ok", told
+
+
+def test_a_form_that_moves_in_another_way_is_seen(monkeypatch):
+    monkeypatch.setattr(Form, "gravity", lambda form: np.array([0.0, -9.0, 0.0]))
+    monkeypatch.setattr(forms, "CHANGES", {"turned": forms.CHANGES["turned"]})
+    assert "turned: " in verdict(FORMS[0], 100_000, forms=True)["reasons"][0]
 
 
 @pytest.mark.parametrize("given", [("--scenes", "30000000:30000001"), ("--space", "--scenes", "9000000:9000001")])
