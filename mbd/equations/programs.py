@@ -263,7 +263,7 @@ def accelerations(equations: Equations, impacts: bool = True, loop: MassLoop | N
     out += [value for contact in equations.contacts for value in contact.captured]
     out += [tape.input("anchor", turn.anchor) for turn in equations.turns]
     out += [equations.kinetic, *(friction.limit_at_speed(smooth) for friction in equations.frictions)]
-    out += [entry for impulse in equations.impulses for entry in impulse.vector]
+    out += [entry for impulse in equations.impulses for entry in impulse.vector] if impacts else []
     return out + list(() if loop is None else loop.numbers)
 
 

@@ -122,7 +122,7 @@ class Balance:
         turns = MAX_LOAD_ITERATIONS if self.follows or (held.depend and self.equations.frictions) else 1
         lam = rows.lam
         for _ in range(turns):
-            M, f, R, B, _, _, bias, limits = self.terms_at(replace(rows, lam=lam))
+            M, f, R, B, _, _, bias, limits, here = self.terms_at(replace(rows, lam=lam))
             forces, spread = R[:, :, held.kept], None
             if held.depend:
                 dependence, weight = _dependence(M, B, held), self._shares(held, limits)
@@ -136,7 +136,12 @@ class Balance:
             if np.all((change <= MULTIPLIER_RTOL * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
                 break
         if slides:
-            *_, rates, _, limits = self.terms_at(replace(rows, lam=lam))
+            anchors = rows.anchors.copy()  # friction turns with the surface under it, not with that where it was struck
+            for number, friction in enumerate(self.equations.frictions):
+                if friction.group and friction.contact >= 0 and abs(mode[number - len(self.equations.frictions)]) == 1:
+                    own = list(self.equations.contacts[friction.contact].anchors)
+                    anchors[:, own] = here[:, own]
+            *_, rates, _, limits, _ = self.terms_at(replace(rows, lam=lam, anchors=anchors))
             for number, friction in enumerate(self.equations.frictions):
                 sliding = np.abs(rows.phase[:, number]) == 1
                 way = self._way(rows, number, rates)
@@ -171,13 +176,17 @@ class Balance:
         return weight
 
     def terms_at(self, rows: Rows) -> tuple[Any, ...]:
-        """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), h, ḣ, γ (k, m), limits of frictions (k, n_frictions)."""
+        """M (k, n, n), f (k, n), R (k, n, m), B (k, m, n), h, ḣ, γ (k, m), limits, what would be held.
+
+        The limits are those of frictions (k, n_frictions), the last what anchors would be here (k, n_anchors).
+        """
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
         flat = np.array(self.terms(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source))).T
         cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
         M, f, R, B, h, rates, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
-        limits = rest[:, rest.shape[1] - len(self.equations.frictions) :]
-        return M.reshape(count, n, n), f, R.reshape(count, n, m), B.reshape(count, m, n), h, rates, bias, limits
+        last = rest.shape[1] - len(self.equations.frictions)
+        R, B = R.reshape(count, n, m), B.reshape(count, m, n)
+        return M.reshape(count, n, n), f, R, B, h, rates, bias, rest[:, last:], rest[:, : last - 1]
 
     def rows_in(self, mode: NDArray[np.int8]) -> Held:
         """The rows that hold in a mode: flags of contacts, then phases of frictions."""

@@ -294,8 +294,9 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
             impacts[name][row] -= loss
             left[row] += loss
     reset = _resets(columns.equations, record, len(left))
+    at_impacts = [*together, *(row for given in kicks.values() for row in np.flatnonzero(given))]
     beyond = np.zeros(len(left))
-    beyond[list(together)] = left[list(together)]
+    beyond[at_impacts] = left[at_impacts]
     beyond[reset] = 0.0
     parts = [Part(name, "force", np.cumsum(given)) for name, given in kicks.items()]
     parts += [Part(f"{name} impact", "impact", np.cumsum(taken)) for name, taken in impacts.items()]

@@ -111,7 +111,6 @@ def write_expressions(equations: Any, nodes: Mapping[str, Node], arrays: Arrays)
         terms: Sequence[Node] = equations.terms if own else ()
         if not own and Balance.serves(equations):
             terms = programs.accelerations(equations, impacts=False)
-            terms = terms[: len(terms) - sum(len(each.vector) for each in equations.impulses)]
         charts = Charts.of(equations)
         moving = () if charts is None else charts.nodes
         turning = [node for turn in equations.wrapped for node in (turn.angle, turn.rate)]

@@ -79,7 +79,9 @@ def powers(equations: Equations) -> list[Power]:
                 elastic[effect.name, effect.column] = switch * _change(equations, effect.elastic, states), effect
     still = {tape.input("v", k): 0.0 for k in range(equations.n_v)}
     for number, row in enumerate(equations.rows):
-        speed = substitute([row.rate], still)[0]
+        # friction acts along the direction of now, which turns with its surface; its row keeps that of the anchor
+        rate = row.rate if row.friction < 0 else equations.frictions[row.friction].rate
+        speed = substitute([rate], still)[0]
         if not speed.is_zero:
             add(row.owner, "constraint", tape.input("lam", number) * speed)
     clock: dict[Node, Scalar] = {tape.input("t"): 1.0}

@@ -139,3 +139,16 @@ def test_a_point_that_sticks_on_a_wave_rides_it_and_feels_its_slope():
     np.testing.assert_allclose(run["table.force"], weight / size, rtol=0, atol=2e-3)
     np.testing.assert_allclose(np.ravel(run["table.friction"]), weight * slope / size, rtol=0, atol=2e-3)
     assert abs(run.energy.sums["numerical"]) < 1e-4
+
+
+@pytest.mark.parametrize(("axes", "friction"), [("xy", mbd.Stribeck(0.4, 0.2, 0.5) + mbd.Viscous(0.05)), ("xyz", 0.3)])
+def test_the_ledger_closes_on_ground_that_tilts_as_feet_slide_over_it(axes, friction):
+    """Friction acts along the slope of now, which is not that where the foot came down."""
+    model, point = mbd.Model("tilting"), mbd.PointMass("foot", M)
+    model.connect(mbd.Translation("place", model.ground.origin, point.origin, axes=axes))
+    hill = {"xy": lambda x, t: 0.3 * x * mbd.sin(3.0 * t), "xyz": lambda x, z, t: 0.3 * (x + z * t) * mbd.sin(3.0 * t)}
+    model.constrain(mbd.Unilateral("slope", mbd.touchdown(point.origin, hill[axes]), friction=friction))
+    start = mbd.assemble(model, velocity={f"place.{axis}": 3.0 for axis in axes[::2]}, closed="slope")
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=2e-3, until=1.2)
+    assert run.energy.sums["slope friction"] < -1.0 < 1.0 < np.max(np.abs(run.energy["slope"]))
+    assert np.max(np.abs(run.energy.numerical)) < 1e-9
