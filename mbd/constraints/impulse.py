@@ -52,8 +52,8 @@ class Impulse(OfQuantities, Constraint):
     arguments : what a function is called with, as for `Applied`; values are those just before the impulse
 
     The run has an event of kind 'pushed' for each, whose `energy_loss` is less than zero where it drives; the ledger
-    books its work ``P w·(v⁻ + v⁺)/2`` under its name and the kind 'force'; of order 'with' v⁺ is that without
-    the impact, which takes the rest.
+    books its work ``P w·(v⁻ + v⁺)/2``, less what friction of closed contacts takes of it, under its name and the kind
+    'force'; of order 'with' v⁺ is that without the impact, which takes the rest.
     """
 
     name: str

@@ -88,6 +88,27 @@ def test_the_ledger_closes_where_rows_take_an_impulse(order):
     assert abs(run.final["place.x.rate"]) < 1e-12 and np.max(np.abs(run.energy.numerical)) < 1e-12
 
 
+@pytest.mark.parametrize("order", ["before", "after"])
+def test_the_ledger_closes_where_friction_takes_a_part_of_an_impulse(order):
+    """A sledge on a belt is pressed down as a ball strikes; friction takes what that costs, and follows its load."""
+    model = mbd.Model("pressed")
+    sledges = [mbd.PointMass(name, 1.0) for name in ("sledge", "ball")]
+    for sledge in sledges:
+        model.connect(mbd.Translation(f"{sledge.name} place", model.ground.origin, sledge.origin))
+        belt = mbd.touchdown(sledge.origin, mbd.Plane(velocity=(-1.0, 0.0)))
+        model.constrain(mbd.Unilateral(f"{sledge.name} floor", belt, friction=0.3))
+    model.constrain(mbd.Impulse("kick", sledges[0].origin, 1.0, "ball floor", direction=(1, -2), order=order))
+    model.apply(mbd.Applied("load", sledges[0].origin, (0.0, lambda t: -3.0 * mbd.sin(20.0 * t))))
+    start = mbd.assemble(model, {"ball place.y": 0.5}, {"sledge place.x": 2.0}, closed="sledge floor")
+    run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until="ball floor")
+    gained = (1.0 - 0.3 * 2.0) / 5.0**0.5
+    before = 2.0 - 0.3 * (9.81 * (end := run.events[-1].time) + 0.15 * (1.0 - math.cos(20.0 * end)))
+    assert run.final["sledge place.x.rate"] == pytest.approx(before + gained, rel=1e-12)
+    assert np.max(np.abs(run.energy.numerical)) < 1e-11
+    between = run.at(0.5 * (run.time[:9] + run.time[1:10]))
+    np.testing.assert_allclose(between["sledge floor.friction"], -0.3 * between["sledge floor.force"], rtol=1e-12)
+
+
 def test_a_size_may_follow_the_motion_and_is_a_parameter():
     doubled = mbd.simulate(
         *wheel(), mbd.RungeKutta4(), dt=0.01, until=0.7, parameters={f"push {k}.size": 0.4 for k in range(8)}

@@ -11,8 +11,8 @@ from mbd.kernel.stepping.restart import capture, evaluate, evaluate_loaded, limi
 from mbd.kernel.tangent_rules import note_edges
 
 __all__ = [
-    "energy_gain", "gather", "is_held_through", "let_rebound", "loosen", "prepare", "restitution_of", "solve_impact",
-    "speed", "start_over", "strikes",
+    "energy_gain", "gather", "is_held_through", "let_rebound", "loosen", "loss_elsewhere", "loss_in", "prepare",
+    "restitution_of", "solve_impact", "speed", "start_over", "strikes",
 ]  # fmt: skip
 
 
@@ -173,3 +173,36 @@ def relative_gain(K: ContactForces, cluster: int) -> float:
 def strikes(K: ContactForces, c: int) -> bool:
     """Whether a contact closes in the impact just found; one that only touches takes no impulse."""
     return bool(K.kind[c] == 0 and K.closing[c] > 0 and (K.closing[c] == 1 or K.impulse[K.normal[c]] != 0.0))
+
+
+def loss_of(K: ContactForces, row: int) -> float:
+    """What the impulse of a row took, −½ Λ (γ⁻ + γ⁺): its part of the kinetic energy lost."""
+    rate = row_speed(K, row)
+    for j in range(K.n):
+        rate += 0.5 * K.acc[K.acc_B + row * K.n + j] * K.jump[j]
+    return float(K.impulse[row] * rate)
+
+
+def loss_in(K: ContactForces, c: int) -> float:
+    """What the impulses of a contact took."""
+    loss = 0.0
+    for k in range(K.n_rows):
+        if K.row_contact[k] == c:
+            loss += loss_of(K, k)
+    return loss
+
+
+def loss_elsewhere(K: ContactForces) -> float:
+    """What friction in joints, and contacts that were closed before, took in an impact.
+
+    Where an impulse of the user's acts in the same problem, rows that always hold take their part of it, −½ Λ B·Δv.
+    """
+    loss = 0.0
+    for k in range(K.n_rows):
+        c = K.row_contact[k]
+        if (c < 0 and K.row_friction[k] >= 0) or (c >= 0 and not strikes(K, c)):
+            loss += loss_of(K, k)
+        elif c < 0 and K.n_impulses > 0:
+            for j in range(K.n):
+                loss -= 0.5 * K.impulse[k] * K.acc[K.acc_B + k * K.n + j] * K.jump[j]
+    return loss

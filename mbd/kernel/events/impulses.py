@@ -10,6 +10,7 @@ from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import LOG_OPENED, LOG_PUSHED
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.contact.impact import impact
+from mbd.kernel.contact.impact_solve import loss_elsewhere
 from mbd.kernel.records import Contacts, Switching
 from mbd.kernel.stepping.restart import evaluate
 
@@ -53,12 +54,16 @@ def push(K: Switching, order: int) -> int:
     for j in range(K.n):
         K.pushed_from[j] = K.y[j]
         K.y[j] += K.jump[j]
-    # what closed contacts and other rows make of it
+    # what closed contacts and other rows make of it, and what their friction takes of the work
+    taken = 0.0
+    for i in range(K.n_impulses):
+        taken -= work_of(K, i) if is_pushed(K, i, order) else 0.0
     if order != BESIDE:
         for c in range(K.n_contacts):
             K.pushed_closing[c] = K.closing[c]
             K.closing[c] = 0
         status = impact(K, False)
+        taken += loss_elsewhere(K)
         for c in range(K.n_contacts):
             if status == 0 and K.kind[c] == 0 and K.closed[c] == 1 and K.active[c] == 0:
                 K.closed[c] = 0
@@ -68,11 +73,17 @@ def push(K: Switching, order: int) -> int:
             K.active[c] = 0
         if status != 0:
             return status
-    # P w · (v⁻ + v⁺)/2
+    for i in range(K.n_impulses):
+        taken += work_of(K, i) if is_pushed(K, i, order) else 0.0
     for i in range(K.n_impulses):
         if is_pushed(K, i, order):
-            work = 0.0
-            for j in range(K.n_v):
-                work += 0.5 * K.pushes[i * K.n_v + j] * (K.pushed_from[j] + K.y[j])
-            log_event(K, LOG_PUSHED, i, -work, NO_IMPULSE)
+            log_event(K, LOG_PUSHED, i, taken / count - work_of(K, i), NO_IMPULSE)
     return 0
+
+
+def work_of(K: Switching, i: int) -> float:
+    """Work of an impulse until now, P w · (v⁻ + v)/2."""
+    work = 0.0
+    for j in range(K.n_v):
+        work += 0.5 * K.pushes[i * K.n_v + j] * (K.pushed_from[j] + K.y[j])
+    return work

@@ -19,10 +19,10 @@ from mbd.kernel.codes import (
 from mbd.kernel.contact.cones import aim_as_pulled, friction_size, leads_group, set_loose, set_sticking, speed_of
 from mbd.kernel.contact.contact_log import ALL_IMPULSES, NO_IMPULSE, OWN_IMPULSE, log_event
 from mbd.kernel.contact.impact import impact
-from mbd.kernel.contact.impact_solve import strikes
+from mbd.kernel.contact.impact_solve import loss_elsewhere, loss_in, strikes
 from mbd.kernel.events.guards import gap_scale, is_watched
 from mbd.kernel.events.impulses import AFTER, BEFORE, BESIDE, push
-from mbd.kernel.records import Balance, ContactForces, Frictions, Guards, Mechanism, Switching
+from mbd.kernel.records import Balance, Frictions, Guards, Mechanism, Switching
 from mbd.kernel.stepping.accept_restart import project_velocity
 from mbd.kernel.stepping.restart import (
     active_rows,
@@ -32,7 +32,6 @@ from mbd.kernel.stepping.restart import (
     evaluate_loaded,
     largest_force,
     limit_of,
-    row_speed,
 )
 
 __all__ = ["switch"]
@@ -123,39 +122,6 @@ def close_by_impact(K: Switching, fastest: float) -> int:
     if not slow:
         release_for(K, 1)
     return push(K, AFTER) if K.n_impulses > 0 and not slow else 0
-
-
-def loss_of(K: ContactForces, row: int) -> float:
-    """What the impulse of a row took, −½ Λ (γ⁻ + γ⁺): its part of the kinetic energy lost."""
-    rate = row_speed(K, row)
-    for j in range(K.n):
-        rate += 0.5 * K.acc[K.acc_B + row * K.n + j] * K.jump[j]
-    return float(K.impulse[row] * rate)
-
-
-def loss_in(K: ContactForces, c: int) -> float:
-    """What the impulses of a contact took."""
-    loss = 0.0
-    for k in range(K.n_rows):
-        if K.row_contact[k] == c:
-            loss += loss_of(K, k)
-    return loss
-
-
-def loss_elsewhere(K: ContactForces) -> float:
-    """What friction in joints, and contacts that were closed before, took in an impact.
-
-    Where an impulse of the user's acts in the same problem, rows that always hold take their part of it, −½ Λ B·Δv.
-    """
-    loss = 0.0
-    for k in range(K.n_rows):
-        c = K.row_contact[k]
-        if (c < 0 and K.row_friction[k] >= 0) or (c >= 0 and not strikes(K, c)):
-            loss += loss_of(K, k)
-        elif c < 0 and K.n_impulses > 0:
-            for j in range(K.n):
-                loss -= 0.5 * K.impulse[k] * K.acc[K.acc_B + k * K.n + j] * K.jump[j]
-    return loss
 
 
 def mark_touching(K: Guards) -> None:
