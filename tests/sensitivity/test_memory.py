@@ -31,6 +31,15 @@ def puck():
     return model, mbd.assemble(model, {"slide.y": -1.2e-3}, {"slide.x": 0.3}, closed="mat"), 0.5, "slide.x"
 
 
+def thrown():
+    """A foot that slides on rubber, and off it again: there no bristle is loaded, and neither side of its kink is."""
+    model, body = mbd.Model("thrown"), mbd.PointMass("puck", 1.0)
+    model.connect(mbd.Translation("flight", model.ground.origin, body.origin))
+    rubber = mbd.Bristles(0.4, 2e3, 15.0)
+    model.constrain(mbd.Penalty("mat", mbd.touchdown(body.origin), 3e3, 20.0, friction=rubber))
+    return model, mbd.assemble(model, {"flight.y": 0.1}, {"flight.x": 1.0}), 0.25, "flight.x"
+
+
 def dropped(make):
     """A body that falls on a stop."""
     model, body = mbd.Model("dropped"), mbd.PointMass("body", 1.0)
@@ -44,6 +53,7 @@ LAWS = {
     "dahl": (lambda: shank(mbd.Dahl(0.4, 25.0)), ["gravity.y", "shank.mass", "shank.center"]),
     "lugre": (lambda: shank(mbd.LuGre(0.5, 0.4, 0.5, 25.0, 0.8)), ["gravity.y", "shank.mass", "shank.center"]),
     "bristles": (puck, ["gravity.y", "puck.mass", "mat.bristle_stiffness"]),
+    "bristles that open": (thrown, ["gravity.y", "mat.stiffness", "mat.mu"]),
     "maxwell": (
         lambda: dropped(lambda gap: mbd.MaxwellStop("stop", gap, 2e3, 3e3, 50.0)),
         ["gravity.y", "stop.stiffness", "stop.branch_stiffness"],

@@ -106,7 +106,11 @@ def follow_event(K: Kernel) -> int:
     status = candidate_after(K, seeded(h))
     if status != 0:
         return status
-    K.event_after = at_root(h, guard_value(K, kind, K.event_index, K.time + seeded(h)))
+    value = guard_value(K, kind, K.event_index, K.time + seeded(h))
+    if (kind == CROSS or kind == CROSS_BACK) and K.guard_kink[K.event_index] == 1 and seed_rate(value) == 0.0:
+        K.event_after = h  # two sides of a kink that have met and run together: nothing depends on the instant
+    else:
+        K.event_after = at_root(h, value)
     status = candidate_after(K, K.event_after)
     restore_candidate(K)
     return status
