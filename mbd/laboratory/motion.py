@@ -17,6 +17,7 @@ from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.errors import ModelError, UnknownNameError, nearest, quoted
 from mbd.forces.samples import Samples, in_degrees
+from mbd.forces.scipy_curves import is_curve
 from mbd.laboratory.closed_loops import close_loops, refuse_open_loops
 from mbd.laboratory.quaternion_rates import make_continuous, quaternion_rates
 from mbd.laboratory.recording import Recording
@@ -322,8 +323,9 @@ def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
     """One column for each component, checked."""
     if type(value) is np.ndarray and value.dtype == float and width == 1 and value.shape == time.shape:
         return [_Column(value)]
-    if isinstance(value, Samples):
-        parts = value.components
+    if isinstance(value, Samples) or is_curve(value):
+        curve = value if isinstance(value, Samples) else Samples.of(value, f"motion: {key!r}")
+        parts = curve if isinstance(curve, tuple) else curve.components
         if len(parts) != width:
             raise ModelError(f"motion: {key!r} needs {width} components, its Samples have {len(parts)}")
         return [_Column(*(np.asarray(part(time, order), dtype=float) for order in (0, 1, 2))) for part in parts]
@@ -340,7 +342,7 @@ def _values(key: str, value: Any, time: Vector, width: int) -> list[_Column]:
 def _require_finite(given: Mapping[str, Any], time: Vector) -> None:
     """Raise a `ModelError` for the first gap in columns that are given."""
     for key, value in given.items():
-        if key == "time" or isinstance(value, Samples):
+        if key == "time" or isinstance(value, Samples) or is_curve(value):
             continue
         table = np.asarray(value, dtype=float)
         wrong = np.flatnonzero(~np.isfinite(table.reshape(len(time), -1)).all(axis=1))

@@ -185,7 +185,7 @@ def _checked(xs: Sequence[float], ys: Sequence[float], what: str) -> tuple[list[
     if len(x) != len(y):
         faults.append(f"{what}: {len(x)} abscissae and {len(y)} ordinates; give as many of one as of the other")
     if len(x) < 2:
-        faults.append(f"{what}: at least two samples are needed, {len(x)} came")
+        faults.append(f"{what}: at least two samples are needed, got {len(x)}")
     for kind, values in ("abscissa", x), ("ordinate", y):
         bad = [k for k, value in enumerate(values) if not math.isfinite(value)]
         if bad:

@@ -223,7 +223,7 @@ def test_the_drive_of_a_loop_gives_the_moment_and_the_reactions_of_inverse_dynam
 
 def test_the_angle_of_the_crank_alone_determines_a_loop():
     time_ = np.linspace(0.0, 0.5, 101)
-    angle = mbd.Samples(time_, 3.0 * time_ + 0.4 * np.sin(5.0 * time_), "spline")
+    angle = CubicSpline(time_, 3.0 * time_ + 0.4 * np.sin(5.0 * time_))
     found = mbd.inverse_dynamics(four_bar(), {"time": time_, "drive.angle": angle}, joints=["drive"])
     driven = four_bar(angle)
     run = mbd.simulate(driven, mbd.assemble(driven), mbd.RadauIIA(), tol=1e-9, until=0.5)
