@@ -212,6 +212,30 @@ def test_a_friction_that_had_its_joint_cut_is_left_out_from_the_same_place():
     assert scene.start["pin.angle"] == pytest.approx(1.0) and scene.start["pin.rate"] == pytest.approx(-0.5)
 
 
+@pytest.mark.parametrize("loss", [mbd.Viscous(0.1), mbd.PinFriction(0.3, 0.02)])
+def test_machines_go_on_from_where_they_are_without_an_effect(loss):
+    model, rod = mbd.Model("arm", gravity=(0.0, 0.0, 0.0)), mbd.Link("rod", mass=1.0, length=0.5, center=0.5)
+    pin = mbd.Revolute("pin", model.ground.origin, rod.start, loss=loss)
+    model.connect(pin)
+    model.apply(mbd.Motor("first", pin, torque=0.1), mbd.Motor("second", pin, torque=0.2))
+    ways = [mbd.Transition("a", "b", after=0.07), mbd.Transition("b", "a", after=0.11)]
+    model.constrain(mbd.Mode("phase", ("a", "b"), transitions=ways, remembers={"turned": "pin.angle"}, start="b"))
+    model.constrain(mbd.SampledLaw("law", 0.03, {"first.torque": lambda q: -q}, arguments=("pin.angle",)))
+    run = mbd.simulate(model, mbd.assemble(model, {"pin.angle": 1.0}), dt=2e-3, until=0.25)
+    scene = reduced(
+        Scene(model, run.final, {}), run, ["pin friction" if run.final.names != ("pin.angle",) else "second"], "auto"
+    )
+    assert scene.start.names == ("pin.angle",)
+    other = mbd.simulate(scene.model, scene.start, dt=2e-3, until=0.3)
+    for name in ("phase", "phase.time", "phase.turned", "first.torque"):
+        assert other[name][0] == run[name][-1]
+    assert [(e.name, round(e.time, 9)) for e in other.events] == [
+        ("law: sample", 0.27),
+        ("phase: b to a", 0.29),
+        ("law: sample", 0.3),
+    ]
+
+
 def test_the_start_is_kept_to_the_bit():
     model, start = leg()
     run = mbd.simulate(model, start, dt=2e-3, until=0.1)

@@ -67,10 +67,10 @@ def reduced(scene: Scene, run: Trajectory, names: Iterable[str], backend: str) -
     start = scene.start
     equations = mechanism_of(model, backend, mine).equations
     whole = mechanism_of(scene.model, backend, scene.parameters).equations
-    contacts = {contact.name for contact in equations.contacts}
     if [c.name for c in equations.coordinates] != list(start.names):
-        return Scene(model, _reassembled(equations, model, start, run, contacts, mine, backend), mine)
+        return Scene(model, _reassembled(equations, whole, model, start, run, mine, backend), mine)
     states = dict(zip((state.name for state in whole.states), start.z, strict=True))
+    contacts = {contact.name for contact in equations.contacts}
     armed = None if start.armed is None else start.armed & contacts
     made = replace(
         start, z=np.array([states[state.name] for state in equations.states]),
@@ -80,30 +80,40 @@ def reduced(scene: Scene, run: Trajectory, names: Iterable[str], backend: str) -
     return Scene(model, made, mine)
 
 
-def _anchors(equations: Equations, whole: Equations, start: State) -> Any:
-    """What the contacts that are left hold, and the whole turns of cut joints."""
-    held = np.zeros(equations.n_anchors)
-    counted = {(turn.joint, turn.name): turn.anchor for turn in whole.turns}
-    for turn in equations.turns:
-        if len(start.anchors) and (turn.joint, turn.name) in counted:
-            held[turn.anchor] = start.anchors[counted[turn.joint, turn.name]]
-    known = {contact.name: contact.anchors for contact in whole.contacts}
-    for contact in equations.contacts:
-        places = known.get(contact.name, ())
-        if len(start.anchors) and len(places) == len(contact.anchors):
-            held[list(contact.anchors)] = start.anchors[list(places)]
+def _anchors(equations: Equations, whole: Equations, start: State, anew: Any = None) -> Any:
+    """What the contacts and machines that are left hold, and the whole turns of cut joints.
+
+    anew : anchors of a start in other coordinates, of which machines alone hold what they held
+    """
+    if not len(start.anchors):
+        return start.anchors if anew is None else anew
+    held, before = np.zeros(equations.n_anchors) if anew is None else anew.copy(), _places_of_anchors(whole)
+    for key, anchor in _places_of_anchors(equations).items():
+        if key in before and (anew is None or key[0] == "machine"):
+            held[anchor] = start.anchors[before[key]]
     return held
 
 
+def _places_of_anchors(equations: Equations) -> dict[tuple[Any, ...], int]:
+    """Anchors by what holds them."""
+    found: dict[tuple[Any, ...], int] = {("turn", turn.joint, turn.name): turn.anchor for turn in equations.turns}
+    for contact in equations.contacts:
+        found |= {("contact", contact.name, len(contact.anchors), k): a for k, a in enumerate(contact.anchors)}
+    for each in equations.machines:
+        found |= {("machine", each.name, field): a for field, a in zip(each.fields, each.anchors, strict=True)}
+    return found
+
+
 def _reassembled(
-    equations: Equations, model: Any, start: State, run: Trajectory, contacts: set[str],
+    equations: Equations, whole: Equations, model: Any, start: State, run: Trajectory,
     parameters: Mapping[str, float], backend: str,
 ) -> State:  # fmt: skip
     """A start in other coordinates."""
     first = run.at(float(run.time[0]), side="left")
     position = {coordinate.name: first[coordinate.name] for coordinate in (*equations.coordinates, *equations.states)}
     velocity = {name: first[name] for name in equations.velocity_names}
+    contacts = {contact.name for contact in equations.contacts}
     closed = start.mode.closed & contacts
     free = set() if start.armed is None else contacts - closed - start.armed
     made = assemble(model, position, velocity, closed, free, parameters, project=True, backend=backend)
-    return replace(made, time=start.time)
+    return replace(made, time=start.time, anchors=_anchors(equations, whole, start, made.anchors))
