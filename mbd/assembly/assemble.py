@@ -223,7 +223,7 @@ def _opened(
     """A mechanism where closing begins."""
     q, y = _values(mechanism.equations, named, guess)
     q = mechanism.equations.configuration.normalise(q)
-    manager, first = manager_of(mechanism, parameters), first_anchors(mechanism)
+    manager, first = manager_of(mechanism, parameters), first_anchors(mechanism, parameters)
     hold(mechanism, held, first)
     return Posture(mechanism, manager, parameters, q, y, manager.flags(closed), first, named.places, named.speeds)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.given_state import given_state
+from mbd.assembly.machines import begun_in, stored_anew
 from mbd.assembly.posture import Posture, capture, close_nearby, close_velocities, position_rows
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.errors import AssemblyError
@@ -45,6 +46,7 @@ def changed_start(
     """
     given = given_state(model, start, parameters, backend)
     mechanism, manager, equations = given.mechanism, given.manager, given.mechanism.equations
+    start, begun = begun_in(model, mechanism, start)
     q, y = np.array(start.q, dtype=float), np.concatenate([start.v, start.z]).astype(float)
     free_q, free_v = np.ones(equations.n_v, dtype=bool), np.ones(equations.n_v, dtype=bool)
     names = start_names(mechanism)
@@ -69,10 +71,8 @@ def changed_start(
         if left:
             shown = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
             raise AssemblyError(f"no start with {shown}: {'; '.join(left)}")
-    return of_model(
-        replace(
-            start, q=work.q, v=work.y[: equations.n_v].copy(), z=work.y[equations.n_v :].copy(),
-            anchors=work.anchors if active else start.anchors, moved={}, memory=None,
-        ),
-        model,
+    changed = replace(
+        start, q=work.q, v=work.y[: equations.n_v].copy(), z=work.y[equations.n_v :].copy(),
+        anchors=work.anchors if active else start.anchors, moved={}, memory=None,
     )  # fmt: skip
+    return of_model(stored_anew(mechanism, changed, given.values, begun), model)

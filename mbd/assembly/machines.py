@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,22 +11,57 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.bodies.values import number
 from mbd.compile.mechanism import Mechanism
+from mbd.equal import ROUND_OFF_RTOL
+from mbd.equations.equations import Machine
 from mbd.errors import ModelError, nearest
+from mbd.state import State
 
-__all__ = ["first_anchors", "hold", "store_first", "without_held"]
+__all__ = ["begun_in", "first_anchors", "hold", "store_first", "stored_anew", "without_held"]
 
 
-def first_anchors(mechanism: Mechanism) -> Vector:
+def first_anchors(mechanism: Mechanism, parameters: Vector) -> Vector:
     """Anchors of which machines hold what they do before a start, and zeros elsewhere."""
     anchors = np.zeros(mechanism.layout.n_anchors)
     for machine in mechanism.equations.machines:
-        anchors[list(machine.anchors)] = machine.initial
+        anchors[list(machine.anchors)] = machine.initial_at(parameters)
     return anchors
 
 
-def store_first(mechanism: Mechanism, time: float, q: Vector, y: Vector, parameters: Vector, anchors: Vector) -> None:
-    """Store into anchors what machines store at a start; the states that they are in stay."""
+def begun_in(model: Any, mechanism: Mechanism, state: State) -> tuple[State, Sequence[Machine]]:
+    """A state, and the machines that begin in it: they hold what they store there at a start, with its parameters.
+
+    The anchors of one that has none are those of a start.
+    """
     machines = mechanism.equations.machines
+    if not machines:
+        return state, ()
+    own = mechanism.parameters(state.parameters, getattr(model, "parameters", {}))
+    if len(state.anchors) != mechanism.layout.n_anchors:
+        state = replace(state, anchors=first_anchors(mechanism, own))
+        return stored_anew(mechanism, state, own, machines), machines
+    anew = stored_anew(mechanism, state, own, machines).anchors
+    off = np.abs(anew - state.anchors) > ROUND_OFF_RTOL * np.maximum(1.0, np.abs(anew))
+    return state, [each for each in machines if not np.any(off[list(each.anchors[1:])])]
+
+
+def stored_anew(mechanism: Mechanism, state: State, parameters: Vector, machines: Sequence[Machine]) -> State:
+    """The state, with what some machines hold that begin in it; those stay in their states."""
+    if not machines:
+        return state
+    found = np.array(state.anchors, dtype=float)
+    for machine in machines:
+        found[list(machine.anchors[1:])] = machine.initial_at(parameters)[1:]
+        found[list(machine.times)] = state.time
+    store_first(mechanism, state.time, state.q, np.concatenate([state.v, state.z]), parameters, found, machines)
+    return replace(state, anchors=found)
+
+
+def store_first(
+    mechanism: Mechanism, time: float, q: Vector, y: Vector, parameters: Vector, anchors: Vector,
+    machines: Sequence[Machine] | None = None,
+) -> None:  # fmt: skip
+    """Store into anchors what machines store at a start; the states that they are in stay."""
+    machines = mechanism.equations.machines if machines is None else machines
     if not machines:
         return
     captured = mechanism.acceleration_terms(time, q, y, parameters, anchors).captured

@@ -11,6 +11,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.given_state import given_state
+from mbd.assembly.machines import begun_in, stored_anew
 from mbd.assembly.orientation import reversed_joints
 from mbd.assembly.posture import Posture, capture, close_nearby, close_velocities, position_rows
 from mbd.assembly.turns import keep_wrapped
@@ -62,6 +63,7 @@ def project(model: Any, state: State, parameters: Mapping[str, float] | None = N
     given = given_state(model, state, parameters, backend)
     mechanism, manager, values = given.mechanism, given.manager, given.values
     equations = mechanism.equations
+    state, begun = begun_in(model, mechanism, state)
     q, y = np.array(state.q, dtype=float), np.concatenate([state.v, state.z]).astype(float)
     anchors = np.array(state.anchors, dtype=float)
     anchors = anchors if len(anchors) == mechanism.layout.n_anchors else np.zeros(mechanism.layout.n_anchors)
@@ -76,7 +78,7 @@ def project(model: Any, state: State, parameters: Mapping[str, float] | None = N
         state, q=work.q, v=work.y[: equations.n_v].copy(), z=work.y[equations.n_v :].copy(), anchors=work.anchors,
         moved=moved, parameters=given.changed, memory=None,
     )  # fmt: skip
-    return of_model(nearest, model)
+    return of_model(stored_anew(mechanism, nearest, values, begun), model)
 
 
 def _close(work: Posture) -> None:

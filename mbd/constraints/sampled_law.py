@@ -28,9 +28,9 @@ INDEX, NEXT, FIRST = 0, 1, 2
 class SampledLaw(Machine):
     """Difference equations ``u_k = f(y_k, x_k)``, ``x_{k+1} = g(y_k, x_k)`` of samples y_k, with outputs that are held.
 
-    The first sample is that of the start; one that falls on the end of a run is taken there, and not again by a run
-    that continues. Steps end at samples, whose instants are exact. Functions are traced, so that they run in machine
-    code, and gaits and derivatives know them. Decisions of any kind in Python are a
+    The first sample is that of the start, with the parameters of the run; one that falls on the end of a run is taken
+    there, and not again by a run that continues. Steps end at samples, whose instants are exact. Functions are traced,
+    so that they run in machine code, and gaits and derivatives know them. Decisions of any kind in Python are a
     `mbd.Controller`.
 
     Parameters

@@ -213,6 +213,11 @@ class Transition:
     stored: tuple[int, ...] = ()
     timed: bool = False
 
+    @property
+    def is_unconditional(self) -> bool:
+        """Whether it happens whenever its cause does."""
+        return self.contact < 0 and self.condition is None
+
 
 @dataclass(frozen=True)
 class Guard:
@@ -244,7 +249,8 @@ class Machine:
 
     states : their names; anchors : the numbers that it holds, that of the state first; fields : their names
     times : which of these anchors are instants [s]
-    initial : what they are before the start; first : those that are stored then, none where forces must be known for it
+    initial : what they are before the start, but for the parameters that `own` tells, (turn, number) of each; first :
+        those that are stored then, none where forces must be known for it
     captured : what is stored into each anchor, on the tape; the anchor itself where nothing is
     """
 
@@ -256,6 +262,14 @@ class Machine:
     initial: tuple[float, ...]
     first: tuple[int, ...]
     captured: tuple[Node, ...]
+    own: tuple[tuple[int, int], ...] = ()
+
+    def initial_at(self, parameters: Any) -> list[float]:
+        """What it holds before the start with these values of parameters."""
+        found = list(self.initial)
+        for turn, number in self.own:
+            found[turn] = float(parameters[number])
+        return found
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from mbd.constraints.base import Constraint
 from mbd.constraints.event import Event
@@ -121,14 +122,27 @@ def machine_guards(
                 )
         loads = any(each.op == "input" and each.data[0] == "lam" for each in live(list(stored[m].values())))
         stored_first = () if loads else tuple(own[k].data[1] for k in first[m])  # forces are known once steps begin
+        captured = tuple(stored[m].get(k, node) for k, node in enumerate(own))
         machines.append(records.Machine(
             word.name, word.state_names, tuple(node.data[1] for node in own), word.fields,
-            tuple(own[k].data[1] for k in word.times), word.initial(values), stored_first,
-            tuple(stored[m].get(k, node) for k, node in enumerate(own)),
+            tuple(own[k].data[1] for k in word.times), word.initial(values), stored_first, captured,
+            tuple(_own_values(scope, word, values, own, captured)),
         ))  # fmt: skip
     if faults:
         raise ModelError(list(dict.fromkeys(faults)))
     return machines, guards
+
+
+def _own_values(
+    scope: DerivationScope, word: Machine, values: Mapping[str, float], held: Sequence[Node], captured: Sequence[Node]
+) -> Iterable[tuple[int, int]]:
+    """(turn, number) of the parameters that a machine sets, in whose place it holds their own values before it does."""
+    used = {node.index for node in live(captured)}
+    for name in word.held_parameters():
+        turns = [k for k, value in enumerate(word.initial({**values, name: math.nan})) if math.isnan(value)]
+        if name in values and any(held[k].index in used for k in turns):
+            node = scope.parameters.node(name, values[name])
+            yield from ((k, node.data[1]) for k in turns if node.op == "input")
 
 
 def _never(guards: Sequence[Guard], first: int, causes: Sequence[str]) -> list[str]:

@@ -19,13 +19,23 @@ def stored_at_start(programs: Programs, motion: Motion, mode: Mode) -> Motion:
     if not machines:
         return motion
     zero = np.zeros(programs.columns.n), np.zeros(programs.columns.rows)
-    before, first = motion.anchors.copy(), [anchor for machine in machines for anchor in machine.first]
+    before, of_before = motion.anchors.copy(), motion.tangent.anchors.copy()
+    columns = {place: k for k, place in enumerate(programs.places)}
     for machine in machines:
-        before[list(machine.anchors)] = machine.initial
+        before[list(machine.anchors[1:])] = machine.initial_at(programs.values)[1:]
         before[list(machine.times)] = motion.t
+        for turn, number in machine.own:
+            if number in columns:
+                of_before[machine.anchors[turn]] = motion.tangent.p[columns[number]]
     values, slopes = programs.stored(replace(motion, anchors=before).at(mode, *zero))
-    of_anchors = motion.tangent.anchors.copy()
-    apart = np.abs(values[first] - motion.anchors[first])
-    fresh = np.array(first, dtype=int)[apart <= ROUND_OFF_RTOL * np.maximum(1.0, np.abs(values[first]))]
-    of_anchors[fresh] = slopes[fresh] @ motion.tangent.stacked(programs.columns)
+    found = slopes @ motion.with_tangent(anchors=of_before).tangent.stacked(programs.columns)
+    stored = [anchor for machine in machines for anchor in machine.first]
+    before[stored], of_anchors = values[stored], motion.tangent.anchors.copy()
+    fresh = np.abs(before - motion.anchors) <= ROUND_OFF_RTOL * np.maximum(1.0, np.abs(before))
+    for machine in machines:
+        if np.all(fresh[list(machine.anchors[1:])]):  # it begins here
+            own = [machine.anchors[turn] for turn, _ in machine.own]
+            of_anchors[own] = of_before[own]
+    stored = [anchor for anchor in stored if fresh[anchor]]
+    of_anchors[stored] = found[stored]
     return motion.with_tangent(anchors=of_anchors)

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mbd.assembly.given_state import fits
+from mbd.assembly.machines import begun_in, stored_anew
 from mbd.assembly.manager import manager_of
 from mbd.assembly.turns import directed
 from mbd.compile.mechanism import Mechanism
@@ -260,9 +261,13 @@ def laid_out(
     """The same before its start is put into the kernel's arrays."""
     mechanism = mechanism_of(model, options["backend"], changed)
     folded = getattr(model, "parameters", {}) if changed else {}
-    manager = manager_of(mechanism, mechanism.parameters(changed, folded))
+    values = mechanism.parameters(changed, folded)
+    manager = manager_of(mechanism, values)
     fits(start, mechanism.equations, manager)
     start = directed(mechanism, start)
+    if changed != start.parameters or len(start.anchors) != mechanism.layout.n_anchors:
+        start, begun = begun_in(model, mechanism, start)
+        start = stored_anew(mechanism, start, values, begun)
     end, stop = end_of(until, manager, dt, start.time)
     tol = options.get("tol")
     strategy, reason = chosen(options["contact"], manager, options["locate"], tol is not None)

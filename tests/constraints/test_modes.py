@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -330,6 +331,21 @@ def test_a_transition_waits_while_its_condition_does_not_hold() -> None:
     run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.6)
     assert [event.name for event in run.events][-1] == "leg: thrust to flight (2)"
     np.testing.assert_allclose(run["rail.displacement"][run.events[-1].row], 0.2, atol=1e-12)
+
+
+@pytest.mark.parametrize("condition", [None, mbd.measure(lambda t: t - 10.0, "t")])
+def test_a_timer_that_has_ended_when_a_run_begins_is_due_at_once(condition: Any) -> None:
+    model, _ = hopper()
+    ways = [mbd.Transition("a", "b", after=0.5, only_while=condition), mbd.Transition("b", "a", after=0.1)]
+    model.apply(mbd.Mode("clock", ("a", "b"), transitions=ways), mbd.SampledLaw("law", 0.25, {"u": lambda t: t}, "t"))
+    start = mbd.assemble(model, {"rail.displacement": 9.0})
+    first = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.3)
+    shorter = {"clock.a to b.after": 0.2}
+    for begun, values, time in (first.final, shorter, 0.3), (replace(start, time=0.7), {}, 0.7):
+        run = mbd.simulate(model, begun, mbd.RungeKutta853(), dt=0.01, until=0.9, parameters=values)
+        found = [event.time for event in run.events if event.name == "clock: a to b"]
+        assert found[:1] == ([time] if condition is None else [])
+        assert max((run.time - run["law.u"])[run.time > time]) < 0.25 + 1e-9
 
 
 def test_transitions_without_end_are_named() -> None:

@@ -137,6 +137,30 @@ def test_a_delay_or_period_of_a_run_is_that_of_a_model_made_with_it_or_an_error(
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
 
 
+@pytest.mark.parametrize("delay", [0.0, 0.004, 0.01, 0.023])
+def test_the_first_sample_is_that_of_the_start_and_parameters_of_the_run(delay: float) -> None:
+    model, start = arm(delay=delay)
+    values, until = {"motor.torque": -1.5, "PID.period": 1.05 * PERIOD, "rod.mass": 2.2}, 0.0531
+
+    def end(start: mbd.State, values: Any) -> float:
+        return mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.004, until=until, parameters=values).final.q[0]
+
+    wanted = [end(mbd.assemble(model, {"hinge.angle": angle}, parameters=values), {}) for angle in (0.2, 0.9)]
+    assert end(start, values) == wanted[0] == end(mbd.project(model, start, values), {})
+    assert end(replace(start, anchors=np.zeros(0)), values) == wanted[0]
+    starts = start, {"hinge.angle": [0.2, 0.9]}
+    found = mbd.batch(
+        model, starts, mbd.RungeKutta853(), dt=0.004, until=until, parameters=values, results=["hinge.angle"]
+    )
+    np.testing.assert_array_equal(found["hinge.angle"], wanted)
+    if delay:  # until the first outputs the parameter has its own value
+        rate = mbd.sensitivities(
+            model, start, mbd.RungeKutta853(), dt=0.004, until=until, wrt=["motor.torque"], of=["hinge.angle"]
+        ).matrix[0, 0]
+        change = end(start, {"motor.torque": 0.501}) - end(start, {"motor.torque": 0.499})
+        assert rate == pytest.approx(500.0 * change, rel=1e-5) != 0.0
+
+
 def test_an_output_of_its_own_is_a_quantity_and_samples_restart_with_a_contact() -> None:
     model = mbd.Model("ball")
     ball = mbd.PointMass("ball", mass=1.0)

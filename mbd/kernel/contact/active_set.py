@@ -172,7 +172,10 @@ class ActiveSetManager:
             "guard_source": [-1 if each is None else each.source for _, each in own],
             "guard_target": [-1 if each is None else each.target for _, each in own],
             "guard_fires": [int(each is not None and ("event", e) in each.causes) for e, each in own],
-            "guard_timed": [0 if each is None else 2 * self.guards[e].is_timer + each.timed for e, each in own],
+            "guard_timed": [
+                0 if each is None else each.timed + (2 + 4 * each.is_unconditional) * self.guards[e].is_timer
+                for e, each in own
+            ],
             "guard_kink": [int(guard.is_kink) for guard in self.guards],
             "guard_contact": [-1 if each is None else each.contact for _, each in own],
             "releases": _lists(releases), "causes": _lists(causes),

@@ -95,7 +95,7 @@ def batch(
         raise ModelError(f"there are {sizes['starts']} starts and {sizes['parameters']} values of parameters; give as "
                          "many of both, or one of either")  # fmt: skip
     runner = Runner(model, base, scheme, float(dt or 0.0), until, changes, options, threads)
-    given = starts_of(base, states, columns, count, runner.mechanism, runner.manager)
+    given = starts_of(base, states, columns, count, model, runner.mechanism, runner.manager, runner.changes)
     with share_bar() if bar_wanted else nullcontext() as bar:
         return _table(runner, given, tuple(names), None if bar is None else lambda done: bar(done, count))
 

@@ -10,11 +10,13 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.given_state import MAX_ANGLE, fits
+from mbd.assembly.machines import begun_in, stored_anew
 from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.simulation.batch.changes import Changes
 from mbd.simulation.many_runs import start_line
 from mbd.simulation.marching import Run
 from mbd.state import State
@@ -33,14 +35,16 @@ class Starts:
     states: Sequence[State]
     columns: Columns
     count: int
+    anchors: Matrix | None = None  # (N, n_anchors), where machines store at a start what others do not
 
     def __len__(self) -> int:
         return self.count
 
     def state(self, k: int, names: Mapping[str, int]) -> State:
         """The k-th start, without what an earlier run remembers; `names` as `places_of` gives them."""
+        own = {} if self.anchors is None else {"anchors": self.anchors[k]}
         if self.states:
-            return replace(self.states[k], memory=None, moved={})
+            return replace(self.states[k], memory=None, moved={}, **own)
         q, v, z = self.base.q.copy(), self.base.v.copy(), self.base.z.copy()
         for name, column in self.columns.items():
             place = names[name]
@@ -49,15 +53,18 @@ class Starts:
                     part[place] = column[k]
                     break
                 place -= len(part)
-        return replace(self.base, q=q, v=v, z=z, memory=None, moved={})
+        return replace(self.base, q=q, v=v, z=z, memory=None, moved={}, **own)
 
     def lines(self, run: Run, names: Mapping[str, int]) -> Matrix:
         """What the kernel takes: a line for each."""
         if self.states:
-            return np.array([start_line(run, start) for start in self.states])
+            return np.array([start_line(run, self.state(k, names)) for k in range(self.count)])
         lines = np.tile(start_line(run, self.base), (self.count, 1))
         for name, column in self.columns.items():
             lines[:, 1 + names[name]] = column
+        if self.anchors is not None:
+            first = 1 + len(self.base.q) + len(self.base.v) + len(self.base.z)
+            lines[:, first : first + self.anchors.shape[1]] = self.anchors
         return lines
 
 
@@ -137,7 +144,7 @@ def given_starts(starts: Any) -> tuple[State, Sequence[State], dict[str, Vector]
 
 def starts_of(
     base: State, states: Sequence[State], columns: Mapping[str, Vector], count: int,
-    mechanism: Mechanism, manager: ActiveSetManager,
+    model: Any, mechanism: Mechanism, manager: ActiveSetManager, changes: Changes,
 ) -> Starts:  # fmt: skip
     """The starts of a model.
 
@@ -173,4 +180,12 @@ def starts_of(
         if np.max(np.abs(column), initial=0.0) > MAX_ANGLE:
             raise ModelError(f"starts: {name!r} has values beyond {MAX_ANGLE:g}; take whole turns away")
     whole = {name: np.broadcast_to(column, count) for name, column in columns.items()}
-    return Starts(base, states, whole, count)
+    if not mechanism.equations.machines:
+        return Starts(base, states, whole, count)
+    known = [begun_in(model, mechanism, each) for each in states or [base]]
+    found = Starts(known[0][0], [start for start, _ in known] if states else (), whole, count)
+    made = (
+        stored_anew(mechanism, found.state(k, places), changes.vectors(k, k + 1)[0], known[k if states else 0][1])
+        for k in range(count)
+    )
+    return replace(found, anchors=np.array([start.anchors for start in made]))

@@ -44,7 +44,7 @@ def begin(run: RunData, start: State) -> None:
     if len(start.anchors) == v.n_anchors:  # else all contacts are open, and store theirs as they close
         v.anchors[: v.n_anchors] = start.anchors
     elif run.mechanism.equations.machines:
-        v.anchors[: v.n_anchors] = first_anchors(run.mechanism)
+        v.anchors[: v.n_anchors] = first_anchors(run.mechanism, v.params)
         store_first(run.mechanism, start.time, start.q, v.y[: v.n], v.params, v.anchors[: v.n_anchors])
     n_contacts, n_guards = v.n_contacts, v.n_guards
     v.closed[:n_contacts] = run.manager.flags(start.mode.closed)
@@ -156,9 +156,10 @@ def set_side(run: RunData, e: int, guards: Vector) -> None:
     value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
     doubt = run.stepper.guard_round_off(e)
     v, timed = run.kernel, int(run.kernel.guard_timed[e]) if run.manager.machines else 0
+    late = timed >= 4 and value > 0.0 and int(v.anchors[v.machine_start[v.guard_machine[e]]]) == v.guard_source[e]
     begins = timed % 2 == 1 and v.anchors[v.machine_start[v.guard_machine[e]] + 1] == v.time  # with this state
-    if (abs(value) <= doubt and timed >= 2) or begins:
-        value = -1.0  # a timer that is due
+    if late or (abs(value) <= doubt and timed >= 2) or begins:
+        value = -1.0  # a timer that is due, or was before a parameter or the time was changed
     elif abs(value) <= doubt:
         value = rate if abs(rate) * run.kernel.step > doubt else 0.0
     run.kernel.side[e] = float(np.sign(value))
