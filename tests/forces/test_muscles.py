@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any
 
@@ -177,6 +178,10 @@ def test_a_slack_muscle_has_no_length_of_fibers_at_rest():
     muscle = mbd.Muscle("muscle", (ground.point(0.0, 1.0), ground.point(0.0, 0.0)), 800.0, 0.1, 0.2)
     with pytest.raises(mbd.ModelError, match="slack at length 0.1 m"):
         muscle.fiber_at(0.1, 0.5)
+    values = {"fiber_length": 0.08, "tendon_length": 0.22, "pennation": 0.3}
+    other = dataclasses.replace(muscle, **values)
+    given = {f"muscle.{name}": value for name, value in values.items()}
+    assert muscle.fiber_at(0.32, 0.5, given) == other.fiber_at(0.32, 0.5) != muscle.fiber_at(0.32, 0.5)
     with pytest.raises(mbd.ModelError, match="length of 'muscle' must be finite"):
         muscle.fiber_at(math.nan, 0.5)
 

@@ -169,6 +169,21 @@ def test_who_stands_has_level_soles_on_the_ground_below_the_hips(knees):
         assert np.ptp(heights) < 1e-12 and abs(at[f"{side} sole"][0]) < 1e-12
 
 
+def test_a_leg_that_is_changed_stands_on_the_ground_too():
+    person = mbd.human(70.0, 1.75)
+    knees = "left knee", "right knee"
+    for each, lifted in (
+        (person.welded("left knee"), "right"), (person.welded(*knees), ""),
+        (person.changed("left knee", axis=(0, 0, -1)), ""), (person.welded("left knee", "left ankle"), "right"),
+    ):  # fmt: skip
+        model = mbd.Model("person")
+        model.connect(*each.joints)
+        start = mbd.assemble(model, each.standing(knees=0.4))
+        for side in ("left", "right"):
+            heel, toe = (start[f"{side} foot.{end}"][1] for end in ("heel", "toe"))
+            assert heel == pytest.approx(toe, abs=1e-12) and (abs(heel) < 1e-12) == (side != lifted)
+
+
 def test_passive_moments_are_absent_unless_asked_for():
     assert mbd.human(70.0, 1.75).moments == ()
     person = mbd.human(70.0, 1.75, passive=True).without("right leg")
@@ -197,7 +212,11 @@ def test_what_a_person_lacks_is_named():
         (lambda: person.replaced("left foot", 3), "a body such as"),
         (lambda: person.replaced("left foot", mbd.PointMass("foot", 1.0)), "name the body 'left foot'"),
         (lambda: mbd.human(70.0, 1.75, "mail"), "did you mean 'male'"),
-        (lambda: person.without("head").height, "its height ends at the head"), (lambda: person.joint("kne"), "joint"),
+        (lambda: person.without("head").height, "its height ends at the head"),
+        (lambda: person.replaced("head", mbd.PointMass("head", 5.0)).height, "the point 'top' of 'head'"),
+        (lambda: person.welded("left ankle").standing(knees=0.2), "'left ankle' about z, which it does not allow"),
+        (lambda: person.changed("left knee", axis="x").standing(knees=0.2), "'left knee' about z"),
+        (lambda: person.joint("kne"), "joint"),
     ):  # fmt: skip
         with pytest.raises(ModelError, match=said):
             act()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -275,7 +275,7 @@ class Muscle(OfQuantities, Force):
             found["fiber_length"] = lambda scope: self._fiber(scope)[0]
         return {field: Result(partial(_value, function)) for field, function in found.items()}
 
-    def fiber_at(self, length: float, activation: float) -> float:
+    def fiber_at(self, length: float, activation: float, parameters: Mapping[str, float] | None = None) -> float:
         """The length of the fibers at rest [m], where they and the tendon carry the same.
 
         Give it to `mbd.assemble` as 'name.fiber_length', so that a run begins without a jerk of the fibers.
@@ -284,6 +284,7 @@ class Muscle(OfQuantities, Force):
         ----------
         length : l_MT of the path [m], a state's ``state["name.length"]``
         activation : a ≥ 0 [-]
+        parameters : values that differ from those of the muscle, by name, such as ``state.parameters``
 
         Returns
         -------
@@ -301,20 +302,22 @@ class Muscle(OfQuantities, Force):
 
         length = number(length, f"length of '{self.name}'")
         activation = number(activation, f"activation of '{self.name}'")
-        thickness, optimal = self.fiber_length * float(sin(self.pennation)), self.fiber_length
+        given = {field: (parameters or {}).get(f"{self.name}.{field}", getattr(self, field)) for field in NUMBERS}
+        optimal, slack = (number(given[f], f"{f} of '{self.name}'") for f in ("fiber_length", "tendon_length"))
+        thickness = optimal * float(sin(number(given["pennation"], f"pennation of '{self.name}'")))
 
         def apart(fiber: float) -> float:
             along = root(fiber * fiber - thickness * thickness)
             curves, size = self._curves, fiber / optimal
             carried = (activation * float(curves.active(size)) + float(curves.passive(size))) * along / fiber
-            return carried - float(curves.tendon((length - along) / self.tendon_length))
+            return carried - float(curves.tendon((length - along) / slack))
 
         low = max(0.05 * optimal, thickness * (1.0 + 1e-9))
         high = max(root(length * length + thickness * thickness), 2.0 * low)
         if not apart(low) < 0.0 < apart(high):
             raise ModelError(
                 f"Muscle '{self.name}' is slack at length {length:.3g} m with activation {activation:.3g}: fibers and "
-                f"a tendon of {self.tendon_length:.3g} m have no equilibrium there; give the length of a stretched path"
+                f"a tendon of {slack:.3g} m have no equilibrium there; give the length of a stretched path"
             )
         return float(brentq(apart, low, high, xtol=1e-15, rtol=1e-14))
 

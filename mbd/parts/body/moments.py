@@ -58,7 +58,7 @@ def passive_moment(
     {'left hip ligaments.scale': 1.0}
     """
     check(model, name, "passive_moment")
-    if not isinstance(joint, Joint) or len(joint.coordinate_names) != 1:
+    if not isinstance(joint, Joint) or [label.unit for label in joint.labels] != ["rad"]:
         raise ModelError(f"joint of passive_moment '{name}' must be a hinge with one coordinate, got {joint!r}")
     if not among(of, PASSIVE_MOMENTS):
         raise ModelError(f"passive_moment '{name}': " + nearest(of, PASSIVE_MOMENTS, "joint", "The table has"))

@@ -102,7 +102,9 @@ class Human:
         if "head" not in self.bodies:
             raise ModelError("human: its height ends at the head, which it lacks")
         head = self.bodies["head"]
-        top = next(frame for frame in head.points.values() if frame.name == "top")
+        top = next((frame for frame in (*head.points.values(), *head.frames.values()) if frame.name == "top"), None)
+        if top is None:
+            raise ModelError(f"human: its height ends at the point 'top' of '{head.name}', which it lacks")
         places = origins("pelvis", self.bodies, self.joints)
         return hips_over_ground(self.bodies) + places[head.name][1] + top.offset[1]
 
@@ -118,6 +120,8 @@ class Human:
     def standing(self, knees: float = 0.0) -> dict[str, Position]:
         """Positions for `mbd.assemble`: upright on level ground, feet flat; of legs that differ, the longer one.
 
+        A leg whose knee is welded stays straight.
+
         Parameters
         ----------
         knees : by how much both are flexed, ankles staying under the hips, below π [rad]
@@ -125,7 +129,7 @@ class Human:
         Raises
         ------
         ModelError
-            where knees bend backwards, or by half a turn.
+            where knees bend backwards, or by half a turn, and of a hip or an ankle that is held while its knee bends.
         """
         bend = number(knees, "knees of standing")
         if not 0.0 <= bend < math.pi:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from mbd.bodies.base import Body
 from mbd.bodies.values import Vector3
+from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.parts.whole_body.segments import SIDES
 
@@ -19,17 +20,19 @@ Position = float | tuple[float, ...]
 def standing(prefix: str, bodies: Mapping[str, Body], joints: Sequence[Joint], knees: float) -> dict[str, Position]:
     """Positions of joints: upright over level ground at y = 0, knees flexed, ankles under the hips, soles level.
 
-    Of legs that differ the longer one reaches the ground.
+    Of legs that differ the longer one reaches the ground; one whose knee is held stays straight.
     """
     made, reaches = {joint.name: joint for joint in joints}, []
     found: dict[str, Position] = {}
     for side, (a, b, down) in _legs(bodies).items():
-        hip = math.atan2(b * math.sin(knees), a + b * math.cos(knees))
-        reaches.append(a * math.cos(hip) + b * math.cos(knees - hip) + down)
-        bent = {"hip": hip, "knee": -knees, "ankle": knees - hip}
-        for name, angle in bent.items():
-            joint = made.get(f"{prefix}{side} {name}")
-            if joint is not None and knees != 0.0:
+        joints_of_leg = {name: made.get(f"{prefix}{side} {name}") for name in ("hip", "knee", "ankle")}
+        knee = joints_of_leg["knee"]
+        bend = 0.0 if knee is not None and not knee.labels else knees  # one that is held stays straight
+        hip = math.atan2(b * math.sin(bend), a + b * math.cos(bend))
+        reaches.append(a * math.cos(hip) + b * math.cos(bend - hip) + down)
+        for name, angle in {"hip": hip, "knee": -bend, "ankle": bend - hip}.items():
+            joint = joints_of_leg[name]
+            if joint is not None and bend != 0.0:
                 found |= _bent(joint, angle)
     height: dict[str, Position] = {f"{prefix}trunk.y": max(reaches, default=0.0)} if f"{prefix}trunk" in made else {}
     return {**height, **found}
@@ -54,7 +57,13 @@ def _bent(joint: Joint, angle: float) -> dict[str, Position]:
     """A turn about z."""
     if joint.orientation is not None:
         return {f"{joint.name}.orientation": (math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))}
-    return {joint.coordinate_names[0]: angle} if joint.coordinate_names else {}
+    x, y, z = getattr(joint, "axis", (0.0, 0.0, 0.0))
+    if not joint.labels or x != 0.0 or y != 0.0:
+        raise ModelError(
+            f"standing with bent knees turns '{joint.name}' about z, which it does not allow; weld the knee of that "
+            "leg too, or name the positions one by one"
+        )
+    return {joint.coordinate_names[0]: math.copysign(angle, angle * z)}
 
 
 def _length(body: Body | None, end: str) -> float:
