@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from mbd.compile.elements import MIN_OPERATIONS
 from mbd.compile.layout import Layout
 from mbd.compile.lowering import MAX_OPERATIONS, PART_OPERATIONS, lower
 from mbd.tape.node import Node
@@ -13,11 +14,15 @@ __all__ = ["c_source"]
 
 
 def c_source(
-    programs: Mapping[str, Sequence[Node]], layout: Layout, large: int = MAX_OPERATIONS, part: int = PART_OPERATIONS
+    programs: Mapping[str, Sequence[Node]],
+    layout: Layout,
+    large: int = MAX_OPERATIONS,
+    part: int = PART_OPERATIONS,
+    rolled: int = MIN_OPERATIONS,
 ) -> str:
     """A file with one ``void mbd_name(const double *block, const double *parameters, double *out)`` per program.
 
     With ``-ffp-contract=off`` it gives the bits of machine code without fused multiply-add (see `mbd.trees.c`).
-    large, part : see `mbd.compile.lowering.lower`
+    large, part, rolled : see `mbd.compile.lowering.lower`
     """
-    return "\n".join([HEAD, *(function.text() for function in lower(programs, layout, Straight, large, part))])
+    return "\n".join([HEAD, *(function.text() for function in lower(programs, layout, Straight, large, part, rolled))])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from mbd.compile.elements import MIN_OPERATIONS
 from mbd.compile.layout import Layout
 from mbd.compile.lowering import MAX_OPERATIONS, PART_OPERATIONS, lower
 from mbd.tape.node import Node
@@ -27,7 +28,7 @@ class Module:
     ----------
     programs : names and what each function writes to ``out``
     fused : whether the machine has fused multiply-add (used only inside sine and cosine)
-    large, part : see `lowering.lower`
+    large, part, rolled : see `lowering.lower`
     """
 
     def __init__(
@@ -37,8 +38,9 @@ class Module:
         fused: bool = False,
         large: int = MAX_OPERATIONS,
         part: int = PART_OPERATIONS,
+        rolled: int = MIN_OPERATIONS,
     ) -> None:
-        self.bodies, self.fused = lower(programs, layout, Straight, large, part), fused
+        self.bodies, self.fused = lower(programs, layout, Straight, large, part, rolled), fused
         self.lines = sum(len(body.lines) for body in self.bodies)
 
     def text(self) -> str:
@@ -64,5 +66,6 @@ class Module:
         own = {body.symbol for body in portion}
         called = {symbol for body in portion for symbol in body.called}
         texts = [body.text() for body in portion]
-        elsewhere = [f"declare void @{symbol}(ptr, ptr, ptr, ptr)" for symbol in sorted(called - own)]
+        given = {body.symbol: ", ".join("ptr" for _ in body.arguments) for body in self.bodies}
+        elsewhere = [f"declare void @{symbol}({given[symbol]})" for symbol in sorted(called - own)]
         return "\n".join([*texts, *helpers(portion, self.fused), *elsewhere])

@@ -61,8 +61,8 @@ LEVEL = 2
 MAX_QUICK_LINES = 4500
 """Lines of IR above which level 2 takes over 0.1 s, so that it is made in the background: some 2000 operations."""
 
-CUTS = {0: {"large": 150, "part": 120}}
-"""Cuts of functions into parts that differ from those of `ir`, by level."""
+CUTS = {0: {"large": 150, "part": 120, "rolled": 3000}}
+"""Cuts of functions into parts that differ from those of `ir`, by level; what is called rarely may run slower."""
 
 PASSES = {"from level": 3, "speed_level": 3, "slp_vectorization": True}
 """Passes over the IR, and from which level on; part of the key of every object file."""

@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
+from mbd.compile.elements import MIN_OPERATIONS, MIN_REPEATED, Angle, Element, Step, elements, stretches
 from mbd.compile.layout import Layout
 from mbd.errors import ModelError
 from mbd.tape.derivatives import live
@@ -36,10 +37,9 @@ SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 UNARY = {"neg": "-", "sqrt": "sqrt", "abs": "abs"}
 ARRAYS = ("block", "parameters", "out")
 
-Angle = tuple[Node, Node | None, Node | None]
-"""An argument, with the sine and the cosine that are asked of it."""
-Step = tuple[list[Node], Sequence[Angle]]
-"""Operations, and then the sines and cosines of some angles together."""
+
+Store = tuple[Node, int, int]
+"""A value, and the first of some places side by side that it goes to, with their number."""
 
 
 class Target(Protocol):
@@ -51,7 +51,10 @@ class Target(Protocol):
     compare : < <= > != of numbers; join : 'and', 'or' of conditions; select : both are computed, one is taken
     piece : how many of `count` ascending numbers from `first` on are not above x, less one, at least 0
     room, call : an array of the function itself, and another straight function
+    load_at, store_at : at the place in a line of a table; table : one of whole numbers, for calls from a line on
     """
+
+    symbol: str
 
     def number(self, value: float) -> str: ...
     def load(self, array: str, place: int) -> str: ...
@@ -71,6 +74,10 @@ class Target(Protocol):
     def sines_and_cosines(self, angles: Sequence[str]) -> tuple[list[str], list[str]]: ...
     def room(self, name: str, size: int) -> None: ...
     def call(self, symbol: str, arrays: Sequence[str]) -> None: ...
+    def load_at(self, array: str, entry: int) -> str: ...
+    def store_at(self, value: str, array: str, entry: int) -> None: ...
+    def table(self, numbers: Sequence[int]) -> None: ...
+    def call_at(self, symbol: str, arrays: Sequence[str], entry: int) -> None: ...
 
 
 T = TypeVar("T", bound=Target)
@@ -82,6 +89,7 @@ def lower(
     target: Callable[[str, Sequence[str], bool], T],
     large: int = MAX_OPERATIONS,
     part: int = PART_OPERATIONS,
+    rolled: int = MIN_OPERATIONS,
 ) -> list[T]:
     """One function ``mbd.<name>`` per program, each after its parts.
 
@@ -90,34 +98,91 @@ def lower(
     programs : names and what each function writes to ``out``
     target : makes a function from its name, the names of its arrays, and whether it is a part of another
     large, part : operations above which a function is cut, and those of a part
+    rolled : operations from which on what repeats is written once (see `elements`)
 
     Raises
     ------
     ModelError
         for a name that a target cannot write.
     """
-    found: list[T] = []
+    found, known = list[T](), dict[Any, str]()
     for name, outputs in programs.items():
         if not re.fullmatch(r"[A-Za-z_][\w.]*", name, re.ASCII):
             raise ModelError(f"a compiled function cannot be called {name!r}; use letters, digits, '_' and '.'")
         symbol, whole = f"mbd.{name}", target(f"mbd.{name}", ARRAYS, False)
         steps, places = list(_steps(live(outputs))), _places(outputs)
         _clear_at_once(whole, outputs, places)
-        if sum(len(nodes) for nodes, _ in steps) <= large:
-            _Body(whole, places, layout, {}).steps(steps).rest(outputs)
+        operations, direct = sum(len(nodes) for nodes, _ in steps), _direct(outputs, places)
+        if operations <= large and len(direct) <= large:
+            _Body(whole, places, layout, {}).steps(steps).rest(direct)
         else:
-            parts = list(_parts(steps, part))
-            slots = _slots(parts)
+            # what repeats as elements, all else as parts, and outputs that nothing computes with the last of these
+            kinds = _rolled(steps, places, layout) if operations >= rolled else None
+            parts = [(each, direct[:0]) for each in ([] if kinds else _parts(steps, part))]
+            slots = kinds.slots if kinds else _slots([each for each, _ in parts])
             whole.room("work", len(slots) + 1)
-            for number, steps in enumerate(parts):
-                made = target(f"{symbol}.{number}", (*ARRAYS, "work"), True)
-                body = _Body(made, places, layout, slots).steps(steps)
-                if number == len(parts) - 1:
-                    body.rest(outputs)
-                whole.call(f"{symbol}.{number}", (*ARRAYS, "work"))
-                found.append(made)
+            if kinds:
+                found += kinds.written(whole, target, known)
+            stores = [direct[first : first + part] for first in range(0, len(direct), part)]
+            if parts and stores:
+                parts[-1] = parts[-1][0], stores.pop(0)
+            for number, (each, own) in enumerate([*parts, *(([], own) for own in stores)]):
+                found.append(target(f"{symbol}.{number}", (*ARRAYS, "work"), True))
+                _Body(found[-1], places, layout, slots).steps(each).rest(own)
+                whole.call(found[-1].symbol, (*ARRAYS, "work"))
         found.append(whole)
     return found
+
+
+class _Rolled:
+    """Steps as elements of a few kinds, and what they hand on in ``work``."""
+
+    def __init__(self, parts: list[list[Step]], places: dict[int, list[int]], layout: Layout) -> None:
+        self.slots, self.places, self.layout = _slots(parts), places, layout
+        self.elements = elements(parts, places, self.slots, lambda node: self._at(node)[0])
+        self.kinds = {element.kind: element for element in reversed(self.elements)}
+
+    @property
+    def operations(self) -> int:
+        """Operations of the kinds."""
+        return sum(len(nodes) for element in self.kinds.values() for nodes, _ in element.steps)
+
+    def _at(self, node: Node) -> tuple[str, int]:
+        """Array and place of an input, or of what another element made."""
+        if node.args:
+            return "work", self.slots[node.index]
+        kind, index = node.data
+        return ("parameters", index) if kind == "p" else ("block", self.layout.place(kind, index))
+
+    def _results(self, node: Node) -> Iterator[tuple[str, int]]:
+        """Arrays and places that a result of an element goes to."""
+        yield from (("out", place) for place in self.places.get(node.index, ()))
+        if node.index in self.slots:
+            yield "work", self.slots[node.index]
+
+    def written(self, whole: T, target: Callable[[str, Sequence[str], bool], T], symbols: dict[Any, str]) -> list[T]:
+        """A function of each kind that has none among `symbols`, and calls of these by `whole`."""
+        found, table = list[T](), list[int]()
+        for element in self.elements:
+            if element.kind not in symbols:
+                symbol = symbols[element.kind] = f"{whole.symbol}.kind{len(symbols)}"
+                found.append(target(symbol, (*ARRAYS, "work", "table"), True))
+                _ElementBody(found[-1], self, element)
+            whole.call_at(symbols[element.kind], (*ARRAYS, "work"), len(table))
+            table += [self._at(node)[1] for node in element.outside]
+            table += [place for node in element.kept for _, place in self._results(node)]
+        whole.table(table)
+        for element in self.elements:
+            for node in element.kept:
+                self.places.pop(node.index, None)
+        return found
+
+
+def _rolled(steps: list[Step], places: dict[int, list[int]], layout: Layout) -> _Rolled | None:
+    """Steps as elements where these repeat enough."""
+    parts = stretches(steps)
+    rolled = _Rolled(parts, places, layout)
+    return rolled if parts and MIN_REPEATED * rolled.operations <= sum(len(nodes) for nodes, _ in steps) else None
 
 
 class _Body:
@@ -185,17 +250,15 @@ class _Body:
         if node.index in self.slots:
             self.target.store(self.number(node), "work", self.slots[node.index])
 
-    def rest(self, outputs: Sequence[Node]) -> None:
+    def rest(self, stores: Iterable[Store]) -> _Body:
         """Outputs that are inputs or constants."""
-        for node in outputs:
-            if node.args or node.index not in self.places:
+        for node, first, number in stores:
+            if number >= MIN_ZEROS and node.is_zero:
+                self.target.clear("out", first, number)
                 continue
-            for first, number in _runs(self.places.pop(node.index)):
-                if number >= MIN_ZEROS and node.is_zero:
-                    self.target.clear("out", first, number)
-                    continue
-                for place in range(first, first + number):
-                    self.target.store(self.number(node), "out", place)
+            for place in range(first, first + number):
+                self.target.store(self.number(node), "out", place)
+        return self
 
     def condition(self, node: Node) -> str:
         op, args, target = node.op, node.args, self.target
@@ -257,6 +320,29 @@ class _Body:
                     self.keep(node)
 
 
+class _ElementBody(_Body):
+    """Writes the function of a kind of elements, which finds places in a line of a table."""
+
+    def __init__(self, target: Target, rolled: _Rolled, element: Element) -> None:
+        super().__init__(target, {node.index: [] for node in element.kept}, rolled.layout, {})
+        self.entries = {node.index: (rolled._at(node)[0], k) for k, node in enumerate(element.outside)}
+        first, self.results = len(self.entries), dict[int, list[tuple[str, int]]]()
+        for node in element.kept:
+            arrays = [array for array, _ in rolled._results(node)]
+            self.results[node.index] = [(array, first + k) for k, array in enumerate(arrays)]
+            first += len(arrays)
+        self.steps(element.steps)
+
+    def number(self, node: Node) -> str:
+        if node.index in self.entries and node.index not in self.names:
+            self.names[node.index] = self.target.load_at(*self.entries[node.index])
+        return super().number(node)
+
+    def keep(self, node: Node) -> None:
+        for array, entry in self.results.get(node.index, ()):
+            self.target.store_at(self.number(node), array, entry)
+
+
 def _clear_at_once(target: Target, outputs: Sequence[Node], places: dict[int, list[int]]) -> None:
     """Clear stretches of outputs at the beginning where many runs of zeros are in one, and forget these zeros."""
     zeros = next((own for own in places.values() if outputs[own[0]].is_zero), [])
@@ -292,6 +378,12 @@ def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:
             first, number = place, 0
         number += 1
     yield first, number
+
+
+def _direct(outputs: Sequence[Node], places: Mapping[int, list[int]]) -> list[Store]:
+    """Outputs that are inputs or constants, in the order of their first places."""
+    own = {node.index: node for node in outputs if not node.args and node.index in places}
+    return [(own[index], *run) for index in own for run in _runs(places[index])]
 
 
 def _places(outputs: Sequence[Node]) -> dict[int, list[int]]:

@@ -72,13 +72,14 @@ class Straight:
 
     def __init__(self, symbol: str, arguments: Sequence[str], apart: bool = False) -> None:
         self.symbol, self.arguments, self.apart = symbol.replace(".", "_"), arguments, apart
-        self.lines: list[str] = []
+        self.lines, self.data = list[str](), list[str]()
 
     def text(self) -> str:
         """The function."""
-        given = (f"{'' if name in ('out', 'work') else 'const '}double *restrict {name}" for name in self.arguments)
+        kinds = {"table": "const int *", "out": "double *", "work": "double *"}
+        given = (f"{kinds.get(name, 'const double *')}restrict {name}" for name in self.arguments)
         head = f"{'static ' if self.apart else ''}void {self.symbol}({', '.join(given)})"
-        return "\n".join([head, "{", *self.lines, "}", ""])
+        return "\n".join([*self.data, head, "{", *self.lines, "}", ""])
 
     def let(self, kind: str, expression: str) -> str:
         name = f"v{len(self.lines)}"
@@ -146,6 +147,18 @@ class Straight:
 
     def call(self, symbol: str, arrays: Sequence[str]) -> None:
         self.lines.append(f"    {symbol.replace('.', '_')}({', '.join(arrays)});")
+
+    def load_at(self, array: str, entry: int) -> str:
+        return self.let("double", f"{array}[table[{entry}]]")
+
+    def store_at(self, value: str, array: str, entry: int) -> None:
+        self.lines.append(f"    {array}[table[{entry}]] = {value};")
+
+    def table(self, numbers: Sequence[int]) -> None:
+        self.data.append(f"static const int {self.symbol}_table[] = {{{', '.join(map(str, numbers))}}};")
+
+    def call_at(self, symbol: str, arrays: Sequence[str], entry: int) -> None:
+        self.call(symbol, [*arrays, f"{self.symbol}_table + {entry}"])
 
 
 def _real(value: float) -> str:

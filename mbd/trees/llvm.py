@@ -5,6 +5,7 @@ Both are written by the same verbs. Names of a tree are places on the stack; wha
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from struct import pack
 from typing import ClassVar
@@ -320,7 +321,7 @@ class Body(Writer):
 
     def field(self, table: str, name: str, kind: str) -> str:
         place = self.emit(f"getelementptr inbounds i64, ptr {table}, i64 {self.places[name]}")
-        return self.emit(f"load {LLVM[kind]}, ptr {place}, !invariant.load !0")
+        return self.emit(f"load {LLVM[kind]}, ptr {place}")
 
     def _Element(self, node: tree.Element) -> str:
         return self.load(node, self.place(node))
@@ -428,12 +429,13 @@ class Straight(Writer):
     def __init__(self, symbol: str, arguments: Sequence[str], apart: bool = False) -> None:
         super().__init__()
         self.symbol, self.arguments, self.apart = symbol, arguments, apart
+        self.data = list[str]()
 
     def text(self, linkage: str = "") -> str:
         """The function, for others to see or, as "internal ", not."""
         given = ", ".join(f"ptr noalias %{name}" for name in self.arguments)
         head = f"define {linkage}void @{self.symbol}({given}) nounwind{' noinline' if self.apart else ''} {{"
-        return "\n".join([head, "entry:", *self.lines, "ret void", "}"])
+        return "\n".join([*self.data, head, "entry:", *self.lines, "ret void", "}"])
 
     def emit(self, text: str) -> str:
         name = f"%{self.count}"  # a number, which LLVM reads faster than a name
@@ -528,3 +530,26 @@ class Straight(Writer):
     def call(self, symbol: str, arrays: Sequence[str]) -> None:
         self.called.append(symbol)
         self.lines.append(f"call void @{symbol}({', '.join(f'ptr %{name}' for name in arrays)})")
+
+    def load_at(self, array: str, entry: int) -> str:
+        return self.emit(
+            f"load double, ptr {self.emit(f'getelementptr double, ptr %{array}, i32 {self._entry(entry)}')}"
+        )
+
+    def store_at(self, value: str, array: str, entry: int) -> None:
+        address = self.emit(f"getelementptr double, ptr %{array}, i32 {self._entry(entry)}")
+        self.lines.append(f"store double {value}, ptr {address}")
+
+    def _entry(self, entry: int) -> str:
+        return self.emit(f"load i32, ptr {self.emit(f'getelementptr i32, ptr %table, i64 {entry}')}")
+
+    def table(self, numbers: Sequence[int]) -> None:
+        data = b"".join(number.to_bytes(4, sys.byteorder) for number in numbers)
+        text = "".join(f"\\{byte:02x}" for byte in data)
+        self.data.append(f'@{self.symbol}.table = internal constant [{len(data)} x i8] c"{text}", align 4')
+
+    def call_at(self, symbol: str, arrays: Sequence[str], entry: int) -> None:
+        self.called.append(symbol)
+        given = ", ".join(f"ptr %{name}" for name in arrays)
+        place = f"ptr getelementptr (i32, ptr @{self.symbol}.table, i64 {entry})"
+        self.lines.append(f"call void @{symbol}({given}, {place})")
