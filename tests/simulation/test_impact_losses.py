@@ -76,3 +76,37 @@ def test_no_stored_force_pulls_where_multipliers_of_index_3_ring():
     run = scene.run()
     assert any(event.impulse.any() for event in run.events)
     assert np.min(run["corner 0.force"]) >= 0.0
+
+
+@cache
+def strut(space):
+    """A bar hangs from a pin and comes down on a foot, on its way to the vertical, at an angle of arccos 0.9."""
+    model = mbd.Model("strut")
+    bar = mbd.RigidBody("bar", 2.0, (0.2, 0.25, 0.3) if space else 0.3)
+    pin = mbd.Revolute("pin", model.ground.point(0.1, 0.9), bar.point(0.0, 0.4), axis=(0.6, 0.0, 0.8) if space else "z")
+    model.connect(pin)
+    floor = mbd.Plane(normal=(0.0, 1.0, 0.0)) if space else None
+    foot = mbd.touchdown(bar.point(0.0, -0.6), floor)
+    model.constrain(mbd.Unilateral("foot", foot, restitution=0.5, friction=1.0))
+    return model
+
+
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+@pytest.mark.parametrize("law", ["newton", "poisson", "sequential"])
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+def test_a_strut_that_friction_jams_stops_with_finite_impulses_and_forces_in_the_cone(space, law, contact):
+    rng = np.random.default_rng(5)
+    for scheme in (mbd.HHT(0.05), mbd.GeneralizedAlpha(0.7, formulation="index3")):
+        values, rate = {"foot.mu": np.tan(np.arccos(0.9)) * rng.uniform(1.02, 3.0)}, rng.uniform(0.5, 4.0)
+        start = mbd.assemble(strut(space), position={"pin.angle": 0.5}, velocity={"pin.rate": -rate}, parameters=values)
+        how = {"dt": 4e-3, "until": rng.uniform(0.13, 0.17), "contact": contact, "impact": law}
+        run = mbd.simulate(strut(space), start, scheme, parameters=values, **how)
+        lost, row = run.energy.kinetic[run.events[0].row - 1], run.events[0].row
+        assert sum(event.energy_loss for event in run.events) == pytest.approx(lost, rel=1e-9)
+        # by the moment of momentum about the pin, of what pushes alone
+        assert 0.0 < run.events[0].impulse[0] < 2.0 * np.sqrt(2.0 * lost / 0.62) * 0.62 / np.sqrt(0.19)
+        assert np.all(run.energy.kinetic[row:] < 1e-24)
+        parts = ["friction.forward", "friction.sideways"] if space else ["friction"]
+        pull = np.linalg.norm([run[f"foot.{part}"] for part in parts], axis=0)
+        assert np.all(pull <= values["foot.mu"] * run["foot.force"] * (1.0 + 1e-9))
+        assert run["foot.force"][-1] > 1.0

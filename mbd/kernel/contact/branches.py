@@ -39,7 +39,11 @@ def solve_directed(K: Balance, level: int) -> int:
             if change < 1e-13:
                 break
     if K.n_dropped > 0 and K.n_cones > 0:
+        for k in range(K.n_rows):  # of a non-smooth step with those of its smooth part
+            K.impulse[k] += K.past[k]
         keep_in_cones(K, K.impulse)
+        for k in range(K.n_rows):
+            K.impulse[k] -= K.past[k]
         evaluate_loaded(K, whole(K, level))
         find_limits(K, level)
     for f in range(K.n_frictions):

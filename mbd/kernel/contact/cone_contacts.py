@@ -13,22 +13,20 @@ from __future__ import annotations
 
 from mbd.equal import REST_SPEED
 from mbd.kernel.algebra.linear import factor, solve
-from mbd.kernel.algebra.redundancy import find_dependence, shared, sharing
+from mbd.kernel.algebra.redundancy import shared, sharing
 from mbd.kernel.algebra.saddle import solve_at
 from mbd.kernel.contact.cone_problem import CONE_RTOL, EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
 from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, ContactForces, Frictions
 from mbd.kernel.stepping.restart import (
     active_rows,
-    evaluate,
     evaluate_loaded,
     limit_of,
     load_accelerations,
-    stepping_rows,
 )
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["all_hold", "keep_branches", "solve_cones"]
+__all__ = ["keep_branches", "solve_cones"]
 
 
 def solve_cones(K: Balance, level: int, allowed: float) -> int:
@@ -344,36 +342,3 @@ def take_friction(K: ContactForces, u: int, f: int, small: float, o_w: int, coun
             u = K.cone_twin[u]
     if slides:
         aim(K, f)
-
-
-def all_hold(K: Balance, t1: float) -> bool:
-    """Whether forces within all cones hold everything that sticks and is closed at the candidate.
-
-    Where rows depend on each other, multipliers of least norm may lie outside of a cone, or pull, while others do not:
-    those are put into K.lam1 then.
-    """
-    for c in range(K.n_contacts):
-        K.active[c] = 1 if (K.closed[c] == 1 and K.kind[c] == 0) else 0
-        K.free[c] = 1 if (K.active[c] == 1 and K.opens[c] == 0) else 0
-    for f in range(K.n_frictions):
-        K.loose[f] = K.sticks[f]
-    count = K.n_dropped
-    K.cone_dropped[: K.n_rows] = K.dropped[: K.n_rows]
-    evaluate(K, t1, K.q1, K.y1)
-    holds = solve_cones(K, 0, CONE_RTOL) == 1
-    K.n_dropped = count
-    K.dropped[: K.n_rows] = K.cone_dropped[: K.n_rows]
-    for c in range(K.n_contacts):
-        holds = holds and (K.kind[c] != 0 or K.active[c] == K.closed[c])
-        K.active[c] = 0
-    for f in range(K.n_frictions):
-        holds = holds and (K.loose[f] == 0 or K.sticks[f] == 1)
-    for f in range(K.n_frictions):
-        if K.loose[f] == 1:
-            K.sticks[f] = 1
-            K.slip[f] = 0.0
-        K.loose[f] = 0
-    find_dependence(K, stepping_rows(K))
-    if holds:
-        K.lam1[: K.n_rows] = K.impulse[: K.n_rows]
-    return holds

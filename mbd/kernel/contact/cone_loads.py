@@ -35,7 +35,7 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
     K.lam_at_limit has those at the largest load that sticks, or λ itself where it is in all cones.
     """
     K.lam_at_limit[: K.n_rows] = lam[: K.n_rows]
-    if K.n_dropped == 0 or K.strategy == 1 or not exceeds(K, lam):
+    if K.n_dropped == 0 or not exceeds(K, lam):
         return
     spans = find_freedoms(K, sharing(K))
     if spans == 0:
@@ -54,7 +54,15 @@ def keep_in_cones(K: Balance, lam: Reals) -> None:
 
 
 def exceeds(K: Frictions, lam: Reals) -> bool:
-    """Whether a friction that sticks is beyond its limit."""
+    """Whether a contact that opens on pull pulls, or a friction that sticks is beyond its limit."""
+    push = 0.0
+    pull = 0.0
+    for c in range(K.n_contacts):
+        if K.kind[c] == 0 and K.opens[c] == 0:
+            push = max(push, -lam[K.normal[c]])
+            pull = max(pull, lam[K.normal[c]])
+    if pull > ROUND_OFF_RTOL * push:
+        return True
     for f in range(K.n_frictions):
         if K.sticks[f] == 1 and friction_size(K, f, lam) > (1.0 - ROUND_OFF_RTOL) * K.limit[f]:
             return True

@@ -23,6 +23,7 @@ from __future__ import annotations
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
+from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
 
 __all__ = ["CONE_RTOL", "EQUAL", "PUSH", "STEADY", "cone_places", "cone_solve"]
@@ -30,7 +31,9 @@ __all__ = ["CONE_RTOL", "EQUAL", "PUSH", "STEADY", "cone_places", "cone_solve"]
 PUSH, EQUAL, STEADY = -1, -2, -3
 """In `owner`: a contact that pushes, one that is held, and friction whose limit no unknown changes."""
 CONE_RTOL = 1e-10
-"""Largest ‖F‖ that counts as solved, of the largest impulse."""
+"""Largest ‖F‖ that counts as solved, of the impulses that each contact would have without others."""
+CONE_ULPS = 64.0
+"""Round-off of ‖F‖, in units of the last place of the largest impulse [-]."""
 CONE_FLOOR = 1e-15
 """‖F‖ of the largest impulse below which there is nothing to gain."""
 CONE_COMPLIANCE = 1e-7
@@ -48,7 +51,7 @@ def cone_solve(
     G: Reals, n: int, shift: Reals, z: Reals, owner: Integers, twin: Integers, limit: Reals, slope: Reals, work: Reals,
     pivots: Integers,
 ) -> int:  # fmt: skip
-    """Solve for z from where it is: 0, or 1 where ‖F‖, of the largest impulse, stays above `CONE_RTOL`.
+    """Solve for z from where it is: 0, or 1 where ‖F‖ over `cone_size` stays above `CONE_RTOL`.
 
     Parameters
     ----------
@@ -115,10 +118,14 @@ def cone_iterate(
 
 
 def cone_size(n: int, z: Reals, size: float) -> float:
-    """The largest impulse, or what would be."""
+    """What ‖F‖ is compared with: impulses that would be without others, beside the round-off of those that there are.
+
+    Where nothing solves the problem, as where friction jams what is to rebound, z grows without end and F does not.
+    """
+    largest = 0.0
     for u in range(n):
-        size = max(size, abs(z[u]))
-    return size + 1e-300
+        largest = max(largest, abs(z[u]))
+    return size + CONE_ULPS * EPS / CONE_RTOL * largest + 1e-300
 
 
 def cone_metric(G: Reals, n: int, shift: Reals, twin: Integers, work: Reals) -> float:

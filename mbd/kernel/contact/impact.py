@@ -193,11 +193,14 @@ def give_back_work(K: Switching, work: float) -> int:
 
     The work grows with the square of the factor while no branch changes; where one does, the factor is bisected. Less
     than the work is given back where friction would add to it, because it follows the direction at the end of a phase.
+    Where friction jams, no factor gives any back: the impulses are Poisson's then.
     """
     status = give_back(K, 1.0)
     if status != 0:
         return status
     done = work_given_back(K)
+    if abs(done) <= ROUND_OFF_RTOL * work:
+        return 0
     factor = sqrt(work / done) if done > 0.0 else 0.0
     status = give_back(K, factor)
     if status != 0 or (abs(work_given_back(K) - work) <= 1e-12 * work and energy_gain(K) <= 1e-13):

@@ -20,7 +20,7 @@ from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import follows
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
-from mbd.kernel.contact.nonsmooth_cones import hold_together, pulls, release, turned_in_plane
+from mbd.kernel.contact.nonsmooth_cones import pulls, release, turned_in_plane
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, is_watched, watch
 from mbd.kernel.events.switching import close_by_impact, mark_touching
 from mbd.kernel.records import Balance, ContactForces, ContactRows, Guards, Reals, Switching
@@ -43,8 +43,6 @@ def must_release(K: Switching, t1: float) -> int:
     What has let go for a step does not hold again in it, even where frictions that depend on each other share a load.
     """
     count = 0
-    if K.n_cones > 0 and hold_together(K, t1):
-        return 0
     doubtful = any_pulls(K, K.lam1, PULL)  # multipliers of a step may oscillate: consistent ones decide
     known = doubtful and consistent(K, t1, K.q1, K.y1) == 0
     for c in range(K.n_contacts):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from mbd.equal import NOMINAL_RTOL, REST_SPEED
 from mbd.kernel.codes import PULL
-from mbd.kernel.contact.cone_contacts import all_hold
 from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABILITY_SHARE, estimated_turn_rate
 from mbd.kernel.contact.cones import (
     HOLD_DIRECTION,
@@ -22,10 +21,10 @@ from mbd.kernel.contact.cones import (
     set_hold,
     speed_of,
 )
-from mbd.kernel.records import Balance, ContactRows, Frictions, Guards, Reals, Switching
-from mbd.kernel.stepping.restart import evaluate, evaluate_loaded, largest_force, limit_of
+from mbd.kernel.records import ContactRows, Frictions, Guards, Reals, Switching
+from mbd.kernel.stepping.restart import largest_force
 
-__all__ = ["hold_all", "hold_for_step", "hold_together", "keep_within", "pulls", "release", "turned_in_plane"]
+__all__ = ["hold_all", "hold_for_step", "pulls", "release", "turned_in_plane"]
 
 
 def hold_for_step(K: Switching, h: float) -> None:
@@ -73,39 +72,6 @@ def release(K: Switching, f: int) -> int:
         return 0
     aim_as_pulled(K, f, K.lam1)
     return 1
-
-
-def hold_together(K: Switching, t1: float) -> bool:
-    """Whether contacts that depend on each other hold although multipliers of least norm pull or leave a cone."""
-    if K.n_dropped == 0:
-        return False
-    K.limit[: K.n_frictions] = K.guards1[K.at_limit : K.at_limit + K.n_frictions]
-    return not is_within(K, K.lam1) and all_hold(K, t1)
-
-
-def keep_within(K: Balance) -> None:
-    """After a restart: where multipliers of least norm pull or leave a cone, those by which it was decided stay.
-
-    They are still in K.impulse.
-    """
-    if K.n_dropped == 0:
-        return
-    evaluate(K, K.time, K.q, K.y)
-    evaluate_loaded(K, K.lam)
-    for f in range(K.n_frictions):
-        K.limit[f] = limit_of(K, f)
-    if not is_within(K, K.lam):
-        K.lam[: K.n_rows] = K.impulse[: K.n_rows]
-
-
-def is_within(K: ContactRows, lam: Reals) -> bool:
-    """Whether no contact that opens on pull pulls, and no friction sticks beyond its limit, by these multipliers."""
-    within = True
-    for c in range(K.n_contacts):
-        within = within and not pulls(K, c, lam, PULL)
-    for f in range(K.n_frictions):
-        within = within and not (K.sticks[f] == 1 and is_beyond(K, f, lam, K.limit[f]))
-    return within
 
 
 def pulls(K: ContactRows, c: int, lam: Reals, part: float) -> bool:

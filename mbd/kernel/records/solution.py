@@ -58,7 +58,6 @@ class Complementarity(SchemeAbilities):
     cone_twin: Integers = integers(lambda s: s.n_unknowns)
     cone_normal: Integers = integers(lambda s: s.n_contacts)  # its number among the unknowns, −1 for none
     cone_flags: Integers = integers(lambda s: 2 * s.n_contacts + s.n_frictions)  # branches before such a problem
-    cone_dropped: Integers = integers(lambda s: s.n_unknowns)  # dependent rows before it
     turn: Integers = integers(lambda s: s.n_contacts)  # in which each is tested for Painlevé's paradox, −1 for none
     cone_slips: Reals = reals(lambda s: s.n_frictions)
     lam_at_limit: Reals = reals(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from mbd.kernel.algebra.redundancy import find_dependent, sharing, spread
+from mbd.kernel.algebra.redundancy import find_dependent, sharing
 from mbd.kernel.codes import NEW_MODE
 from mbd.kernel.contact.cones import let_directions_go
 from mbd.kernel.contact.contact_modes import resolve_contact_modes
-from mbd.kernel.contact.nonsmooth_cones import keep_within
 from mbd.kernel.events.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
 from mbd.kernel.records import Balance, DependentRows, Kernel
@@ -52,12 +51,9 @@ def restart(K: Kernel) -> int:
     K.n_restarts += 1
     find_dependent(K, active_rows(K, K.closed))
     if K.n_dropped > 0 and not sharing(K):
-        if K.n_cones > 0 and K.strategy == 1:
-            spread(K, K.lam)
-            keep_within(K)
-        else:  # limits follow the pushes, which are others than those that the modes were found with
-            fill_block(K, K.time, K.q, K.y)
-            minimum_norm_multipliers(K, K.lam)
+        # limits follow the pushes, which are others than those that the modes were found with
+        fill_block(K, K.time, K.q, K.y)
+        minimum_norm_multipliers(K, K.lam)
     K.n_active = stepping_rows(K)
     if is_ill_conditioned(K):
         status = correct_start(K)
