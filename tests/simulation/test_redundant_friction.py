@@ -210,3 +210,30 @@ def test_the_linear_motion_of_a_sliding_sled_is_that_of_its_run():
         for side in (-1.0, 1.0)
     ]  # fmt: skip
     assert linear.A[1, 0] == pytest.approx((moved[1] - moved[0]) / (2.0 * step), rel=1e-6)
+
+
+@cache
+def truss(rise):
+    """A triangle of three bars so flat that its top is this angle [rad] above its chord; all its pins are dry."""
+    model = mbd.Model("truss")
+    chord, *bars = (mbd.RigidBody(name, mass=0.8, inertia=0.05) for name in ("chord", "left bar", "right bar"))
+    model.connect(
+        mbd.Revolute("pivot", model.ground.origin, chord.point(0.1, 0.05), loss=mbd.PinFriction(0.3, 0.02)),
+        mbd.Revolute("left", chord.point(-0.5, 0.0), bars[0].point(-0.25, 0.0), loss=mbd.Coulomb(0.2)),
+        mbd.Revolute("top", bars[0].point(0.25, 0.0), bars[1].point(-0.25, 0.0), loss=mbd.Coulomb(0.5)),
+        mbd.Revolute(
+            "right", chord.point(np.cos(rise) - 0.5, 0.0), bars[1].point(0.25, 0.0), loss=mbd.PinFriction(0.2, 0.02)
+        ),
+    )
+    return model
+
+
+@pytest.mark.parametrize("scheme", [*SCHEMES, mbd.RadauIIA()], ids=repr)
+def test_flat_trusses_swing_with_forces_that_balance_though_their_own_pins_stick(scheme):
+    """Shares follow the limits of pins, these the shares: nearly 1 of each other where bars carry by their angle."""
+    for rise, tilt in ((0.015, 0.4), (0.02, -0.7), (0.03, 1.1)):
+        start = mbd.assemble(truss(rise), position={"pivot.angle": tilt, "left.angle": rise, "top.angle": -2.0 * rise})
+        how = {"dt": 2e-3, "until": 0.05}
+        run, exact = (mbd.simulate(truss(rise), start, each, **how) for each in (scheme, mbd.RungeKutta853()))
+        assert run["pivot.angle"][-1] == pytest.approx(exact["pivot.angle"][-1], abs=1e-6)
+        assert np.max(imbalance(run)[1:]) < 1e-5

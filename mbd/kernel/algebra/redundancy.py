@@ -259,10 +259,14 @@ def share(K: ContactRows, row: int, largest: float) -> float:
     return float(max(K.limit[f] / largest, MIN_LIMIT_SHARE))
 
 
-def clear_dependent(K: Singular, lam: Reals) -> None:
-    """The multipliers of rows that were left out of a solve are none: those of the others carry the whole load."""
+def clear_dependent(K: DependentRows, lam: Reals) -> None:
+    """The multipliers of rows that were left out of a solve are none: those of the others carry the whole load.
+
+    Where loads are shared, they have been part of it.
+    """
+    together = sharing(K)
     for d in range(K.n_rows):
-        if K.dropped[d] == 1:
+        if K.dropped[d] == 1 and not together:
             lam[d] = 0.0
 
 

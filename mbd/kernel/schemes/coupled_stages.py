@@ -12,8 +12,9 @@ is solved as it stands, with three times as many unknowns.
 from __future__ import annotations
 
 from mbd.kernel.algebra.linear import factor, solve
+from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, SINGULAR
-from mbd.kernel.records import Kernel, Steps
+from mbd.kernel.records import Kernel, SingularSteps, Steps
 from mbd.kernel.schemes.iteration import MAX_RATE_ERROR, MIN_RATE_SHARE, note_fastest
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import A2_, A_, BALANCES, CHANGES, E_, MU_REAL, STAGE_RATES, stage_place
@@ -23,6 +24,7 @@ from mbd.kernel.schemes.stages import (
     correct_positions_where_off,
     evaluate_stages,
     hold_block,
+    keep_shared_loads,
     load_stage,
     predict_stages,
     retreat_stages,
@@ -75,6 +77,8 @@ def coupled_step(K: Kernel, h: float, t1: float, m: int) -> int:
         if factor(K.coupled, 3 * (K.n + m), K.coupled_pivots) != 0:
             return SINGULAR
         K.n_factorizations += 1
+        if sharing(K):
+            keep_shared_loads(K, h, t1)
         correct_coupled_rates(K, m, h)
     return NOT_CONVERGED
 
@@ -99,7 +103,7 @@ def is_another_solution(K: Steps, h: float) -> bool:
     return False
 
 
-def correct_coupled_rates(K: Steps, m: int, h: float) -> float:
+def correct_coupled_rates(K: SingularSteps, m: int, h: float) -> float:
     """The correction of rates and multipliers with the factors at hand; its size relative to the largest rate."""
     size = K.n + m
     o_r = stage_place(K, BALANCES)

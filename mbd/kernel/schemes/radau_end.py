@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.ordered import solve_kkt
-from mbd.kernel.algebra.redundancy import clear_dependent
+from mbd.kernel.algebra.redundancy import clear_dependent, sharing
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import NOT_CONVERGED, SINGULAR
 from mbd.kernel.records import Balance, Kernel, Steps
@@ -116,10 +116,11 @@ def end_rates(K: Balance, t1: float, m: int) -> bool:
     Rows that were stepped with are independent, so that plain factors do for `consistent`, except where R follows
     multipliers. Frictions that feel rows left out, whose multipliers are known later, keep those of the stage.
     """
-    if K.n_dropped > 0 and (K.n_frictions > 0 or K.loads_act == 1):
+    together = sharing(K)
+    if K.n_dropped > 0 and K.n_frictions > 0 and not together:
         evaluate(K, t1, K.q1, K.y1)
         return False
-    if K.loaded > 0:
+    if K.loaded > 0 or together:
         return bool(consistent(K, t1, K.q1, K.y1) == 0)
     n = K.n
     evaluate(K, t1, K.q1, K.y1)

@@ -32,7 +32,13 @@ from mbd.kernel.schemes.stage_layout import (
     stage_place,
 )
 from mbd.kernel.schemes.stage_matrices import factor_stages, matrices
-from mbd.kernel.schemes.stages import correct_positions_where_off, correct_rates, correct_stages, load_stage
+from mbd.kernel.schemes.stages import (
+    correct_positions_where_off,
+    correct_rates,
+    correct_stages,
+    keep_shared_loads,
+    load_stage,
+)
 
 __all__ = ["correct_by_own_masses"]
 
@@ -42,6 +48,8 @@ def correct_by_own_masses(K: Kernel, m: int, h: float, t1: float, renew: bool, s
 
     Where rows act only if the iteration is `slow`.
     """
+    if sharing(K):
+        keep_shared_loads(K, h, t1)
     if K.vector == 0 and m == 0:
         exchange_masses(K, h, t1)
     elif K.vector == 0 and slow and not sharing(K):

@@ -46,7 +46,7 @@ from mbd.kernel.stepping.restart import share_loads
 
 __all__ = [
     "apply_changes", "correct_positions_where_off", "correct_rates", "correct_stages", "evaluate_stages", "hold_block",
-    "load_stage", "predict_stages", "retreat_stages",
+    "keep_shared_loads", "load_stage", "predict_stages", "retreat_stages",
 ]  # fmt: skip
 
 
@@ -105,7 +105,7 @@ def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:
     K.block[0] = t1 if i == 2 else K.time + S[C_ + i] * h
     K.block[K.o_lam : K.o_lam + K.n_rows] = S[o_L : o_L + K.n_rows]
     if sharing(K):
-        share_loads(K, K.n_active)
+        share_loads(K, K.n_active, False)
 
 
 def load_state(K: Steps, i: int, h: float) -> None:
@@ -235,7 +235,7 @@ def correct_positions_of_stages(K: Steps, m: int, h: float, whole: bool) -> None
             S[o_r + i * size + k] += pulled / (c * c)
 
 
-def correct_stages(K: Steps, m: int, h: float, whole: bool) -> float:
+def correct_stages(K: SingularSteps, m: int, h: float, whole: bool) -> float:
     """One simplified Newton correction of all stages; its size relative to the largest rate."""
     correct_positions_where_off(K, m, h, whole)
     return correct_rates(K, m, h)
@@ -247,7 +247,7 @@ def correct_positions_where_off(K: Steps, m: int, h: float, whole: bool) -> None
         correct_positions_of_stages(K, m, h, whole)
 
 
-def correct_rates(K: Steps, m: int, h: float) -> float:
+def correct_rates(K: SingularSteps, m: int, h: float) -> float:
     """The correction of rates and multipliers by the residuals in K.stages; its size relative to the largest rate."""
     size = K.n + m
     S = K.stages
@@ -262,7 +262,7 @@ def correct_rates(K: Steps, m: int, h: float) -> float:
     return apply_changes(K, m)
 
 
-def apply_changes(K: Steps, m: int) -> float:
+def apply_changes(K: SingularSteps, m: int) -> float:
     """The correction in K.stages to rates and multipliers; its size relative to the largest rate."""
     n = K.n
     size = n + m
@@ -281,11 +281,11 @@ def apply_changes(K: Steps, m: int) -> float:
                 fastest = max(fastest, abs(S[o_W + i * n + j]))
                 S[o_W + i * n + j] += change
             else:
-                S[o_L + i * K.n_rows + K.rows[j - n]] += change
+                change_multiplier(K, o_L + i * K.n_rows, K.rows[j - n], change)
     return biggest / fastest
 
 
-def retreat_stages(K: Steps, m: int, part: float) -> None:
+def retreat_stages(K: SingularSteps, m: int, part: float) -> None:
     """Take back a part of the last correction of rates and multipliers; all, 1, and then −1 does it again."""
     n = K.n
     size = n + m
@@ -301,4 +301,21 @@ def retreat_stages(K: Steps, m: int, part: float) -> None:
             if j < n:
                 S[o_W + i * n + j] -= change
             else:
-                S[o_L + i * K.n_rows + K.rows[j - n]] -= change
+                change_multiplier(K, o_L + i * K.n_rows, K.rows[j - n], -change)
+
+
+def keep_shared_loads(K: Kernel, h: float, t1: float) -> None:
+    """Multipliers of dependent rows at all stages as loads are shared now: those which a correction changes."""
+    for i in range(3):
+        load_stage(K, i, h, t1)
+        o_L = stage_place(K, STAGE_LAM) + i * K.n_rows
+        K.stages[o_L : o_L + K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
+
+
+def change_multiplier(K: SingularSteps, o: int, row: int, change: float) -> None:
+    """Add to the multiplier of a row in K.stages from o on, and to those of dependent rows what they share of it."""
+    K.stages[o + row] += change
+    if sharing(K):
+        for d in range(K.n_rows):
+            if K.dropped[d] == 1:
+                K.stages[o + d] += K.shares[d * K.n_rows + row] * change

@@ -355,24 +355,29 @@ def minimum_norm_multipliers(K: Balance, lam: Reals) -> None:
         if turn == 0:
             find_dependence(K, stepping_rows(K))
         find_limits_of_loads(K)
-        if sharing(K):
-            find_shares(K)
-            take_shares(K, lam)
-        else:
-            spread(K, lam)
+        if sharing(K):  # they have been part of the equations
+            break
+        spread(K, lam)
         if K.n_frictions == 0 or (turn > 0 and change < 1e-13):
             break
     if K.n_cones > 0:
         keep_in_cones(K, lam)
 
 
-def share_loads(K: Balance, m: int) -> None:
-    """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate."""
+def share_loads(K: Balance, m: int, corrected: bool) -> None:
+    """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate.
+
+    Limits that shares follow are those of all multipliers: where those of the m rows in K.rows have been corrected, so
+    have the others, with the shares that this was found with.
+    """
+    K.loads[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
+    if corrected:
+        take_shares(K, K.loads)
+        K.block[K.o_lam : K.o_lam + K.n_rows] = K.loads[: K.n_rows]
     call(K, ACCELERATIONS, K.acc)
     find_dependence(K, m)
     find_limits_of_loads(K)
     find_shares(K)
-    K.loads[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
     take_shares(K, K.loads)
     K.block[K.o_lam : K.o_lam + K.n_rows] = K.loads[: K.n_rows]
 
