@@ -13,8 +13,9 @@ from mbd.laboratory.plates_by_column import plates_by_column
 from mbd.laboratory.recording import Recording
 from mbd.laboratory.text import Lines, numbers_of, read_lines, times_of, with_tabs
 from mbd.laboratory.units import split_unit
+from mbd.results.opensim import write_storage
 
-__all__ = ["read_storage", "write_storage_text"]
+__all__ = ["read_storage", "save_storage"]
 
 NO_ANGLE = re.compile(
     r"(_t[xyz]|_[vp][xyz]|\.[xyz]|\.[wxyz]|\.displacement|\.length|\.gap|force.*|moment.*|torque.*|.*activation"
@@ -129,8 +130,8 @@ def _of_vectors(
     return Recording(time, markers, name=source.path.stem, notes=(note,))
 
 
-def write_storage_text(recording: Recording, target: Path) -> str:
-    """The text of a storage file: channels in radians ('.sto') or degrees ('.mot'), plates at the frames."""
+def save_storage(recording: Recording, target: Path) -> Path:
+    """Write a storage file: channels in radians ('.sto') or degrees ('.mot'), plates at the frames."""
     columns: dict[str, Vector] = dict(recording.channels)
     degrees = target.suffix == ".mot"
     if degrees:
@@ -146,18 +147,7 @@ def write_storage_text(recording: Recording, target: Path) -> str:
             columns[f"{stem}_torque_{axis}"] = _at(recording.time, plate.time, own)
     if not columns:
         raise TrajectoryError(f"{target.name}: the recording has no channels and no plates; write markers as .trc")
-    labels = ["_".join(name.split()) for name in columns]
-    twice = sorted({label for label in labels if labels.count(label) > 1})
-    if twice:
-        raise TrajectoryError(f"two columns of {target.name} would be {twice[0]!r}")
-    header = [
-        " ".join(recording.name.split()) or "recording", "version=1", f"nRows={len(recording.time)}",
-        f"nColumns={1 + len(columns)}", f"inDegrees={'yes' if degrees else 'no'}", "endheader",
-        "\t".join(["time", *labels]),
-    ]  # fmt: skip
-    table = np.column_stack([recording.time, *columns.values()])
-    lines = ["\t".join("nan" if np.isnan(x) else repr(float(x)) for x in row) for row in table]
-    return "\n".join([*header, *lines]) + "\n"
+    return write_storage(target, recording.name or "recording", recording.time, columns, degrees)
 
 
 def _at(time: Vector, own: Vector, values: Vector) -> Vector:

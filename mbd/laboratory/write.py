@@ -11,15 +11,14 @@ from mbd.errors import TrajectoryError
 from mbd.laboratory.comma_separated import write_csv
 from mbd.laboratory.motion_capture import write_c3d
 from mbd.laboratory.recording import Recording
-from mbd.laboratory.storage import write_storage_text
+from mbd.laboratory.storage import save_storage
 from mbd.laboratory.trc import write_trc
 from mbd.results.archive import named_file, write_whole
+from mbd.results.opensim import KINDS
 
 __all__ = ["write"]
 
-TEXTS: dict[str, Callable[[Recording, Path], str]] = {
-    ".trc": write_trc, ".mot": write_storage_text, ".sto": write_storage_text, ".csv": write_csv,
-}  # fmt: skip
+TEXTS: dict[str, Callable[[Recording, Path], str]] = {".trc": write_trc, ".csv": write_csv}
 
 
 def write(recording: Recording, path: str | Path) -> Path:
@@ -35,6 +34,8 @@ def write(recording: Recording, path: str | Path) -> Path:
 
         write_whole(target, fill)
         return target
+    if target.suffix in KINDS:
+        return save_storage(recording, target)
     if target.suffix not in TEXTS:
         raise TrajectoryError(
             f"a recording ends in .trc, .mot, .sto, .csv or .c3d, such as 'walk.trc'; got {str(path)!r}"

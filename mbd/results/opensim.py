@@ -22,7 +22,7 @@ from mbd.results.units import unit
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["storage_file", "write_storage"]
+__all__ = ["KINDS", "storage_file", "write_storage"]
 
 KINDS = (".sto", ".mot")
 """Endings of the files: in radians, and of motions in degrees."""
@@ -66,7 +66,7 @@ def write_storage(
     labels = ["_".join(label.split()) for label in columns]
     twice = sorted({label for label in labels if labels.count(label) > 1})
     if twice:
-        raise TrajectoryError(f"two columns of {target.name} would be {twice[0]!r}; leave one out with names=[…]")
+        raise TrajectoryError(f"two columns of {target.name} would be {twice[0]!r}; leave one out (names=[…] of a run)")
     header = [
         " ".join(name.split()) or "motion", "version=1", f"nRows={len(time)}", f"nColumns={1 + len(columns)}",
         f"inDegrees={'yes' if degrees else 'no'}", *notes, "endheader", "\t".join(["time", *labels]),
