@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mbd import commands
 from mbd.bodies.values import printable
 from mbd.errors import MbdError, MbdWarning, ModelError, SimulationError
 from mbd.progress import progress_bar
@@ -34,7 +35,6 @@ from mbd.scripts import (
     name_of_run,
     name_of_script,
 )
-from mbd.view import lab_arguments
 from mbd.view.parser import Parser, writable
 
 if TYPE_CHECKING:
@@ -240,30 +240,24 @@ def hardcases_command(arguments: argparse.Namespace) -> int:
 
 def accuracy_command(arguments: argparse.Namespace) -> int:
     """``mbd accuracy``: errors and processor times of schemes and steps."""
-    from mbd.analysis.accuracy.command import run
-
     _out(arguments)
-    return run(Script.load(arguments.script), arguments)
+    return commands.accuracy(Script.load(arguments.script), arguments)
 
 
 def effects_command(arguments: argparse.Namespace) -> int:
     """``mbd effects``: what each effect of a scene costs and changes."""
-    from mbd.analysis.effects.command import run
-
     _out(arguments)
-    return run(Script.load(arguments.script), arguments)
+    return commands.effects(Script.load(arguments.script), arguments)
 
 
 def gait_command(arguments: argparse.Namespace) -> int:
     """``mbd gait``: report how the walkers of scripts, stored runs or recordings walk, one beside the other."""
-    from mbd.analysis.gait_report.command import run
-
     names = [_name_of_gait(name) for name in arguments.scripts]
-    out = Path(writable(Path("mbd-runs") / names[0] if arguments.out is None else arguments.out))
+    arguments.out = writable(Path("mbd-runs") / names[0] if arguments.out is None else arguments.out)
     changes = {} if arguments.until is None else {"until": arguments.until}
     with progress_bar() as progress:
         runs = [_walked(name, arguments, progress, changes) for name in arguments.scripts]
-    return run(runs, names, out, arguments)
+    return commands.gait(runs, names, arguments)
 
 
 def _walked(name: str, arguments: argparse.Namespace, progress: Any, changes: dict[str, Any]) -> Any:
@@ -315,10 +309,10 @@ def _parser() -> argparse.ArgumentParser:
 
     parser = Parser(prog="mbd", description="Simulate multibody mechanisms described in Python.")
     parser.add_argument("--version", action="version", version=f"mbd {mbd.__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+    known = parser.add_subparsers(title="commands", metavar="COMMAND")
 
     def command(name: str, function: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
-        made = commands.add_parser(name, help=text, description=text)
+        made = known.add_parser(name, help=text, description=text)
         made.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
         made.set_defaults(function=function)
         return made
@@ -344,13 +338,13 @@ def _parser() -> argparse.ArgumentParser:
     new.add_argument("name", metavar="NAME", help="of the script, such as my-leg")
     check = command("check", check_command, "report faults, degrees of freedom and redundant rows of a script's model")
     check.add_argument("script", metavar="SCRIPT-or-EXAMPLE", help="a Python file that defines model, or an example")
-    lab_arguments.accuracy(
+    commands.accuracy_arguments(
         command("accuracy", accuracy_command, "measure what accuracy costs: errors, times of schemes and steps")
     )
-    lab_arguments.effects(
+    commands.effects_arguments(
         command("effects", effects_command, "leave out each effect in turn: its cost, energy and change")
     )
-    lab_arguments.gait(command("gait", gait_command, "report how walkers walk: numbers by side, curves, energy"))
+    commands.gait_arguments(command("gait", gait_command, "report how walkers walk: numbers by side, curves, energy"))
     hard = command(
         "hardcases", hardcases_command, "judge scenes on which multibody systems fail; write a table and a page"
     )

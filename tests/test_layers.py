@@ -43,7 +43,7 @@ RANKS = [
     ("hardcases",),
     ("testing",),
     ("scripts", "script_changes"),
-    ("cli", "__main__"),
+    ("cli", "commands", "__main__"),
 ]
 """From the lowest layer to the highest; parts of one layer may know each other."""
 
