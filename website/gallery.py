@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from mbd.cli import Script, examples
 from mbd.view.camera import camera
-from mbd.view.first_view import first_view
+from mbd.view.geometry import first_view
 from mbd.view.page import html
 from mbd.view.plots import drawing
-from mbd.view.posture_in_space import draw_in_space
+from mbd.view.posture import draw_in_space
 from mbd.view.scene import Instants, Scene, scene
 
 __all__ = ["Example", "index", "read"]

@@ -25,8 +25,7 @@ from mbd.kernel.contact.contact_modes import resolve_contact_modes
 from mbd.kernel.events.guards import watch
 from mbd.kernel.records import Kernel
 from mbd.kernel.stepping.restart import active_rows
-from mbd.simulation.run.plain import MechanismSystem
-from mbd.simulation.run.shared_loads import shares
+from mbd.simulation.run.plain import MechanismSystem, shares
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 

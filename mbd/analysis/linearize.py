@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from mbd.analysis.finite import not_finite
 from mbd.analysis.independent import independent
-from mbd.analysis.instant import instant
+from mbd.analysis.instant import Instant, instant
 from mbd.analysis.linear_motion import LinearMotion, Prescribed, linear_motion, singular
 from mbd.analysis.linearization import Linearization
 from mbd.analysis.ports import Input, Output, acting, doubt_of_idle, input_names, output_nodes, port_terms
 from mbd.analysis.state_space import StateSpace
-from mbd.analysis.turning_steadily import doubt_of_turning
 from mbd.arrays import Matrix
 from mbd.compile.mechanisms import require_model
 from mbd.equations.equations import Equations
+from mbd.equations.linearization import LinearTerms
+from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError
+from mbd.notes import doubt
 from mbd.state import State
 
 __all__ = ["linearize"]
+
+ADVICE = "; linearize beside it, or make the function smooth there"
+"""What to try."""
+
+DERIVATIVE_RTOL = 1e-5
+"""Change of the derivatives within that, over their size, that counts as one [-]."""
 
 
 def linearize(
@@ -91,7 +99,7 @@ def linearize(
     given = acting(model, equations, [equations.rows[k] for k in found.rows], wanted)
     seen = output_nodes(equations, () if outputs is None else outputs)
     local, freedoms = port_terms(found, given, seen), _freedoms(equations)
-    _require(not_finite(terms, local, [name for name, _ in freedoms], given, seen))
+    _require(_not_finite(terms, local, [name for name, _ in freedoms], given, seen))
     chosen = independent(terms.M[:n_v, :n_v], terms.B, terms.turning, found.velocity, equations.n_z)
     _require(singular(found, terms, chosen))
     prescribed = Prescribed.of(given, local, found.velocity)
@@ -108,7 +116,7 @@ def linearize(
         not (inputs is None and outputs is None), (given, seen),
     )  # fmt: skip
     if linear.is_equilibrium:
-        doubt_of_turning(found, terms)
+        _doubt_of_turning(found, terms)
     return linear
 
 
@@ -164,3 +172,52 @@ def _digits(values: Any) -> int:
     """Decimal places before the point of the largest magnitude."""
     largest = float(np.max(np.abs(values), initial=0.0))
     return int(np.ceil(np.log10(largest))) if largest > 0.0 else 0
+
+
+def _doubt_of_turning(found: Instant, terms: LinearTerms) -> None:
+    """Tell where derivatives change along a motion whose joints with quaternions turn: eigenvalues are not of it."""
+    configuration, state = found.mechanism.equations.configuration, found.state
+    speed = float(np.max(np.abs(state.v), initial=0.0))
+    if configuration.is_vector or speed == 0.0:
+        return
+    names = configuration.velocity_names
+    turning = [k for k, name in enumerate(names) if ".angular_velocity." in name and abs(state.v[k]) > 1e-9 * speed]
+    if not turning:
+        return
+    # how far the motion is followed, as an angle of the fastest turn [rad]
+    step = 1e-3 / float(np.max(np.abs(state.v[turning])))
+    turned = np.where(np.isin(np.arange(len(names)), turning), state.v[: len(names)], 0.0)
+    ahead = replace(found, state=replace(state, q=configuration.compose(state.q, step * turned))).terms()
+    pairs = [(getattr(terms, name), getattr(ahead, name)) for name in ("M", "C", "K", "B")]
+    if all(np.max(np.abs(a - b), initial=0.0) <= DERIVATIVE_RTOL * np.max(np.abs(a), initial=0.0) for a, b in pairs):
+        return
+    fastest = names[max(turning, key=lambda k: abs(state.v[k]))].partition(".")[0]
+    doubt(
+        f"linearize: '{fastest}' turns, and the derivatives change along its motion: A is that of this instant, and "
+        "its eigenvalues do not tell whether the motion is stable; give what spins steadily a Revolute about its axis"
+    )
+
+
+def _not_finite(
+    terms: LinearTerms, ports: PortTerms, states: Sequence[str], inputs: Sequence[Input], outputs: Sequence[Output]
+) -> list[str]:
+    """One sentence for each; `states` are names of places, velocities and first-order states, in this order."""
+    n_v = terms.K.shape[1]
+    by_place = _columns(terms.K, terms.turning, terms.change_place)
+    by_speed = _columns(terms.C) | np.pad(_columns(terms.B, terms.change_speed), (0, len(terms.C) - n_v))
+    by_input = _columns(ports.r, ports.h, ports.rate, ports.change)
+    names = [*states, *(each.name for each in inputs if each.node is not None)]
+    lost = [name for name, bad in zip(names, (*by_place, *by_speed, *by_input), strict=True) if bad]
+    found = [f"forces or rows have no finite derivative by {name!r} at this state{ADVICE}" for name in lost]
+    of_output = (
+        ports.place, ports.speed, ports.state, ports.acceleration, ports.state_rate, ports.multiplier, ports.through,
+        ports.y[:, None],
+    )  # fmt: skip
+    bad_ones = _columns(*(part.T for part in of_output))
+    lost = [each.name for each, bad in zip(outputs, bad_ones, strict=True) if bad]
+    return found + [f"the output {name!r} has no finite value or derivative at this state{ADVICE}" for name in lost]
+
+
+def _columns(*parts: Matrix) -> Matrix:
+    """Which columns have an entry that is not finite."""
+    return np.asarray(np.any([np.any(~np.isfinite(part), axis=0) for part in parts], axis=0))

@@ -4,7 +4,7 @@ Three joints on one tilted axis close a loop in which the third holds no directi
 are zero identically, but the numbers that come out are round-off, and so is their Jacobian: to solve with it would hold
 the mechanism at rest by forces that do not exist. Such rows never act. Whether a row is one depends on the shape of the
 bodies, that is on parameters: it is judged for their values, at positions anywhere, by the parts of its Jacobian
-before they cancel (`mbd.equations.row_sizes`).
+before they cancel (`mbd.equations.derivation`).
 """
 
 from __future__ import annotations

@@ -12,18 +12,18 @@ from mbd.bodies.domains import Domain, positive
 from mbd.bodies.ground import Ground
 from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import Vector3, number, unit_vector
+from mbd.constraints.balls import Ball
 from mbd.constraints.measure import Measure
 from mbd.constraints.round_on_surface import NO_CONTACT_POINT, edge_on
-from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.tape.functions import sqrt
-from mbd.tape.node import Scalar
+from mbd.tape.node import Node, Scalar
 
-__all__ = ["DiskTouchdown", "disk_touchdown", "steepness", "to_edge"]
+__all__ = ["DiskTouchdown", "disk_touchdown", "slip_along", "steepness", "to_edge"]
 
 
 def steepness(center: Frame, axis: Vector3, ground: Plane, scope: Scope) -> Scalar:
@@ -155,3 +155,18 @@ def disk_touchdown(center: Frame, radius: float, axis: Any, ground: Any = None) 
     return DiskTouchdown(
         center, size, unit_vector(axis, "axis of disk_touchdown"), surface_of(ground, "disk_touchdown")
     )
+
+
+def slip_along(ground: Plane | Surface | Ball, center: Frame, arm: Triple, scope: Scope) -> list[tuple[str, Scalar]]:
+    """``t · (v_C + ω × arm − v_P)`` forward and sideways, of the point of the body that is at C + arm now [m/s].
+
+    v_P is the velocity of the ground there. A direction in which nothing can move, sideways in the plane, has no row.
+    """
+    motion = scope.frame(center)
+    slip = total(motion.velocity, cross(motion.angular_velocity, arm))
+    touched = total(motion.position, arm)
+    if ground.is_moving:
+        slip = difference(slip, ground.velocity_at(touched, scope))
+    directions = zip(("forward", "sideways"), ground.directions(touched, scope), strict=True)
+    rows = [(part, dot(ground.turned(direction, scope), slip)) for part, direction in directions]
+    return [(part, row) for part, row in rows if isinstance(row, Node) and not row.is_constant]

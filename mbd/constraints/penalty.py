@@ -16,15 +16,15 @@ from mbd.constraints.law import Closing, Drag, Hold, Law
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.penalty_parameters import largest_dt
 from mbd.constraints.restitution import KELVIN_VOIGT, MIN_RESTITUTION, chi_for, damping_ratio_for, law_of, wanted
-from mbd.constraints.rubbing import rub, slip_velocities
 from mbd.constraints.rules import condition_details, condition_faults, condition_of, contacts_of, mentions_of
 from mbd.constraints.unilateral import measure_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import StateRates
-from mbd.tape.functions import maximum
-from mbd.tape.node import Scalar
+from mbd.tape.derivatives import substitute
+from mbd.tape.functions import maximum, sqrt
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["Penalty"]
 
@@ -165,7 +165,7 @@ class Penalty(Constraint):
         rate = scope.rate(gap)
         push = self.force(gap, rate, scope, *hold(self.captured(rate)))
         contact = Closing(gap, self.measure.unit, self.opens_on, only_while=self.only_while)
-        slips = slip_velocities(self.measure, scope, hold) if self.has_friction else []
+        slips = _slip_velocities(self.measure, scope, hold) if self.has_friction else []
         drags: list[Drag] = []
         rates: StateRates = ()
         open_rates: bool | Sequence[Scalar] = True
@@ -174,7 +174,7 @@ class Penalty(Constraint):
         elif self.has_friction:
             coefficient = scope.parameter(self.name, "mu", self.friction)
             creep = scope.parameter(self.name, "creep", self.creep)
-            drags = rub(slips, coefficient * push, creep)
+            drags = _rub(slips, coefficient * push, creep)
         return Law(
             contact=contact,
             push=push,
@@ -308,3 +308,36 @@ class Penalty(Constraint):
                 "slide in; use mbd.touchdown, give mbd.measure(…, tangents=…), or friction=0"
             )
         return faults
+
+
+def _slip_velocities(measure: Measure, scope: Scope, hold: Hold) -> list[tuple[str, Scalar]]:
+    """(part, velocity [m/s]) of the contact point along the surface, forward and sideways.
+
+    Those of a measure with tangents are the rates of their residuals, with the directions at the point of now.
+    """
+    captured = measure.captured(scope)
+    held = hold(captured)
+    here = {anchor: value for anchor, value in zip(held, captured, strict=True) if isinstance(anchor, Node)}
+    found: list[tuple[str, Scalar]] = []
+    for part, residual in measure.tangents(scope, held):
+        rate = scope.rate(residual)
+        found.append((part, substitute([rate], here)[0] if isinstance(rate, Node) else rate))
+    return found + [(part, velocity) for part, velocity in measure.slip_velocities(scope)]
+
+
+def _rub(velocities: Sequence[tuple[str, Scalar]], limit: Scalar, creep: Scalar) -> list[Drag]:
+    """``f = −limit γ/√(‖γ‖² + creep²)``: opposite to γ in the plane of contact, limit where it slides fast.
+
+    Parameters
+    ----------
+    velocities : γ, one or two parts [m/s]; a force acts along those that the mechanism can change
+    limit : μ p [N]
+    creep : speed at which friction is 1/√2 of that [m/s]
+    """
+    square: Scalar = creep * creep
+    for _, velocity in velocities:
+        square = square + velocity * velocity
+    size: Scalar = maximum(limit, 0.0) / sqrt(square)
+    if len(velocities) == 1:
+        return [Drag(velocity, -1.0 * size * velocity) for _, velocity in velocities]
+    return [Drag(velocity, -1.0 * size * velocity, f"friction.{part}", True) for part, velocity in velocities]

@@ -13,8 +13,7 @@ from mbd.bodies.ground import Ground
 from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import flag, name_of, number, unit_vector
 from mbd.constraints.base import VelocityConstraint
-from mbd.constraints.disks import to_edge
-from mbd.constraints.slip import slip_along
+from mbd.constraints.disks import slip_along, to_edge
 from mbd.constraints.surfaces import Plane
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError

@@ -13,9 +13,9 @@ from mbd.bodies.ground import Ground
 from mbd.bodies.scope import Scope, Triple
 from mbd.bodies.values import number
 from mbd.constraints.balls import Ball
+from mbd.constraints.disks import slip_along
 from mbd.constraints.measure import Measure
 from mbd.constraints.round_on_surface import NO_CONTACT_POINT, ball_on
-from mbd.constraints.slip import slip_along
 from mbd.constraints.surfaces import Plane, Surface, spin_about, surface_of
 from mbd.dataclass import dataclass
 from mbd.forces.base import frame_of

@@ -11,7 +11,6 @@ from mbd.bodies.domains import Domain
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number
 from mbd.constraints.base import Constraint
-from mbd.constraints.contact_friction import friction_of, resistance
 from mbd.constraints.expressions import is_expression
 from mbd.constraints.law import Closing, Equation, Hold, Law, Rubbing
 from mbd.constraints.measure import Measure, gap_of
@@ -28,7 +27,8 @@ from mbd.constraints.user_measure import measure
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
-from mbd.joints.losses.base import Loss
+from mbd.joints.losses.base import Loss, without_states
+from mbd.joints.losses.isotropic import isotropic
 from mbd.tape.functions import maximum
 from mbd.tape.node import Scalar
 
@@ -76,7 +76,7 @@ class Unilateral(Constraint):
         put = object.__setattr__
         put(self, "measure", measure_of(self.measure, f"Unilateral '{self.name}'"))
         put(self, "restitution", number(self.restitution, f"restitution of '{self.name}'"))
-        put(self, "friction", friction_of(self.friction, self.name))
+        put(self, "friction", _friction_of(self.friction, self.name))
         put(self, "spin_friction", number(self.spin_friction, f"spin_friction of '{self.name}'"))
         put(self, "release", releases_of(self.release, self.name) or None)
         put(self, "only_while", condition_of(self.only_while, self.name))
@@ -148,7 +148,7 @@ class Unilateral(Constraint):
 
     def _resistance(self, scope: Scope, loss: Loss, push: Scalar, speeds: Sequence[Scalar]) -> Sequence[Scalar]:
         """Smooth friction along its slips, none while a rule lets it pull."""
-        return resistance(loss, self._pushing(push), speeds, scope, f"{self.name} friction")
+        return _resistance(loss, self._pushing(push), speeds, scope, f"{self.name} friction")
 
     def _spin_limit(self, scope: Scope, push: Scalar) -> Scalar:
         """ρ p, none while a rule lets it pull."""
@@ -237,3 +237,29 @@ def measure_of(value: object, what: str) -> Measure:
     if not isinstance(value, Measure):
         raise ModelError(f"{what} needs a measure such as mbd.touchdown(shank.end) or mbd.flexion(knee), got {value!r}")
     return value
+
+
+def _friction_of(value: Any, name: str) -> float | Loss | None:
+    """What a contact's friction may be: None, μ, or a loss of the slip's speed, its force per newton of normal force.
+
+    Raises
+    ------
+    ModelError
+        for anything else, and a loss that follows the force in a joint.
+    """
+    if isinstance(value, Loss):
+        if value.needs_reaction:
+            raise ModelError(
+                f"friction of '{name}': {value!r} follows the force in a joint; friction of a contact follows its "
+                "normal force by itself: give μ, or mbd.Viscous(…)"
+            )
+        instead = "give a contact mbd.Coulomb, mbd.Stribeck, mbd.Viscous or μ"
+        return without_states(value, f"friction of '{name}'", instead)
+    if value is None:
+        return None
+    return number(value, f"friction of '{name}'")
+
+
+def _resistance(loss: Loss, push: Scalar, speeds: Sequence[Scalar], scope: Scope, owner: str) -> list[Scalar]:
+    """Forces on the mechanism along one slip, or two that are perpendicular: −p F(‖γ‖) γ/‖γ‖, F of the smooth part."""
+    return [-push * part for part in isotropic(loss, speeds, scope, owner)]

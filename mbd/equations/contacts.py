@@ -9,26 +9,27 @@ from functools import partial
 from mbd.bodies.promises import called
 from mbd.constraints.base import Constraint
 from mbd.constraints.event import Event
-from mbd.constraints.law import Closing, Equation, Law
+from mbd.constraints.law import Closing, Equation, Law, Rubbing
 from mbd.constraints.machine import state_of
 from mbd.constraints.measure import Measure, gap_of
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.derivation_scope import DerivationScope, Generalized
 from mbd.equations.dynamics import Work
 from mbd.equations.effects import drag_effect, penalty_effect
-from mbd.equations.equations import Contact, Guard, Row
+from mbd.equations.equations import Contact, Effect, Guard, Row
 from mbd.equations.frictions import dry_friction, dry_joint, sliding_contact
 from mbd.equations.gathered import Gathered
 from mbd.equations.law_of import Holding, law_of
 from mbd.equations.laws import Laws
-from mbd.equations.rubbing import rubbing_contact
 from mbd.equations.states import with_states
 from mbd.joints.base import Joint, row_unit
-from mbd.tape.derivatives import gradient, live
+from mbd.tape.derivatives import gradient, live, substitute
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Scalar
 
 __all__ = ["anchors_held", "laws"]
+
+Drags = tuple[tuple[str, Node, Node], ...]
 
 
 def laws(
@@ -201,7 +202,7 @@ def _by_rows(
     if limited:
         sliding_contact(found, scope, dynamics, word.name, acting, limited, captured)
     drags = (
-        rubbing_contact(found, scope, dynamics, word.name, number, numbers[0], law.rubbing, captured)
+        _rubbing_contact(found, scope, dynamics, word.name, number, numbers[0], law.rubbing, captured)
         if law.rubbing is not None and numbers[0] >= 0
         else ()
     )
@@ -302,3 +303,54 @@ def _never(scope: DerivationScope, guard: Guard, written: Collection[str]) -> li
         f"the guard of Event '{guard.name}' never changes, so the event cannot happen; let it depend on a "
         "coordinate, a rate, a force, the time 't', or a parameter that a controller writes"
     ]
+
+
+def _rubbing_contact(
+    found: Laws,
+    scope: DerivationScope,
+    dynamics: Generalized,
+    name: str,
+    number: int,
+    normal: int,
+    rubbing: Rubbing,
+    captured: dict[int, Node],
+) -> Drags:
+    """(part, velocity, force) of the smooth friction of contact `number`, whose normal row is `normal`.
+
+    Velocities are those of the slips at the place of now. A slip that no motion changes has no friction. The forces
+    follow the multiplier of the normal row, which is zero while the contact is open.
+    """
+    here = {scope.tape.input("anchor", k): value for k, value in captured.items()}
+    parts, speeds = [], []
+    for row in rubbing.slips:
+        view = scope.tape.lift(row.value)
+        rate = view if row.level == "velocity" else scope.rates([view])[0]
+        speed = substitute([rate], here)[0]
+        if not speed.is_constant:
+            parts.append(row.part)
+            speeds.append(speed)
+    forces = [scope.tape.lift(force) for force in rubbing.forces(-scope.tape.input("lam", normal), speeds)]
+    if not parts:
+        return ()
+    found.drags += [(number, speed, force) for speed, force in zip(speeds, forces, strict=True)]
+    work = Work([], [], speeds, [-force for force in forces])
+    generalized = dynamics.generalized(work)
+    real, sizes = scope.views.real(speeds), scope.views.real(forces)
+    moving = list(zip(real, sizes, strict=True))
+    _add_effect(found, drag_effect(f"{name} friction", -1, moving, generalized, scope))
+    return tuple((part, speed, force) for part, (speed, force) in zip(parts, moving, strict=True))
+
+
+def _add_effect(found: Laws, effect: Effect) -> None:
+    """One effect of all friction of a contact, that which sticks included."""
+    places = [place for place, other in enumerate(found.effects) if other.name == effect.name]
+    if not places:
+        found.effects.append(effect)
+        return
+    first, second = found.effects[places[0]], effect
+
+    def generalized() -> list[Node]:
+        return [a + b for a, b in zip(first.generalized(), second.generalized(), strict=True)]
+
+    power = None if first.power is None or second.power is None else first.power + second.power
+    found.effects[places[0]] = replace(first, power=power, generalized=generalized)

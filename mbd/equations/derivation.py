@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from mbd.bodies.algebra import dot
+from mbd.bodies.algebra import dot, norm
 from mbd.bodies.domains import ParameterCheck
 from mbd.dataclass import dataclass
 from mbd.equations.changes import partials, rates
@@ -20,14 +20,15 @@ from mbd.equations.figure import figure_of, shown_markers
 from mbd.equations.gathered import Gathered
 from mbd.equations.held_forces import HeldForces, held_force_faults
 from mbd.equations.impulses import impulses_of
+from mbd.equations.kinematic_proxies import KinematicProxies, View
 from mbd.equations.kinks import kinks
 from mbd.equations.laws import Laws
 from mbd.equations.machines import declare_machines, machine_guards
 from mbd.equations.magnitudes import of_directions
 from mbd.equations.observations import offer_observations
 from mbd.equations.outputs import Outputs
+from mbd.equations.placement import Placement, Point
 from mbd.equations.results import offer_results
-from mbd.equations.row_sizes import row_sizes
 from mbd.equations.shapes import offer_shapes, shapes_of
 from mbd.equations.sizes import require_room
 from mbd.equations.solids import offer_solids, solids_of
@@ -38,9 +39,9 @@ from mbd.equations.whole_body import offer_whole_body
 from mbd.errors import ModelError
 from mbd.forces.rotor import Rotor
 from mbd.joints.reflected import signs_in_a_mirror
-from mbd.tape.derivatives import live
+from mbd.tape.derivatives import gradient, live
 from mbd.tape.functions import cos
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 from mbd.topology.check import require_valid
 from mbd.topology.plan import Plan, plan
 
@@ -336,7 +337,7 @@ class TreeGeometry:
         laws, scope = self.constraints, self.scope
         moving = laws.rows[row].is_velocity
         inputs = scope.inputs.v if moving else scope.inputs.x
-        return row_sizes(scope.placement, scope.views, laws.viewed[row], inputs, moving)
+        return _row_sizes(scope.placement, scope.views, laws.viewed[row], inputs, moving)
 
     def amplitudes(self) -> dict[int, float]:
         """How large elements of rotations can be, where joints turn by quaternions."""
@@ -349,3 +350,45 @@ class TreeGeometry:
     def rates(self, outputs: Sequence[Node]) -> dict[Node, Node]:
         """d node/dt of the places and rotations inside the outputs."""
         return rates(self.scope.placement, outputs)
+
+
+# How large the parts of a row's Jacobian are before they cancel.
+#
+# A row is written in places and directions of bodies (views). Its derivative by a coordinate x_j is the sum over these
+# of ``∂h/∂view · ∂view/∂x_j``, with ``∂p/∂x_j = û_j + ω̂_j × (p − o_j)`` and ``∂R/∂x_j = ω̂_j × R``. The sizes
+#
+# ``Σ |∂h/∂view| · (|û_j| + |ω̂_j| (|p| + |o_j|))`` for places,  ``Σ |∂h/∂view| · |ω̂_j|`` for directions
+#
+# do not vanish where the parts cancel, as those of two frames on one axis do: what is left of a derivative below its
+# round-off says that the row does not depend on x_j at all.
+
+
+def _row_sizes(
+    placement: Placement, views: KinematicProxies, viewed: Node, inputs: Sequence[Node], motion: bool
+) -> list[Node]:
+    """Σ|parts| of the derivative of a row by each coordinate.
+
+    Parameters
+    ----------
+    viewed : the value of the row in views, or the rate of one on velocities
+    inputs : x, or v of a row on velocities
+    motion : whether the row holds velocities
+    """
+    inside = [view for view in views.inside([viewed]) if view.motion == motion]
+    slopes = [abs(slope) for slope in views.real(gradient(viewed, [*inputs, *(view.node for view in inside)]))]
+    sizes: list[Scalar] = list(slopes[: len(inputs)])
+    for view, slope in zip(inside, slopes[len(inputs) :], strict=True):
+        for j in view.of.carrier.path:
+            sizes[j] = sizes[j] + slope * _motion(placement, view, j)
+    return [placement.tape.lift(size) for size in sizes]
+
+
+def _motion(placement: Placement, view: View, j: int) -> Scalar:
+    """How far coordinate j moves a place or turns a direction, without cancellation."""
+    mover = placement.movers[j]
+    assert mover.edge is not None
+    column = placement.columns(mover)[j - mover.edge.first]
+    turn = norm(column.angular)
+    if not isinstance(view.of, Point):
+        return turn
+    return norm(column.linear) + turn * (norm(view.of.position) + norm(placement.joint(mover).position))

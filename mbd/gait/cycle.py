@@ -14,7 +14,6 @@ from mbd.bodies.values import named_number_faults
 from mbd.dataclass import dataclass
 from mbd.errors import GaitError, ModelError
 from mbd.gait.derivatives import Derivatives, require_member, step_spans
-from mbd.gait.energies import cost_of_transport, energy_by_cause
 from mbd.gait.family import energy_of
 from mbd.gait.floquet import Multipliers
 from mbd.gait.map_derivative import MapDerivative, Measured, measured
@@ -23,6 +22,7 @@ from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart
 from mbd.later import later
 from mbd.notebook import table
+from mbd.results.ledger import SPENT, titled
 from mbd.sensitivity.tangent_names import place_names
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["LimitCycle"]
+__all__ = ["LimitCycle", "cost_of_transport", "energy_by_cause"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,3 +309,27 @@ def residual_by_unit(chart: Chart, c: Vector) -> dict[str, float]:
     for unit, value in zip(units, np.abs(chart.basis @ c), strict=True):
         found[unit] = max(found.get(unit, 0.0), float(value))
     return found
+
+
+def energy_by_cause(run: Trajectory) -> dict[str, float]:
+    """What each cause gave from the first row to the last [J]; negative: it took. Gravity and springs give what they
+    had stored; NaN of a kind with a part that is withheld.
+    """
+    ledger = run.energy
+    kinds, withheld = ledger.by_kind(), {part.kind for part in ledger.parts if part.withheld}
+    stored = titled(ledger.stored, kinds)
+    given = {title: float(energy[0] - energy[-1]) for title, energy in stored.items() if len(energy)}
+    taken = {kind: float(values[-1]) for kind, values in kinds.items() if len(values)}
+    return {**given, **taken, **dict.fromkeys(withheld, float("nan"))}
+
+
+def cost_of_transport(energy: Mapping[str, float], model: Any, changed: Mapping[str, float], distance: float) -> float:
+    """``−Σ (losses, dampers, friction, penalties, impacts) / (m g d)`` [-]; NaN without bodies, gravity or a way, and
+    where one of these is not known.
+    """
+    values = {**getattr(model, "parameters", {}), **changed}
+    mass = sum(values.get(f"{body}.mass", 0.0) for body in getattr(model, "bodies", {}))
+    gravity = float(np.linalg.norm([values.get(f"gravity.{axis}", 0.0) for axis in "xyz"]))
+    weight = mass * gravity * abs(distance)
+    taken = -sum(value for kind, value in energy.items() if kind in SPENT)
+    return taken / weight if weight > 0.0 else float("nan")

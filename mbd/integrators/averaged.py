@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from mbd.arrays import Vector
+from mbd.dataclass import dataclass
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
-from mbd.integrators.coefficients import Coefficients
 from mbd.integrators.stepping import MAX_ITERATIONS, SchemeMemory
 from mbd.kernel.codes import EPS
 from mbd.state import Mode, State
 
-__all__ = ["AveragedStep"]
+__all__ = ["AveragedStep", "Coefficients"]
 
 
 class AveragedStep:
@@ -91,3 +91,32 @@ class AveragedStep:
             old.parameters,
         )  # fmt: skip
         return StepResult(state, after, report)
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """α_m, α_f, β, γ."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    @property
+    def second_order(self) -> bool:
+        """γ = ½ + α_f − α_m."""
+        return abs(self.gamma - 0.5 - self.alpha_f + self.alpha_m) < 1e-12
+
+    @property
+    def undamped(self) -> bool:
+        """Spectral radius 1 at infinite frequency (ρ∞ = 1): nothing damps the round-off of the multipliers."""
+        return abs(self.rho_inf - 1.0) < 1e-9
+
+    @property
+    def rho_inf(self) -> float:
+        """Spectral radius of the amplification matrix as ω dt → ∞."""
+        beta, gamma = self.beta, self.gamma
+        half, product = 0.5 * (0.5 + gamma - 2.0 * beta) / beta, (0.5 - gamma + beta) / beta
+        split = half * half - product  # of the roots of z² + 2 half z + product; complex or double where it is not > 0
+        pair = float(np.sqrt(product)) if split <= 1e-14 * half * half else abs(half) + float(np.sqrt(split))
+        return max(abs(self.alpha_f / (1.0 - self.alpha_f)), pair)

@@ -18,8 +18,8 @@ from typing import Any, ClassVar, Literal, TypeAlias
 
 from mbd.bodies.values import among, is_number, shown
 from mbd.errors import CapabilityError
+from mbd.integrators.averaged import Coefficients
 from mbd.integrators.base import CompiledIntegrator, System
-from mbd.integrators.coefficients import Coefficients
 
 __all__ = ["DEFAULT_TOLERANCE", "Coefficients", "Formulation", "NewmarkFamily", "Starting"]
 

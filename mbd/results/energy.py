@@ -26,7 +26,7 @@ from mbd.equal import HALF_PRECISION_RTOL, ROUND_OFF_RTOL, SMALL_SUM_RTOL
 from mbd.results.columns import ModelColumns
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.powers import Lost, Power, moving_share, powers
-from mbd.results.quadrature import cumulative_of_many
+from mbd.results.quadrature import cumulative
 from mbd.results.record import EventRecord, Rows
 from mbd.results.within import readable, within
 
@@ -227,7 +227,7 @@ def _refined(
     by more than `least` [J] from ``h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``.
     """
     time = columns.record.time
-    works = cumulative_of_many(time, [(value, rate) for _, value, rate in asked])
+    works = cumulative(time, [(value, rate) for _, value, rate in asked])
     known = readable(columns)
     if not known.any():
         return works

@@ -17,7 +17,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.equal import EQUAL_RTOL
 from mbd.results.polynomials import CHUNK
 
-__all__ = ["cumulative", "cumulative_of_many", "stretches"]
+__all__ = ["cumulative", "stretches"]
 
 ROWS_WITH_RATES, ROWS_WITHOUT = 4, 8
 """Rows that the polynomial goes through: eight conditions either way."""
@@ -46,20 +46,15 @@ def stretches(time: Vector) -> tuple[Index, Index]:
     return first.astype(np.intp), last.astype(np.intp)
 
 
-def cumulative(time: Vector, values: Vector, rates: Vector | None = None) -> Vector:
-    """∫ P dt from the first row to each row, (R,); nothing is added across a switch.
+def cumulative(time: Vector, integrands: Sequence[tuple[Vector, Vector | None]]) -> list[Vector]:
+    """∫ P dt from the first row to each row, (R,), of each integrand; nothing is added across a switch.
 
     Parameters
     ----------
     time : (R,) [s], equal at the two sides of a switch
-    values : P at the rows; those of the two sides of a switch may differ
-    rates : Ṗ at the rows, each as seen from its own side; None where they are not known
+    integrands : P at the rows, where those of the two sides of a switch may differ; and Ṗ, each as seen from its own
+        side, or None where it is not known
     """
-    return cumulative_of_many(time, [(values, rates)])[0]
-
-
-def cumulative_of_many(time: Vector, integrands: Sequence[tuple[Vector, Vector | None]]) -> list[Vector]:
-    """`cumulative` of several integrands, (values, rates), whose weights are computed once."""
     known = {with_rates: _rules(time, with_rates) for with_rates in {rates is not None for _, rates in integrands}}
     found = []
     for values, rates in integrands:

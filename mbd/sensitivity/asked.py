@@ -11,6 +11,7 @@ import numpy as np
 from mbd.bodies.values import among, is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of, tunable_model
 from mbd.dataclass import changed_late, dataclass
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations
 from mbd.errors import CapabilityError, ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
@@ -19,7 +20,6 @@ from mbd.results.facts import Facts
 from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
 from mbd.sensitivity.derivative import Differentiated, passed
-from mbd.sensitivity.functions import rates_of_parameters
 from mbd.sensitivity.made_run import made_with
 from mbd.sensitivity.outputs import lines_of, taken_apart, usual
 from mbd.sensitivity.result import Sensitivities, words_of
@@ -28,6 +28,10 @@ from mbd.sensitivity.starts import Direction, restitution_names
 from mbd.sensitivity.tangent_names import refuse_parts, start_names, whole_names
 from mbd.simulation.marching import Run
 from mbd.state import State
+from mbd.tape.derivatives import jvp
+from mbd.tape.evaluate import evaluate
+from mbd.tape.node import Tape
+from mbd.tape.tracing import traced_scalar
 
 __all__ = ["Asked", "EndState", "Table", "Wanted", "names_in", "request_of", "with_inputs"]
 
@@ -76,7 +80,7 @@ class Asked:
                 if isinstance(each, str):
                     found.append(each)
                 else:
-                    found += [(name, rates_of_parameters(name, given, self.at, known)) for name, given in each.items()]
+                    found += [(name, _rates_of_parameters(name, given, self.at, known)) for name, given in each.items()]
         of_start = [name for name in single if name not in known]
         return found, of_start if self.hold is None else self.hold
 
@@ -267,3 +271,42 @@ def _names_of(equations: Equations) -> frozenset[str]:
 def _inputs_of(equations: Equations) -> frozenset[str]:
     """Parameters and coordinates."""
     return frozenset([*(each.name for each in equations.parameters), *(each.name for each in equations.coordinates)])
+
+
+def _rates_of_parameters(
+    name: str, functions: Mapping[str, Any], at: Mapping[str, float], known: Mapping[str, float]
+) -> dict[str, float]:
+    """Derivatives of parameters by a quantity on which they depend.
+
+    Parameters
+    ----------
+    functions : of one scalar, by the name of the parameter that they give; or a number, the derivative itself
+    at : the value of each quantity
+    known : the parameters of the run, which the functions must give
+
+    Raises
+    ------
+    ModelError
+        where the value is missing, or functions give other parameters than the run has.
+    """
+    rates: dict[str, float] = {}
+    for parameter, function in functions.items():
+        if is_number(function):
+            rates[parameter] = float(function)
+            continue
+        if not callable(function):
+            raise ModelError(f"wrt: {parameter!r} of {name!r} must be a function or a number, not {shown(function)}")
+        if name not in at:
+            raise ModelError(f"wrt: {name!r} is a function of parameters: give its value too, as at={{{name!r}: 0.05}}")
+        tape = Tape()
+        place = tape.input("p", 0)
+        node = traced_scalar(function, [(name, place)], f"{parameter!r} as a function of {name!r}", tape)
+        value, rate = evaluate([node, *jvp([node], {place: 1.0})], {("p", 0): at[name]})
+        present = known.get(parameter)
+        if present is not None and not abs(value - present) <= EQUAL_RTOL * max(abs(present), abs(value), 1e-3):
+            raise ModelError(
+                f"wrt: {parameter!r} is {value:.9g} at {name} = {at[name]:.9g}, but {present:.9g} in the run; give the "
+                "run these parameters, or at= the value that it has"
+            )
+        rates[parameter] = rate
+    return rates

@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +37,8 @@ from mbd.equations.equations import Equations
 from mbd.equations.inputs import Inputs
 from mbd.equations.linearization import along_places
 from mbd.equations.programs import switched_balance
-from mbd.sensitivity.charts import chart_columns
 from mbd.tape.derivatives import jvps
-from mbd.tape.node import Node
+from mbd.tape.node import Node, Scalar
 
 __all__ = ["Columns", "Programs", "Sparse", "State", "watched_nodes"]
 
@@ -272,5 +272,16 @@ def derivatives(equations: Equations, values: Sequence[Node], places: Sequence[i
     parameters = [tape.input("p", k) for k in places]
     others = (*inputs.v, *inputs.z, *inputs.a, *inputs.s, *inputs.lam, inputs.t, *anchors, *parameters)
     by_others = jvps(values, [{node: 1.0} for node in others])
-    by_places = along_places(equations, values) if equations.chart is None else chart_columns(equations, values)
+    by_places = along_places(equations, values) if equations.chart is None else _chart_columns(equations, values)
     return [*by_places, *by_others]
+
+
+def _chart_columns(equations: Equations, values: Sequence[Node]) -> list[list[Node]]:
+    """∂values/∂x (n_v lists): at the center of a chart those along velocities, as tangents are here."""
+    inputs = Inputs.of(equations)
+    known: Sequence[Any] = [{} for _ in range(len(inputs.x))]
+    if equations.geometry is not None:
+        known = equations.geometry.partials(values)
+    moving = inputs.by_increments(known)
+    seeds: list[dict[Node, Scalar]] = [{x: 1.0, **moving[j]} for j, x in enumerate(inputs.x)]
+    return jvps(values, seeds)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from mbd.bodies.values import is_finite_number, shown
+from mbd.assembly.projection import project
+from mbd.bodies.values import is_finite_number, is_number, shown
 from mbd.compile.mechanisms import mechanism_of
-from mbd.errors import ModelError, OneSidedError
+from mbd.errors import AssemblyError, ModelError, OneSidedError, SimulationError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.asked import Table, Wanted, names_in, with_inputs
@@ -16,12 +17,14 @@ from mbd.sensitivity.one_sided import with_both_sides
 from mbd.sensitivity.outputs import taken_apart, usual
 from mbd.sensitivity.result import Sensitivities
 from mbd.sensitivity.run_data import RunRows, refused
-from mbd.sensitivity.sequence import amounts_of, changed_sequences
+from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.sensitivity.tangent_names import expanded
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
 
 __all__ = ["sensitivities"]
+
+Again = Callable[[State, Mapping[str, float]], Trajectory]
 
 
 def sensitivities(
@@ -109,7 +112,7 @@ def sensitivities(
     changed = {**start.parameters, **(parameters or {})} if isinstance(parameters, Mapping | None) else {}
     model = with_inputs(model, backend, changed, wrt, controllers)
     ways = expanded(mechanism_of(model, backend).equations, wrt)
-    amounts = amounts_of(check_events, [name for each in ways for name in ([each] if isinstance(each, str) else each)])
+    amounts = _amounts_of(check_events, [name for each in ways for name in ([each] if isinstance(each, str) else each)])
     own: Sequence[Any] = getattr(model, "controllers", ())
     if own and amounts:
         raise refused("in the runs of check_events controllers read and write other values", "leave check_events out")
@@ -131,7 +134,7 @@ def sensitivities(
     found: Sensitivities = asked.found
     if not amounts:
         return found
-    return replace(found, event_changes=changed_sequences(model, run, *asked.of_run(run), amounts, made, backend))
+    return replace(found, event_changes=_changed_sequences(model, run, *asked.of_run(run), amounts, made, backend))
 
 
 def _check_hold(hold: Any) -> None:
@@ -154,3 +157,75 @@ def _values_of(at: Any) -> dict[str, float]:
     if not isinstance(at, Mapping) or not all(isinstance(k, str) and is_finite_number(v) for k, v in at.items()):
         raise ModelError(f"at maps names of quantities to finite numbers, such as {{'slope': 0.05}}, not {shown(at)}")
     return {name: float(value) for name, value in at.items()}
+
+
+def _amounts_of(given: Any, names: list[str]) -> dict[str, float]:
+    """By how much each quantity is to change, checked.
+
+    Raises
+    ------
+    ModelError, UnknownNameError
+        for what is no positive number, or a name that is not among `names`.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or not all(is_number(size) and size > 0.0 for size in given.values()):
+        raise ModelError(
+            "check_events maps names in wrt to changes > 0 that the order of events is to survive, such as "
+            f"{{'hip.angle': 0.01}}, not {shown(given)}"
+        )
+    for name in given:
+        if name not in names:
+            raise UnknownNameError("check_events: " + nearest(name, names, "name in wrt", "There are"))
+    return {name: float(size) for name, size in given.items()}
+
+
+def _changed_sequences(
+    model: Any, run: Trajectory, ways: Sequence[Any], held: Sequence[str], amounts: Mapping[str, float], again: Again,
+    backend: str,
+) -> tuple[str, ...]:  # fmt: skip
+    """The first event that is another, by each change in both senses; () if all are the same.
+
+    ways, held : directions and what they leave as it is, see `mbd.sensitivity.asked`; amounts : sizes of changes;
+    again : makes the run from another start, with other parameters
+    """
+    rows, found = RunRows(run), list[str]()
+    wanted_ways, compose = directions(rows.mechanism, ways), rows.mechanism.equations.configuration.compose
+    for way in wanted_ways:
+        if way.restitutions and way.name in amounts:
+            raise refused(
+                f"runs take no other restitution as a parameter: {way.name!r}", "leave it out of check_events"
+            )
+    programs = programs_of(rows.mechanism, wanted_ways, rows.record.parameters)
+    start, state = start_tangent(rows.first, programs, wanted_ways, held), rows.record.start
+    values = dict(zip(rows.record.parameter_names, rows.record.parameters, strict=False))
+    wanted = [(event.kind, event.name) for event in run.events]
+    for k, way in enumerate(wanted_ways):
+        size = amounts.get(way.name, 0.0)
+        for part in (size, -size) if size else ():
+            changed = {name: values[name] + part * rate for name, rate in (way.parameters or {}).items()}
+            n_v = len(start.q)
+            moved = replace(
+                state, q=compose(state.q, part * start.q[:, k]), v=state.v + part * start.y[:n_v, k],
+                z=state.z + part * start.y[n_v:, k], memory=None,
+            )  # fmt: skip
+            name = f"{way.name} {'+' if part > 0 else '−'} {size:g}"
+            try:
+                other = again(project(model, moved, {**state.parameters, **changed}, backend), changed)
+            except (AssemblyError, SimulationError) as error:
+                found.append(f"{name}: {str(error).splitlines()[0]}")
+                continue
+            difference = _first_difference(wanted, [(event.kind, event.name) for event in other.events])
+            found += [f"{name}: {difference}"] if difference else []
+    return tuple(found)
+
+
+def _first_difference(wanted: list[tuple[str, str]], found: list[tuple[str, str]]) -> str:
+    """The first event that is another, '' if none is."""
+    for number in range(max(len(wanted), len(found))):
+        here = wanted[number] if number < len(wanted) else None
+        there = found[number] if number < len(found) else None
+        if here != there:
+            now, then = (f"{each[1]!r} {each[0]}" if each else "none" for each in (there, here))
+            return f"event {number + 1} is {now}, in the run {then}"
+    return ""

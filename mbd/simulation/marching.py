@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from mbd.assembly.conflicts import Conflict, loops_of
+from mbd.assembly.infeasibility import position_conflicts
+from mbd.assembly.posture import Posture, close_positions, position_rows
+from mbd.dataclass import found_late
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Guard
 from mbd.errors import MemoryLimitError, SimulationError, UnknownNameError
 from mbd.kernel import codes
+from mbd.kernel.records import TABLE
 from mbd.results.columns import ModelColumns
 from mbd.results.trajectory import EventRecord, Trajectory
 from mbd.simulation.arguments import MAX_WAIT
@@ -19,10 +25,9 @@ from mbd.simulation.diagnostics.circular import circular_laws
 from mbd.simulation.diagnostics.energy import EnergyWatch
 from mbd.simulation.diagnostics.failures import attempt, crowded, explanation
 from mbd.simulation.diagnostics.fastest import stability
-from mbd.simulation.diagnostics.reach import out_of_reach
+from mbd.simulation.diagnostics.notes import Note, notes_of
 from mbd.simulation.diagnostics.singular import at_singular_configuration
 from mbd.simulation.diagnostics.turning import first_reversed, overturned
-from mbd.simulation.outcome import trajectory_of
 from mbd.simulation.run.begin import begin, check_rank, notify
 from mbd.simulation.run.control import apply_reset, arrive, begin_controllers, call_controllers
 from mbd.simulation.run.data import RunData
@@ -30,12 +35,34 @@ from mbd.simulation.run.ends import advance, call, close
 from mbd.simulation.run.memory import carry_on, take_up
 from mbd.simulation.run.room import Room
 from mbd.simulation.run.savepoints import rewind, save
-from mbd.simulation.run.stored import whole_record
+from mbd.simulation.run.stored import ended_record, whole_record
 from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated
 from mbd.simulation.run.user_calls import call_user
 from mbd.state import State
 
 __all__ = ["Run"]
+
+AHEAD = (1.0, 4.0, 16.0)
+"""How many steps beyond the last accepted state are looked at, one after the other [-]."""
+STEP_FAILURES = frozenset(
+    {
+        codes.NOT_FINITE, codes.NOT_CONVERGED, codes.SINGULAR, codes.STAGNATED, codes.DEPENDENT, codes.CONFLICT,
+        codes.NO_LOCATION, codes.TOO_TIGHT,
+        codes.TOO_NEAR, codes.TOO_SMALL, codes.SINGULAR_ROWS_MOVE, codes.OUTGROWN, codes.GAINED, codes.LEAPT,
+        codes.UNSTABLE,
+    }
+)  # fmt: skip
+"""What steps fail with next to such a limit."""
+
+COUNTS = {
+    name: TABLE.places[f"n_{name}"][1]
+    for name in (
+        "steps", "iterations", "tangents", "residuals", "factorizations", "events", "restarts", "impacts",
+        "locations", "stagnations", "singular_steps", "shortened", "energetic_impacts",
+        "endless", "pivoted",
+    )
+}  # fmt: skip
+"""Counts of the kernel that results tell, and their places."""
 
 INTERRUPTED = "interrupted"
 """The problem of a run that was interrupted, until its time is known."""
@@ -110,7 +137,7 @@ class Run(RunData):
             problem = f"{problem}; before that, {fed}"
         if problem and not self.interrupted and self.stored:
             problem += stability(self, whole_record(self))
-        return trajectory_of(self, problem, message, final), problem
+        return _trajectory_of(self, problem, message, final), problem
 
     def march(self) -> tuple[str, str]:
         """Run until the end or a failure, of which nothing is taken back yet; (problem, message)."""
@@ -218,7 +245,7 @@ class Run(RunData):
         rates = np.abs(self.table[: self.stored, 1 + n_q : 1 + n_q + n_v])
         swiftest = float(np.max(rates, initial=0.0))
         events = [*self.earlier, *self.events]
-        beyond = out_of_reach(self, status) or at_singular_configuration(self, status)
+        beyond = _out_of_reach(self, status) or at_singular_configuration(self, status)
         return explanation(self.stepper, status, events, self.places, swiftest, beyond)
 
     def _show(self, finished: bool = False) -> None:
@@ -269,3 +296,96 @@ class Run(RunData):
         apply_reset(self, guard)
         if guard.transition is not None:
             self.kernel.restart_due = 1
+
+
+def _trajectory_of(run: RunData, problem: str, message: str, final: State) -> Trajectory:
+    """The run by name; `problem` is '' if it went as far as it was asked to. Its message tells what is in doubt."""
+    record = ended_record(run)
+    notes, run.doubts = notes_of(run, record)
+    text = problem or "; but ".join([message, *run.doubts])
+    ended = record.concluded(success=not problem, message=text, failure=run.failure, final=final)
+    return Trajectory(found_late(ended, "stats", _statistics(run, notes)))
+
+
+def _statistics(run: RunData, notes: Sequence[Note]) -> Callable[[], dict[str, Any]]:
+    """What gives counts and notes."""
+    counts = run.kernel.counts.tolist()
+    numbers: dict[str, Any] = {name: counts[place] for name, place in COUNTS.items()}
+    if run.kernel.adaptive:
+        numbers["rejected"] = int(run.kernel.n_rejected)
+    if run.kernel.adaptive or run.kernel.estimates:
+        numbers["local_errors"] = float(run.kernel.error_sum)
+    if run.kernel.n_cones > 0 and run.kernel.strategy == 1:
+        numbers["cone_residual"] = float(run.kernel.cone_residual)
+    numbers["modes"] = len(run.stepper.modes)
+    numbers["compiled"] = run.stepper.compiled
+    numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional
+    numbers["derive_and_compile_seconds"] = run.mechanism.seconds
+    numbers["notes"] = []
+    numbers["wall_seconds"] = perf_counter() - run.began
+
+    def statistics() -> dict[str, Any]:
+        numbers["notes"] = [one for note in notes for one in ([note] if isinstance(note, str) else note())]
+        return numbers
+
+    return statistics
+
+
+def _out_of_reach(run: RunData, status: int) -> str:
+    """A sentence on the constraints that cannot hold together soon after the accepted state, '' if none.
+
+    A linkage that a driver pulls to its limit ends next to a singular configuration, where steps fail for reasons of
+    their own; that no position exists beyond it is the cause.
+    """
+    if status not in STEP_FAILURES or not _follows_time(run):
+        return ""
+    try:
+        return _first_conflict(run)
+    except np.linalg.LinAlgError:
+        return ""
+
+
+def _first_conflict(run: RunData) -> str:
+    """The same of rows that follow time."""
+    for steps in AHEAD:
+        found = _conflict(run, steps * run.dt)
+        if found is not None:
+            return f"by t = {run.now + steps * run.dt:.6g} s {found}"
+    return ""
+
+
+def _follows_time(run: RunData) -> bool:
+    """Whether a row on positions that acts changes with time while nothing moves."""
+    rows = position_rows(_posture(run, 0.0))
+    off = [np.max(np.abs(_heights(_posture(run, ahead * run.dt), rows)), initial=0.0) for ahead in AHEAD]
+    return bool(rows) and bool(np.isfinite(off).all()) and max(off) > EQUAL_RTOL
+
+
+def _posture(run: RunData, ahead: float) -> Posture:
+    """The accepted positions at a later time."""
+    v = run.kernel
+    return Posture(
+        run.mechanism, run.manager, v.params, v.q[: v.n_q].copy(), v.y[: v.n].copy(),
+        v.closed[: v.n_contacts].copy(), v.anchors.copy(), time=run.now + ahead,
+    )  # fmt: skip
+
+
+def _heights(work: Posture, rows: list[int]) -> np.ndarray:
+    """What the rows are off."""
+    terms = work.terms()
+    return np.asarray(terms.h[rows])
+
+
+def _closes(run: RunData, ahead: float) -> bool:
+    work = _posture(run, ahead)
+    left = close_positions(work, position_rows(work), np.ones(work.equations.n_v, dtype=bool))
+    return bool(np.max(np.abs(left), initial=0.0) <= EQUAL_RTOL)
+
+
+def _conflict(run: RunData, ahead: float) -> Conflict | None:
+    """The first irreducible set of constraints that no position satisfies at a later time."""
+    if _closes(run, ahead):
+        return None
+    work = _posture(run, ahead)
+    found = position_conflicts(work, position_rows(work), work.q.copy(), loops_of(run.model), tried=True)
+    return found[0] if found else None

@@ -13,10 +13,9 @@ from mbd.errors import ModelError, nearest
 from mbd.integrators.base import Integrator
 from mbd.state import Mode, State
 from mbd.testing.findings import Findings, Verdict
-from mbd.testing.order import observed_order
 from mbd.testing.problems import PROBLEMS, Problem, broken, problem
 
-__all__ = ["check_integrator"]
+__all__ = ["check_integrator", "observed_order"]
 
 ERROR_FLOOR = 1e-11
 """Errors below are round-off, of the scheme or of the reference."""
@@ -172,3 +171,14 @@ def _order(findings: Findings, scheme: Integrator, posed: Problem, dt: float, ha
         shown = ", ".join(f"{error:.3g}" for error in errors)
         sentence = f"promised {promised}, observed {order:.2f}; errors at dt = {dt:g}, dt/2, …: {shown}"
         findings.holds(f"{law}: as promised, within {ORDER_ATOL}", abs(order - promised) <= ORDER_ATOL, sentence, hint)
+
+
+def observed_order(errors: Any, floor: float = 0.0) -> float:
+    """log₂ of the last fall of an error under halving of dt, above the floor of round-off; NaN where there is none.
+
+    >>> observed_order([1.0, 0.3, 0.075])
+    2.0
+    """
+    sizes = np.asarray(errors, dtype=float)
+    clear = np.flatnonzero((sizes[1:] > floor) & (sizes[:-1] > floor))
+    return float(np.log2(sizes[clear[-1]] / sizes[clear[-1] + 1])) if len(clear) else float("nan")

@@ -22,7 +22,7 @@ from mbd.joints.base import Joint
 from mbd.simulation.simulate import prepared
 from mbd.state import State
 from mbd.testing.findings import Findings, Verdict
-from mbd.testing.order import observed_order
+from mbd.testing.integrators import observed_order
 
 __all__ = ["check_scheme"]
 

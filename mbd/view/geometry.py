@@ -5,15 +5,32 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from mbd.arrays import Matrix
-from mbd.view.packing import QUANTIZATION_STEPS, finite, packed, side, step_of
+from mbd.arrays import Matrix, Vector
+from mbd.view.camera import FIRST, VIEWS, camera
+from mbd.view.forms import mesh
 from mbd.view.scene import Scene
-from mbd.view.scenery import Sheet
-from mbd.view.space import TURN_STEP, space, surface
+from mbd.view.scenery import SURFACE_LINES, Sheet
 
-__all__ = ["geometry"]
+__all__ = ["finite", "first_view", "geometry", "packed", "side", "step_of"]
+
+QUANTIZATION_STEPS = 5000.0
+"""Steps into which a range of values is divided; finer than a pixel."""
+
+OBLIQUE = np.deg2rad(np.arange(-45.0, -66.0, -5.0))
+"""Yaws tried, from halfway between the side and the front to nearly the front [rad]."""
+FIRST_PITCH = 0.3
+"""Pitch of a walker's first view [rad]."""
+QUANTILE = 0.2
+"""Part of the time in which the sides may be nearer to each other than what is compared."""
+DISTANCE_WEIGHT = 0.01
+"""Weight of the distance of a pair, over the largest one, beside how much it changes [-]."""
+MIN_DISTANCE_RATIO = 0.9
+"""Part of the largest distance between the sides at which the least turned view is taken [-]."""
+
+TURN_STEP = 1e-4
+"""Steps of directions and quaternions [-]."""
 
 
 def geometry(picture: Scene) -> dict[str, Any]:
@@ -60,7 +77,7 @@ def geometry(picture: Scene) -> dict[str, Any]:
             for push in picture.pushes
         ],
         **_scenery(picture, axes, step),
-        **(space(picture, step) if picture.spatial else {}),
+        **(_space(picture, step) if picture.spatial else {}),
     }  # fmt: skip
 
 
@@ -72,7 +89,7 @@ def _scenery(picture: Scene, axes: int, step: float) -> dict[str, Any]:
         return [packed(places[:, axis], fine) for axis in range(axes)]
 
     def sheet_of(sheet: Sheet) -> dict[str, Any]:
-        return surface(sheet, picture.turn[:, 1], step) if picture.spatial else _sheet(sheet, step)
+        return _surface(sheet, picture.turn[:, 1], step) if picture.spatial else _sheet(sheet, step)
 
     return {
         "decks": [
@@ -116,3 +133,147 @@ def _sheet(sheet: Sheet, step: float) -> dict[str, Any]:
             for line in lines
         ],
     }
+
+
+def _space(picture: Scene, step: float) -> dict[str, Any]:
+    """Solids, hinges and stops over time, facets of each kind of solid in use, ground axes (columns), camera views.
+
+    step : of places [m]
+    """
+    kinds = {"capsule", "box", *(solid.form.kind for solid in picture.solids)}
+    kinds |= {"cylinder"} if picture.hinges else set()
+    kinds |= {"wheel"} if picture.around.wheels else set()
+    kinds |= {"cone"} if picture.pushes else set()
+    return {
+        "solids": [
+            {
+                "body": solid.name, "side": side(solid.name), "kind": solid.form.kind,
+                "half": [finite(x) for x in solid.form.half], "at": _series(solid.center, step),
+                "turn": _series(solid.turn, TURN_STEP),
+            }
+            for solid in picture.solids
+        ],
+        "hinges": [
+            {"name": hinge.name, "at": _series(hinge.place, step), "axis": _series(hinge.axis, TURN_STEP)}
+            for hinge in picture.hinges
+        ],
+        "cones": [
+            {
+                "name": stop.name,
+                "at": _series(stop.place, step),
+                "axis": _series(stop.axis, TURN_STEP),
+                "angle": stop.angle,
+            }
+            for stop in picture.stops
+        ],
+        "meshes": {kind: _mesh(kind) for kind in sorted(kinds)},
+        "axes": picture.turn.round(9).T.tolist(),
+        "views": {"reset": first_view(picture), **VIEWS},
+    }  # fmt: skip
+
+
+def _surface(sheet: Sheet, upwards: Vector, step: float) -> dict[str, Any]:
+    """A surface by the corners of its lines along x, row after row: places at its first time, then how far each rose.
+
+    upwards : the direction of heights in the scene; holes : numbers of corners without a height
+    """
+    rows, count = SURFACE_LINES, sheet.lines.shape[2]
+    corners = sheet.lines[:, :rows].reshape(len(sheet.times), rows * count, 3)
+    holes = np.flatnonzero(~np.all(np.isfinite(corners), axis=(0, 2)))
+    risen = (corners - corners[0]) @ upwards
+    return {
+        "times": [round(float(t), 9) for t in sheet.times], "rows": rows, "count": count, "holes": holes.tolist(),
+        "at": _series(corners[0], step), "up": [finite(x) for x in upwards],
+        "risen": [packed(each, 5.0 * step) for each in risen[1:]],  # heights in coarser steps than places
+    }  # fmt: skip
+
+
+def _series(values: NDArray[np.float64], step: float) -> list[dict[str, Any]]:
+    return [packed(column, step) for column in values.T]
+
+
+def _mesh(kind: str) -> dict[str, list[Any]]:
+    form = mesh(kind)
+    return {
+        "at": form.at.round(4).ravel().tolist(), "normal": form.normal.round(4).ravel().tolist(),
+        "faces": form.faces.ravel().tolist(), "marked": form.marked.astype(int).tolist(),
+    }  # fmt: skip
+
+
+def first_view(picture: Scene) -> tuple[float, float]:
+    """Yaw and pitch [rad]; `FIRST` for mechanisms without a left and a right side.
+
+    1. The points of one side that have a partner on the other, 'left leg.foot' and 'right leg.foot', are taken.
+    2. The way from left to right, at the start and levelled, of the pair whose distance changes least (the sockets of a
+       pelvis) is the sideways axis, to which yaws are relative.
+    3. Of the oblique yaws that one counts from which partners stay apart in the picture.
+    """
+    pairs = _pairs(picture)
+    if not len(pairs):
+        return FIRST
+    # pictures of a run that are judged, at most
+    rows = np.unique(np.linspace(0, len(picture.positions) - 1, 40).round().astype(int))
+    apart = picture.positions[rows][:, pairs[:, 1]] - picture.positions[rows][:, pairs[:, 0]]  # from left to right
+    length = np.linalg.norm(apart, axis=-1)
+    usual = np.maximum(length.mean(axis=0), 1e-9)
+    steadiest = int(np.argmin(np.std(length, axis=0) / usual + DISTANCE_WEIGHT * usual / usual.max()))
+    level = apart[0, steadiest] * [1.0, 0.0, 1.0]
+    size = float(np.linalg.norm(level))
+    if size < 1e-9:
+        return FIRST
+    sideways = level / size
+    forward = np.array([sideways[2], 0.0, -sideways[0]])
+    yaws = [_yaw(forward, sideways, angle) for angle in OBLIQUE]
+    scores = np.array([_distance(apart, yaw) for yaw in yaws])
+    return yaws[int(np.argmax(scores >= MIN_DISTANCE_RATIO * scores.max()))], FIRST_PITCH
+
+
+def _pairs(picture: Scene) -> NDArray[np.intp]:
+    """(k, 2) numbers of points on the left and their partners on the right that are drawn."""
+    drawn = {k for _, members in picture.segments for k in members}
+    number = {name: k for k, name in enumerate(picture.points) if k in drawn}
+    found = [
+        (k, number[partner])
+        for name, k in number.items()
+        if side(name) == "left" and (partner := name.replace("left", "right")) in number
+    ]
+    return np.array(found, dtype=np.intp).reshape(-1, 2)
+
+
+def _yaw(forward: Vector, sideways: Vector, angle: float) -> float:
+    """The yaw from which forward is to the right in the picture, turned by an angle."""
+    right = np.cos(angle) * forward + np.sin(angle) * sideways
+    return float(np.arctan2(right[2], right[0]))
+
+
+def _distance(apart: NDArray[np.float64], yaw: float) -> float:
+    """How far partners are apart across the picture, but for `QUANTILE` of the time [m]."""
+    across = np.abs(apart @ camera(yaw, FIRST_PITCH)[0])
+    return float(np.quantile(across, QUANTILE, axis=0).mean())
+
+
+def side(name: str) -> str:
+    """'left', 'right' or ''."""
+    words = name.replace(".", " ").split()
+    return next((word for word in ("left", "right") if word in words), "")
+
+
+def finite(value: float) -> float | None:
+    """A number JSON can hold, rounded to nine figures."""
+    return float(f"{value:.9g}") if np.isfinite(value) else None
+
+
+def packed(values: ArrayLike, step: float) -> dict[str, Any]:
+    """A series as whole multiples of `step`: the first, then differences; one number if it never changes."""
+    numbers = np.asarray(values, dtype=np.float64)
+    whole = np.rint(np.nan_to_num(numbers / step)).astype(np.int64)
+    constant = len(whole) > 0 and bool(np.all(whole == whole[0]))
+    return {"step": step, "d": [int(whole[0])] if constant else np.diff(whole, prepend=0).tolist()}
+
+
+def step_of(*series: ArrayLike) -> float:
+    """A round step that divides the common range of some series finely enough."""
+    both = np.concatenate([np.ravel(np.asarray(values, dtype=np.float64)) for values in series])
+    both = both[np.isfinite(both)]
+    span = float(np.max(np.abs(both), initial=0.0))
+    return float(f"{span / QUANTIZATION_STEPS:.1g}") if span > 0.0 else 1.0

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.constraints.machine import SEPARATOR
@@ -15,19 +16,17 @@ from mbd.results.ledger import SPENT
 from mbd.results.names import AXES
 from mbd.results.summary import facts
 from mbd.results.units import unit
-from mbd.view.geometry import geometry
+from mbd.view.geometry import finite, geometry, packed, side, step_of
 from mbd.view.instants import Instants
-from mbd.view.packing import finite, packed, side, step_of
 from mbd.view.plots import QUANTITIES, scale, stretches
 from mbd.view.scene import Scene, scene
 from mbd.view.style import CYCLE
 from mbd.view.template import filled, part, written
-from mbd.view.thinning import kept, motion
 
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["content", "write"]
+__all__ = ["content", "kept", "write"]
 
 MAX_FRAME_RATE = 60.0
 """Most pictures per second of run [1/s]."""
@@ -64,7 +63,7 @@ def html(run: Trajectory) -> str:
     if not picture.spatial or len(text) <= MAX_CHARACTERS:
         return text
     whole, tolerance = picture.instants, MIN_INTERPOLATION_ERROR
-    moving = np.hstack([motion(picture), CURVE_ERROR_RATIO * _curves(run, whole)])
+    moving = np.hstack([_motion(picture), CURVE_ERROR_RATIO * _curves(run, whole)])
     while len(text) > MAX_CHARACTERS and len(picture.instants.time) > LEAST:
         chosen = kept(whole.time, moving, tolerance)
         if len(chosen) < len(picture.instants.time):
@@ -223,3 +222,49 @@ def _chart(title: str, kind: str, lines: list[tuple[str, str, Any]]) -> dict[str
     step = step_of(*(values for _, _, values in lines))
     packs = [{"name": name, "color": shade, "values": packed(values, step)} for name, shade, values in lines]
     return {"title": title, "unit": kind, "series": packs}
+
+
+def _motion(picture: Scene) -> Matrix:
+    """All that a page interpolates, (F, k), over the size of the mechanism: places, and quaternions by half of it.
+
+    A page divides interpolated quaternions by their length, which stays on the rotations; what is missed there is at
+    most what the straight line misses here.
+    """
+    count, around = len(picture.instants.time), picture.around
+    places = [picture.positions.reshape(count, -1), *(solid.center for solid in picture.solids)]
+    places += [hinge.place for hinge in picture.hinges] + [each.center for each in around.rounds]
+    places += [deck.place for deck in around.decks] + [push.place for push in picture.pushes]
+    largest = max((float(np.max(np.abs(push.force))) for push in picture.pushes), default=0.0) or 1.0
+    turns = [solid.turn for solid in picture.solids] + [hinge.axis for hinge in picture.hinges]
+    turns += [wheel.spoke for wheel in around.wheels] + [deck.normal for deck in around.decks]
+    size = max(float(np.max(np.ptp(picture.positions, axis=1), initial=0.0)), 1e-9)
+    pushes = [push.force / (3.0 * largest) for push in picture.pushes]
+    return np.hstack([*(place / size for place in places), *(0.5 * turn for turn in turns), *pushes])
+
+
+def kept(time: NDArray[np.float64], moving: Matrix, tolerance: float) -> NDArray[np.int64]:
+    """Numbers of the pictures to keep, as few as go one after the other: ends, both sides of events, and others so that
+    straight lines between them miss no column by more than `tolerance`."""
+    last = len(time) - 1
+    held = np.zeros(last + 1, dtype=bool)
+    held[[0, last]] = True
+    twice = np.flatnonzero(np.diff(time) <= 0.0)
+    held[twice] = held[twice + 1] = True
+    ends = np.flatnonzero(held)
+    found = [0]
+    for stop in ends[1:]:
+        while found[-1] < stop:
+            found.append(_farthest(time, moving, found[-1], int(stop), tolerance))
+    return np.array(found)
+
+
+def _farthest(time: NDArray[np.float64], moving: Matrix, first: int, stop: int, tolerance: float) -> int:
+    """The last picture to which one straight line leads from the first."""
+    good = first + 1
+    for end in range(first + 2, min(stop, first + 60) + 1):  # most pictures that one interval stands for
+        share = (time[first + 1 : end] - time[first]) / (time[end] - time[first])
+        line = moving[first] + share[:, None] * (moving[end] - moving[first])
+        if float(np.max(np.abs(moving[first + 1 : end] - line))) > tolerance:
+            break
+        good = end
+    return good

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, Vector
 from mbd.bodies.ground import Ground
-from mbd.errors import ModelError
+from mbd.errors import MbdError, ModelError
 from mbd.results.at_state import instant
 from mbd.results.trajectory import Trajectory
+from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.view.camera import angles_of, camera
+from mbd.view.facets import MAX_FACET_EDGE, facets, shaded, size_of, surfaces
 from mbd.view.plots import drawing
-from mbd.view.posture_forces import draw_forces, with_forces
-from mbd.view.posture_in_space import draw_in_space
+from mbd.view.pushes import Push
 from mbd.view.scene import Scene, scene, upright
 from mbd.view.scenery import Wheel
-from mbd.view.style import INK, NEUTRAL, as_label, color, tone
+from mbd.view.style import FAINT, INK, NEUTRAL, PALE, as_label, color, tone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["drawn", "instant"]
+__all__ = ["draw_in_space", "drawn", "instant"]
+
+FORCE_COLOR = "#009E73"
 
 GROUND_COLOR = "#B9C0C9"
 
@@ -39,7 +43,7 @@ def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = 
     """The picture of a state; see `State.plot`."""
     rows = camera(*angles_of(view))
     run = instant(model, state)
-    picture = scene(with_forces(model, state) or run, 1)
+    picture = scene(_with_forces(model, state) or run, 1)
     if not picture.points:
         raise ModelError(f"'{run.name}' has no bodies to draw")
     rows = rows if picture.spatial else np.eye(3)
@@ -50,7 +54,7 @@ def drawn(model: Any, state: State, path: str | Path | None = None, view: Any = 
             _, _, size = _frame(axes, draw_in_space(axes, picture, rows))
         else:
             size = _draw_in_plane(axes, picture, places)
-        draw_forces(axes, picture, rows, size)
+        _draw_forces(axes, picture, rows, size)
         _pivots(axes, model, run, rows)
         _markers(axes, picture, places)
         axes.set_xlabel("[m]")
@@ -169,3 +173,104 @@ def _is_free(axes: Any, place: Any, letters: int, taken: list[tuple[float, float
         return False
     taken.append((float(left), float(right), float(y)))
     return True
+
+
+def _with_forces(model: Any, state: State) -> Trajectory | None:
+    """A run of one row, the state with the forces that act in it; None where none of a contact is known.
+
+    Contacts that are open push nothing. Of models with controllers, which would have to be called, no force is shown.
+    """
+    if not state.mode.closed or model.controllers:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = simulate(model, state, dt=1e-3, until=float(state.time))
+    except MbdError:
+        return None
+    return run if len(run) == 1 else None
+
+
+def _draw_forces(axes: Any, picture: Scene, rows: Matrix, size: float) -> None:
+    """Arrows from where contacts touch, in proportion; the largest is labelled [N].
+
+    rows : the camera; size : of the mechanism [m]
+    """
+    pushes = [push for push in picture.pushes if np.any(push.force[0])]
+    forces = [float(np.linalg.norm(push.force[0])) for push in pushes]
+    # the largest force, over the size of the mechanism
+    ends = [_arrow(axes, push, rows, size / (3.0 * max(forces))) for push in pushes]
+    if pushes:
+        text, end = f"{max(forces):.3g} N", ends[int(np.argmax(forces))]
+        axes.annotate(text, end, (4.0, 2.0), textcoords="offset points", color=tone(INK), fontsize=8.0, zorder=7)
+
+
+def _arrow(axes: Any, push: Push, rows: Matrix, scale: float) -> Vector:
+    """Where it ends in the picture."""
+    start = rows[:2] @ push.place[0]
+    end = start + scale * (rows[:2] @ push.force[0])
+    how = {
+        "arrowstyle": "-|>",
+        "color": tone(FORCE_COLOR),
+        "lw": 1.8,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+        "mutation_scale": 11.0,
+    }
+    axes.annotate("", end, start, arrowprops=how, zorder=7)
+    return np.asarray(end)
+
+
+def draw_in_space(axes: Any, picture: Scene, rows: Matrix) -> Matrix:
+    """Grounds, shadows and solids seen by a camera; gives corners of the solids in the picture (n, 2) [m]."""
+    from matplotlib.collections import PolyCollection
+
+    axes.grid(False)
+    found, size = facets(picture), size_of(picture)
+    for normal, at in _floors(picture, size):
+        _grid(axes, normal, at, found.corners, rows, size)
+    sheet = surfaces(picture)
+    for part, closed in ((sheet, False), (found, True)):
+        if part is None:
+            continue
+        places, tint = shaded(part, rows, MAX_FACET_EDGE * size, closed)
+        stack = PolyCollection(list(places), facecolors=tint, edgecolors=tint, linewidths=0.3, zorder=2)
+        stack.set_rasterized(True)
+        axes.add_collection(stack)
+    if sheet is not None:
+        for line in picture.around.sheets[0].lines[0, ::2]:
+            axes.plot(*(line @ rows[:2].T).T, color=tone(FAINT), lw=0.4, alpha=0.5, zorder=2.1)
+    return np.asarray(found.corners.reshape(-1, 3) @ rows[:2].T)
+
+
+def _floors(picture: Scene, size: float) -> list[tuple[Vector, Vector]]:
+    """Normal and a place below the mechanism of every plane; without any ground one below, for depth."""
+    around = picture.around
+    planes = [(ground.normal, ground.offset) for ground in picture.grounds]
+    planes += [(deck.normal[0], float(deck.normal[0] @ deck.place[0])) for deck in around.decks]
+    if not planes and not around.sheets:
+        low = float(facets(picture).corners[:, :, 1].min())
+        planes = [(np.array([0.0, 1.0, 0.0]), low - 0.12 * size)]
+    middle = picture.positions[0].mean(axis=0)
+    return [(normal, middle - (normal @ middle - offset) * normal) for normal, offset in planes]
+
+
+def _grid(axes: Any, normal: Vector, at: Vector, corners: Any, rows: Matrix, size: float) -> None:
+    """Lines on a plane around a place, and what is straight above as a shadow if the plane is seen from above."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    flat = normal[1] < 0.5
+    first = np.array([-normal[2], 0.0, normal[0]]) if flat else np.array([normal[1], -normal[0], 0.0])
+    first = first / np.linalg.norm(first)
+    second, half = np.cross(first, normal), 0.9 * size
+    marks = np.linspace(-half, half, 9)
+    ends = [(m * a - half * b, m * a + half * b) for a, b in ((first, second), (second, first)) for m in marks]
+    lines = [np.array([at + start, at + stop]) @ rows[:2].T for start, stop in ends]
+    axes.add_collection(LineCollection(lines, colors=tone(PALE), linewidths=0.8, zorder=0))
+    if normal[1] > 0.2 and normal @ rows[2] > 0.0:
+        below = corners.copy()
+        below[:, :, 1] = (normal @ at - corners[:, :, 0] * normal[0] - corners[:, :, 2] * normal[2]) / normal[1]
+        above = np.any(corners[:, :, 1] > below[:, :, 1], axis=1)
+        shade = PolyCollection(list(below[above] @ rows[:2].T), facecolors=tone(PALE), linewidths=0.0, zorder=1)
+        shade.set_rasterized(True)
+        axes.add_collection(shade)

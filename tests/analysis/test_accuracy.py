@@ -15,9 +15,8 @@ from mbd import cli
 from mbd.analysis.accuracy import Point, choices, points
 from mbd.analysis.accuracy.advice import advice, cheapest
 from mbd.analysis.accuracy.compare import aligned
-from mbd.analysis.accuracy.lab import with_orders
+from mbd.analysis.accuracy.lab import folds, retimed, with_orders
 from mbd.analysis.accuracy.reference import RungeKuttaReference
-from mbd.analysis.accuracy.timing import folds, retimed
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
 from mbd.view.accuracy import clear, frontier

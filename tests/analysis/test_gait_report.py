@@ -10,10 +10,9 @@ import pytest
 import mbd
 from mbd import cli
 from mbd.analysis.gait_report.curves import forces_at
-from mbd.analysis.gait_report.extremes import largest
-from mbd.analysis.gait_report.measures import Measure
+from mbd.analysis.gait_report.measures import Measure, largest
+from mbd.analysis.gait_report.report import symmetry_of
 from mbd.analysis.gait_report.strides import sides_of
-from mbd.analysis.gait_report.symmetry import symmetry_of
 from mbd.errors import ModelError, TrajectoryError, UnknownNameError
 from tests.simulation.mechanisms import falling, kneed_walker, kneed_walker_start
 

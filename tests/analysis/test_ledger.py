@@ -13,7 +13,7 @@ from scipy.integrate._ivp import dop853_coefficients as tableau
 
 import mbd
 from mbd.errors import ModelError
-from mbd.gait.energies import cost_of_transport, energy_by_cause
+from mbd.gait.cycle import cost_of_transport, energy_by_cause
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
 from mbd.results.forces import Forces
@@ -338,7 +338,7 @@ def test_polynomials_of_degree_7_are_integrated_exactly_on_uneven_rows(with_rate
     shape = np.polynomial.Polynomial(rng.normal(size=8), domain=[0.0, time[-1]])
     jump = np.arange(len(time)) >= len(first)
     values = shape(time) + 5.0 * jump
-    work = cumulative(time, values, shape.deriv()(time) if with_rates else None)
+    work = cumulative(time, [(values, shape.deriv()(time) if with_rates else None)])[0]
     exact = shape.integ()(time) - shape.integ()(0.0) + 5.0 * jump * (time - first[-1])
     np.testing.assert_allclose(work, exact, rtol=1e-10, atol=1e-10)
 
@@ -346,13 +346,13 @@ def test_polynomials_of_degree_7_are_integrated_exactly_on_uneven_rows(with_rate
 def test_a_tiny_step_beside_full_ones_does_no_harm():
     """A row at the instant of an event may be any distance from the next."""
     time = np.sort(np.concatenate([np.linspace(0.0, 2.0, 41), [0.5 + 1e-9, 1.0 - 1e-13, 1.23456]]))
-    work = cumulative(time, np.exp(-time), -np.exp(-time))
+    work = cumulative(time, [(np.exp(-time), -np.exp(-time))])[0]
     np.testing.assert_allclose(work, 1.0 - np.exp(-time), atol=1e-9)
 
 
 def test_nothing_is_integrated_without_an_interval():
-    assert cumulative(np.zeros(0), np.zeros(0)).shape == (0,)
-    assert cumulative(np.zeros(2), np.ones(2)).tolist() == [0.0, 0.0]
+    assert cumulative(np.zeros(0), [(np.zeros(0), None)])[0].shape == (0,)
+    assert cumulative(np.zeros(2), [(np.ones(2), None)])[0].tolist() == [0.0, 0.0]
 
 
 def blocks(count: int, friction: float):

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 import mbd
-from mbd.analysis.sweep_file import SweepFile
+from mbd.analysis.sweep import SweepFile
 from tests.simulation.mechanisms import G, falling
 
 RANGE = st.tuples(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6)).map(lambda pair: (pair[0], pair[0] + pair[1]))
@@ -107,7 +107,7 @@ def test_a_sweep_goes_on_from_its_file_and_makes_no_run_twice(tmp_path, monkeypa
 
 SCRIPT = """
 import os
-from mbd.analysis.sweep_file import SweepFile
+from mbd.analysis.sweep import SweepFile
 from tests.analysis.test_sweep_designs import swept
 keep, done = SweepFile.keep, []
 def killed(self, case, row):

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 
 from mbd.equations.cost import operations
-from mbd.equations.factoring import factored
+from mbd.equations.tangents import factored
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape
 from tests.equations.numbers import at

@@ -87,7 +87,7 @@ def test_a_study_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     assert len(lines) == 5
     path.write_bytes(b"".join(lines[:3]) + lines[3][:50])  # in the midst of a line
     made = []
-    monkeypatch.setattr("mbd.gait.basin.store.Store.keep", _counted(made))
+    monkeypatch.setattr("mbd.gait.basin.basin.Store.keep", _counted(made))
     study.cache_clear()
     assert same(study(10, file=path), found)
     assert made == [200, 300]
@@ -157,7 +157,7 @@ def test_an_interrupted_study_keeps_what_is_decided_in_its_file_too(monkeypatch,
 
 
 def _counted(made):
-    from mbd.gait.basin.store import Store
+    from mbd.gait.basin.basin import Store
 
     keep = Store.keep
 

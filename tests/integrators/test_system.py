@@ -17,7 +17,7 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State
-from mbd.testing.order import observed_order
+from mbd.testing.integrators import observed_order
 from mbd.testing.problems import PROBLEMS, problem
 from tests.instances import INTEGRATORS
 from tests.integrators.own import ProjectedMidpoint

@@ -194,7 +194,7 @@ def test_the_friction_of_a_pin_in_space_is_that_in_the_plane():
 
 
 def test_results_have_units_and_words_and_their_own_axes_in_tables():
-    from mbd.results.long_names import long_name
+    from mbd.results.tables import long_name
     from mbd.results.units import unit
 
     run = flown()

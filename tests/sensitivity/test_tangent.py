@@ -13,8 +13,8 @@ from mbd.kernel.algebra import linear
 from mbd.kernel.build import object_of
 from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.derivative import final_state_derivative
+from mbd.sensitivity.tangent.build import own_rules
 from mbd.sensitivity.tangent.printer import LANES, tangent_text
-from mbd.sensitivity.tangent.rules import own_rules
 from mbd.sensitivity.tangent_run import TangentRun
 from mbd.simulation.interrupted import stopped
 from mbd.testing.mechanisms import random_scene

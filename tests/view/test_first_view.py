@@ -5,7 +5,7 @@ import pytest
 
 import mbd
 from mbd.view.camera import FIRST, camera
-from mbd.view.first_view import first_view
+from mbd.view.geometry import first_view
 from mbd.view.page import content
 from mbd.view.scene import scene
 

@@ -16,10 +16,10 @@ import mbd
 from mbd.view import page as pages
 from mbd.view.camera import FIRST, VIEWS, angles_of, camera
 from mbd.view.forms import equal_inertia, mesh
+from mbd.view.page import kept
 from mbd.view.posture import instant
 from mbd.view.scene import scene
 from mbd.view.solids import quaternions, rotations
-from mbd.view.thinning import kept
 from tests.view.test_page import CHROMIUM, Elements, unpacked
 
 ANGLE = st.floats(-3.2, 3.2)

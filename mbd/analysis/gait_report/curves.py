@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mbd.analysis.gait_report.moments import Moments
 from mbd.analysis.gait_report.strides import Side, base_name, of_side
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
@@ -16,7 +15,9 @@ from mbd.equal import EQUAL_RTOL
 from mbd.results.interpolation import Side as When
 
 if TYPE_CHECKING:
+    from mbd.results.columns import ModelColumns
     from mbd.results.trajectory import Trajectory
+    from mbd.tape.node import Node
 
 __all__ = ["PERCENT", "Curve", "angles_of", "curves_of", "forces_at", "grips_of"]
 
@@ -53,7 +54,7 @@ def curves_of(run: Trajectory, sides: Sequence[Side], mass: float | None) -> lis
     """All curves of all sides; moments, powers and forces over the mass where it is given."""
     angles = {side.name: angles_of(run, side.name) for side in sides}
     joints = [angle.coordinate for own in angles.values() for angle in own if angle.coordinate]
-    moments = Moments(run, joints)
+    moments = _Moments(run, joints)
     per = "" if mass is None else "/kg"
     scale = 1.0 if mass is None else 1.0 / mass
     found = []
@@ -114,7 +115,7 @@ def _as_in_the_clinic(run: Trajectory, angle: _Angle) -> _Angle:
     return angle._replace(shown=-1.0) if bends else angle
 
 
-def _sampled(run: Trajectory, side: Side, angles: Sequence[_Angle], moments: Moments) -> list[dict[str, Vector]]:
+def _sampled(run: Trajectory, side: Side, angles: Sequence[_Angle], moments: _Moments) -> list[dict[str, Vector]]:
     """What the curves of a side are made of, over each of its strides."""
     # every stride ends just before the strike that ends it
     shares = np.append(PERCENT[:-1] / 100.0, 1.0 - 1e-9)
@@ -159,3 +160,37 @@ def _curve(
 ) -> Curve:
     values: Matrix = scale * np.array([each[key] for each in samples])
     return Curve(side.name, subject, quantity, unit, np.mean(values, axis=0), np.std(values, axis=0))
+
+
+class _Moments:
+    """``τ_k = −Σ f_k − Σ λ ∂h/∂q_k`` over losses, springs, motors, stops and locks: what muscles would do in a body.
+
+    This is what inverse dynamics finds from motion and ground reaction. Impacts, whose moments are without bound, are
+    not in it. Joints that close a loop have no coordinate, and so no moment here.
+
+    Parameters
+    ----------
+    run : a trajectory with its model
+    coordinates : names of the joints' coordinates, such as 'left knee.angle'
+    """
+
+    def __init__(self, run: Trajectory, coordinates: Sequence[str]) -> None:
+        self._columns: ModelColumns | None = run.columns.between_rows
+        self._nodes: dict[str, Node] = {}
+        if self._columns is None:
+            return
+        known = [name for name in coordinates if self._columns.knows(f"{name}.net_moment")]
+        self._nodes = {name: self._columns.node(f"{name}.net_moment") for name in known}
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """The coordinates that have one."""
+        return tuple(self._nodes)
+
+    def at(self, run: Trajectory, times: Vector) -> Mapping[str, Vector]:
+        """τ at some times, just after events [N m]."""
+        if self._columns is None or not self._nodes:
+            return {}
+        columns = self._columns
+        rows = columns.between(columns.grid.places(times, "right"))
+        return dict(zip(self._nodes, columns.evaluate(list(self._nodes.values()), rows), strict=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -12,10 +12,9 @@ from mbd.analysis.gait_report.band import NormativeBand
 from mbd.analysis.gait_report.curves import PERCENT, Curve, curves_of
 from mbd.analysis.gait_report.measures import NO_SIDE, Measure, Spent, energy_of, measures_of
 from mbd.analysis.gait_report.strides import Side, sides_of, words_of
-from mbd.analysis.gait_report.symmetry import symmetry_of
-from mbd.bodies.values import names_of, number, printable
+from mbd.bodies.values import among, names_of, number, printable
 from mbd.dataclass import dataclass
-from mbd.errors import ModelError
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.later import later
 from mbd.notebook import table
 from mbd.results.archive import named_file, write_whole
@@ -27,7 +26,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-__all__ = ["GaitReport", "Walk", "gait_report"]
+__all__ = ["GaitReport", "Walk", "gait_report", "symmetry_of"]
+
+Definition = tuple[str, Callable[[float, float], float]]
+
+DEFINITIONS: dict[str, Definition] = {
+    "Robinson": ("%", lambda s, p: 200.0 * abs(s - p) / (abs(s) + abs(p))),
+    "ratio": ("-", lambda s, p: p / s),
+    "STA": ("-", lambda s, p: (s - p) / (abs(s) + abs(p))),
+}
+"""Unit and value of each definition, from the values x_s, x_p of the first and the second side.
+
+Robinson: ``2 |x_s − x_p|/(|x_s| + |x_p|) · 100 %``, 0 where they are alike, 200 where one is zero or of the other
+sign; of positive numbers the index as published (R. O. Robinson, W. Herzog & B. M. Nigg, Use of
+force platform variables to quantify the effects of chiropractic manipulation on gait symmetry, J. Manipulative Physiol.
+Ther. 10 (1987) 172); ratio: ``x_p/x_s``, 1 where they are alike; STA: ``(x_s − x_p)/(|x_s| + |x_p|)``, with a sign.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,3 +344,14 @@ def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
         + "".join(cell.rjust(width + 2) for cell, width in zip(row[1:], widths[1:], strict=True))
         for row in rows
     ]
+
+
+def symmetry_of(name: str) -> Definition:
+    """A definition by its name.
+
+    >>> symmetry_of("Robinson")[1](3.0, 1.0)
+    100.0
+    """
+    if not among(name, DEFINITIONS):
+        raise UnknownNameError("symmetry: " + nearest(name, DEFINITIONS, "definition", "There are"))
+    return DEFINITIONS[name]

@@ -6,13 +6,22 @@ import math
 from abc import ABC, abstractmethod
 from functools import cache, cached_property
 from itertools import pairwise
+from math import comb
 from typing import Any
 
-from mbd.forces.muscles.bezier import corner, curve
+import numpy as np
+
+from mbd.arrays import Vector
 from mbd.forces.samples import Samples
 from mbd.tape.functions import cosh, exp, log, minimum, sign, sinh, sqrt
 
 __all__ = ["CURVES", "Curves", "DeGrooteFregly", "Millard"]
+
+EXTENSION_LENGTH = 1.0
+"""Length of the straight pieces in the table before the first and after the last corner, which continue [-]."""
+
+Corner = tuple[Vector, Vector]
+"""Six control points each of x and y."""
 
 NEWTON_STEPS = 12
 """The same from rest with the velocity curve of Millard et al., for damping ≥ 0.01; 10 suffice for 0.1."""
@@ -132,14 +141,14 @@ class Millard(Curves):
         descending = (x2 + half + 0.5 * (x3 - x2 - half), 0.5, -1.0 / (x3 - x2 - 2.0 * half))
         ends = ((x0, 0.0, 0.0), (x3, 0.0, 0.0))
         line = (ends[0], steep, ascending, top, descending, ends[1])
-        return curve(*(corner(a, b, 1.0) for a, b in pairwise(line)))
+        return _curve(*(_corner(a, b, 1.0) for a, b in pairwise(line)))
 
     @cached_property
     def _passive(self) -> Samples:
         strain, low, stiffness = 0.7, 0.2, 2.0 / 0.7
         width = min(0.1 / stiffness, 0.1 * strain)
         foot = (1.0 + width, 0.5 * low * width, low)
-        return curve(corner((1.0, 0.0, 0.0), foot, 0.75), corner(foot, (1.0 + strain, 1.0, stiffness), 0.75))
+        return _curve(_corner((1.0, 0.0, 0.0), foot, 0.75), _corner(foot, (1.0 + strain, 1.0, stiffness), 0.75))
 
     @cached_property
     def _tendon(self) -> Samples:
@@ -150,16 +159,18 @@ class Millard(Curves):
         middle = (0.5 * toe - 1.0) / stiffness + 1.0 + strain
         slope = 0.5 * toe / (middle - foot)
         control = (foot + 0.5 * (middle - foot), 0.5 * slope * (middle - foot), slope)
-        return curve(corner((1.0, 0.0, 0.0), control, curviness), corner(control, (x_toe, toe, stiffness), curviness))
+        return _curve(
+            _corner((1.0, 0.0, 0.0), control, curviness), _corner(control, (x_toe, toe, stiffness), curviness)
+        )
 
     @cached_property
     def _speed(self) -> Samples:
         near_c, isometric, near_e, most = 0.25, 5.0, 0.15, 1.4
         line = ((-1.0, 0.0, 0.0), (-0.9, 0.05 * near_c, near_c), (0.0, 1.0, isometric))
         back = ((0.0, 1.0, isometric), (0.9, most - 0.05 * near_e, near_e), (1.0, most, 0.0))
-        return curve(
-            *(corner(a, b, 0.6) for a, b in pairwise(line)),
-            *(corner(a, b, 0.9) for a, b in pairwise(back)),
+        return _curve(
+            *(_corner(a, b, 0.6) for a, b in pairwise(line)),
+            *(_corner(a, b, 0.9) for a, b in pairwise(back)),
         )
 
     def active(self, length: Any) -> Any:
@@ -204,3 +215,46 @@ def _asinh(x: Any) -> Any:
 
 CURVES: dict[str, Curves] = {"de groote": DeGrooteFregly(), "millard": Millard()}
 """Curves by name."""
+
+
+def _corner(first: tuple[float, float, float], last: tuple[float, float, float], curviness: float) -> Corner:
+    """The quintic Bézier curve between two lines, each given as (x, y, slope).
+
+    The third control point lies where the lines meet; a curviness of 1 draws the curve into that corner, 0 makes it
+    nearly straight (M. Millard, T. Uchida, A. Seth and S. L. Delp, J. Biomech. Eng. 135 (2013) 021005, appendix).
+    """
+    (x0, y0, s0), (x1, y1, s1) = first, last
+    part = 0.1 + 0.8 * curviness
+    x = (y1 - y0 - x1 * s1 + x0 * s0) / (s0 - s1)
+    y = (x - x1) * s1 + y1
+    a, b = x0 + part * (x - x0), y0 + part * (y - y0)
+    c, d = x1 + part * (x - x1), y1 + part * (y - y1)
+    return np.array([x0, a, a, c, c, x1]), np.array([y0, b, b, d, d, y1])
+
+
+def _curve(*corners: Corner) -> Samples:
+    """Corners one after another, straight before the first and after the last, as one function of x."""
+    from scipy.interpolate import CubicSpline, PPoly
+
+    u = np.linspace(0.0, 1.0, 101)  # intervals of the spline through one corner, which leave errors of some 1e-8
+    x, y, before, after = [], [], 0.0, 0.0
+    for k, (across, up) in enumerate(corners):
+        last = slice(None) if k == len(corners) - 1 else slice(-1)
+        x.append(_bernstein(across, u)[last])
+        y.append(_bernstein(up, u)[last])
+        slope = np.diff(up[[0, 1, -2, -1]])[[0, 2]] / np.diff(across[[0, 1, -2, -1]])[[0, 2]]
+        before, after = (slope[0] if k == 0 else before), slope[1]
+    xs, ys = np.concatenate(x), np.concatenate(y)
+    ends: Any = ((1, before), (1, after))
+    inside = CubicSpline(xs, ys, bc_type=ends)
+    first, last_one = [0.0, 0.0, before, ys[0] - EXTENSION_LENGTH * before], [0.0, 0.0, after, ys[-1]]
+    table = np.concatenate([np.array([first]).T, inside.c, np.array([last_one]).T], axis=1)
+    made: Any = Samples.of(
+        PPoly(table, np.concatenate([[xs[0] - EXTENSION_LENGTH], xs, [xs[-1] + EXTENSION_LENGTH]])), "curve"
+    )
+    return made  # type: ignore[no-any-return]
+
+
+def _bernstein(points: Vector, u: Vector) -> Vector:
+    n = len(points) - 1
+    return np.asarray(sum(comb(n, i) * u**i * (1.0 - u) ** (n - i) * points[i] for i in range(n + 1)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -15,17 +16,17 @@ from mbd.arrays import Vector
 from mbd.bodies.values import flag, is_finite_number, named_number_faults, shown
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.gait.basin.axes import Grid, grid_of, study_of
-from mbd.gait.basin.kinds import NUMBER
+from mbd.gait.basin.kinds import LETTERS, NUMBER
 from mbd.gait.basin.made import Made
 from mbd.gait.basin.result import Basin
-from mbd.gait.basin.store import Store, digest_of
 from mbd.gait.basin.walks import Decided, Numbers
 from mbd.gait.cycle import LimitCycle
 from mbd.progress import share_bar
 from mbd.results.identity import identity, identity_of_model
+from mbd.results.study_file import StudyFile
 from mbd.simulation.batch.batch import worker_count
 
-__all__ = ["basin"]
+__all__ = ["Store", "basin"]
 
 STATE = ("q", "v", "z", "anchors")
 """What a state of a gait is made of, which starts have where axes do not name it."""
@@ -159,10 +160,10 @@ def _head(made: Made, grid: Grid, steps: int) -> dict[str, Any]:
         "mirror": None if map_.mirror is None else list(map_.mirror.sides), "dt": map_.dt, "longest": map_.longest,
         "steps": steps, "axes": [list(names) for names in grid.dimensions], "shape": list(grid.shape),
         "parameters": {name: float(value) for name, value in made.base.items()}, "attractors": list(made.gaits),
-        "starts": digest_of(*grid.values.values(), *state.values(), *columns.values()),
+        "starts": _digest_of(*grid.values.values(), *state.values(), *columns.values()),
         "functions": identity(map_.functions, made.study.start),
-        "gaits": digest_of(*(getattr(each.state, part) for each in made.gaits.values() for part in STATE)),
-        "values": digest_of([float(v) for v in getattr(map_.model, "parameters", {}).values()]),
+        "gaits": _digest_of(*(getattr(each.state, part) for each in made.gaits.values() for part in STATE)),
+        "values": _digest_of([float(v) for v in getattr(map_.model, "parameters", {}).values()]),
     }  # fmt: skip
 
 
@@ -197,3 +198,48 @@ def _decide(made: Made, first: int, left: Numbers, steps: int, block: Decided, s
             waiting = np.flatnonzero(block.kind == NUMBER["not decided"])
         if store is not None:
             store.keep(first, block, waiting)
+
+
+# A file of blocks of starts that are decided.
+#
+# Each has its first number, a letter for the kind of each start (`mbd.gait.basin.kinds`), attractors, steps and times;
+# one that Ctrl-C has cut short also the places of the starts that are left.
+
+
+def _digest_of(*arrays: Any) -> str:
+    """Of numbers, to tell one study from another."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(np.ascontiguousarray(array, dtype=float).tobytes())
+    return found.hexdigest()[:24]
+
+
+class Store:
+    """The blocks that a file holds, and the file, to which more are added.
+
+    Raises
+    ------
+    ModelError
+        for a file that is none of a basin, and one of another basin, by what differs.
+    """
+
+    def __init__(self, path: Any, head: Mapping[str, Any]) -> None:
+        self.file = StudyFile(path, "basin", head)
+        self._blocks = {line["first"]: line for line in self.file.parts}
+
+    def fill(self, first: int, block: Decided) -> Numbers:
+        """Note what became of a block of starts as far as the file has it; the places of those that are left."""
+        line = self._blocks.get(first)
+        if line is None or len(line["kinds"]) != len(block.kind):
+            return np.arange(len(block.kind))
+        block.kind[:] = [LETTERS.index(letter) for letter in line["kinds"]]
+        block.attractor[:], block.steps[:], block.time[:] = line["attractors"], line["steps"], line["times"]
+        return np.array(line.get("left", []), dtype=np.int64)
+
+    def keep(self, first: int, block: Decided, left: Numbers) -> None:
+        """Add a block that is decided but for the starts at the places `left`."""
+        self.file.add({
+            "first": first, "kinds": "".join(LETTERS[kind] for kind in block.kind.tolist()),
+            "attractors": block.attractor.tolist(), "steps": block.steps.tolist(), "times": block.time.tolist(),
+            **({"left": left.tolist()} if len(left) else {}),
+        })  # fmt: skip

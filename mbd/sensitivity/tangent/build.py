@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,24 @@ from mbd.free_memory import no_collection
 from mbd.kernel import build
 from mbd.kernel.schemes import contract
 from mbd.kernel.translation.translate import Source, functions_of, translate
-from mbd.sensitivity.tangent import printer
+from mbd.sensitivity.tangent import (
+    follow_accelerations,
+    follow_candidates,
+    follow_impacts,
+    follow_newmark,
+    follow_stages,
+    printer,
+    words,
+)
 from mbd.sensitivity.tangent.interpreted import Table, interpreted
 from mbd.sensitivity.tangent.printer import tangent_text
-from mbd.sensitivity.tangent.rules import FILES, own_rules
 from mbd.trees.tree import Function
 
-__all__ = ["entry", "keep_optimized", "plain_entry"]
+__all__ = ["entry", "keep_optimized", "own_rules", "plain_entry"]
+
+PARTS = (words, follow_candidates, follow_newmark, follow_accelerations, follow_stages, follow_impacts)
+FILES = tuple(Path(str(part.__file__)) for part in PARTS)
+"""Where they stand."""
 
 ENTRY = "mbd_tangent_kernel"
 HELD = (
@@ -117,3 +129,21 @@ def _trees() -> list[Function]:
     own = Source("hooks", functions_of(dispatched), {**names, "advance": advance})
     instead = {"mbd.kernel.hooks": own, **own_rules()}
     return translate(own, "advance", ["kernel"], build.APART, instead)
+
+
+# Rules of the tangent pass that are more than arithmetic, in place of `mbd.kernel.tangent_rules`.
+#
+# Steps are tried, judged and located by values alone. The candidate that is accepted, or that an event takes over, is
+# taken once more for its derivatives, at values that are known: explicit formulas operation by operation, implicit ones
+# by the implicit function theorem, ``J δz = −δr`` at the solution z of ``r(z) = 0`` with one factorization of J
+# (Griewank & Walther 2008, Evaluating Derivatives, ch. 15). Values stay those of the run to the bit.
+
+
+def own_rules() -> Mapping[str, Source]:
+    """The rules as one source, whose functions are ``rules.…``, by the names of the modules that it stands for."""
+    functions, names = dict[str, Any](), dict[str, Any]()
+    for part in PARTS:
+        functions |= functions_of(inspect.getsource(part))
+        names |= vars(part)
+    found = Source("rules", functions, names)
+    return dict.fromkeys(["mbd.kernel.tangent_rules", *(part.__name__ for part in PARTS)], found)

@@ -16,12 +16,10 @@ from mbd.equations.equations import Contact
 from mbd.kernel.codes import PULL
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
-from mbd.simulation.diagnostics.coarse import coarse_steps
+from mbd.simulation.diagnostics.coarse import coarse_steps, percent
 from mbd.simulation.diagnostics.fastest import fastest, resolving_dt, sane_rows
-from mbd.simulation.diagnostics.half_turns import half_turns
 from mbd.simulation.diagnostics.idle_modes import idle_modes
 from mbd.simulation.diagnostics.impact_step import dt_of_impacts
-from mbd.simulation.diagnostics.position_level import position_level_multipliers
 from mbd.simulation.diagnostics.redundant import readers_of, redundancy
 from mbd.simulation.diagnostics.singular import singular_start
 from mbd.simulation.diagnostics.stiff import bounded_by_stability
@@ -31,6 +29,11 @@ from mbd.simulation.run.stored import record_of
 from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE, doubts
 
 __all__ = ["Note", "notes_of"]
+
+FIRST_ROWS = 16
+"""Rows after the start whose multipliers are compared with the balance of forces."""
+MAX_SHARE = 0.02
+"""Difference from the balance, over the largest multiplier of the run, above which a run says so [-]."""
 
 Note: TypeAlias = str | Callable[[], list[str]]
 """A sentence, or what finds sentences when somebody reads them, after the run's arrays serve another run."""
@@ -133,8 +136,8 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     columns = ModelColumns(record, equations)
     notes += idle_modes(run, record, columns)
     if getattr(run.integrator, "formulation", "") == "index3":
-        notes.append(partial(position_level_multipliers, record, columns))  # which takes longer than a short run
-    turned = half_turns(columns)
+        notes.append(partial(_position_level_multipliers, record, columns))  # which takes longer than a short run
+    turned = _half_turns(columns)
     notes, doubts = [*notes, *turned], doubts + turned
     for number, contact in enumerate(run.manager.contacts):
         short, blind = _short_touch(run, record, number, contact)
@@ -325,3 +328,68 @@ def _halved(run: RunData, contact: Contact, row: int) -> float:
     k = int(slow[0])
     share = (rate[k - 1] - 0.5 * rate[0]) / (rate[k - 1] - rate[k])
     return float(table[k - 1, 0] - table[0, 0] + share * (table[k, 0] - table[k - 1, 0]))
+
+
+def _half_turns(columns: ModelColumns) -> list[str]:
+    """A doubt on each spring of a rotation vector (`Spherical`, `Bushing`) that came beyond half a turn.
+
+    ``V = ½ k θ²`` has a kink at θ = π, where there are two shortest ways back; a step across it loses its accuracy.
+    """
+    found = []
+    if len(columns.record.time) < 2:
+        return []
+    for spring, names in _rotation_vectors(columns):
+        vectors = np.column_stack(columns.at_rows(names))
+        jumped = np.linalg.norm(np.diff(vectors, axis=0), axis=1) > np.pi
+        if jumped.any():
+            time = columns.record.time[int(np.argmax(jumped)) + 1]
+            found.append(
+                f"{spring!r} was turned beyond half a turn at t = {time:.6g} s, where its torque jumps from "
+                "one way back to the other within a step: energy is not kept there; give it a stop like mbd.cone, "
+                "or a law that is smooth there, such as an mbd.Potential of the parts of the quaternion"
+            )
+    return found
+
+
+def _rotation_vectors(columns: ModelColumns) -> list[tuple[str, list[str]]]:
+    """Springs with the names of the parts of their rotation vectors, which are looked for once."""
+    memory = columns.equations.memory
+    if "rotation vectors" not in memory:
+        stems = [
+            (effect.name, stem) for effect in columns.equations.effects if effect.potential is not None
+            for stem in dict.fromkeys((effect.name, effect.name.removesuffix(" spring")))
+        ]  # fmt: skip
+        named = [(spring, [f"{stem}.rotation_vector.{axis}" for axis in "xyz"]) for spring, stem in stems]
+        memory["rotation vectors"] = [pair for pair in named if all(map(columns.knows, pair[1]))]
+    found: list[tuple[str, list[str]]] = memory["rotation vectors"]
+    return found
+
+
+def _position_level_multipliers(record: Record, columns: ModelColumns) -> list[str]:
+    """The note of index 3 on rows whose multipliers differ from what the balance of forces has at the same state.
+
+    A scheme of order 2 that holds ``h(q₁) = 0`` alone takes the error of its own position formula, O(dt³), for an
+    acceleration: multipliers err by O(dt) in the first steps after a start or an event (Arnold, Brüls, Cardona 2015,
+    Numerische Mathematik 129, 149-179).
+    """
+    if len(record.time) < 3:
+        return []
+    rows = columns.rows.part(np.arange(1, min(FIRST_ROWS, len(record.time))))
+    solved = columns.balance.solve(rows)
+    known = solved.sound & solved.unique
+    off = np.max(np.abs(rows.lam - solved.lam)[known], axis=0, initial=0.0)
+    share = off / np.maximum(np.max(np.abs(record.lam), axis=0, initial=0.0), 1e-300)
+    worst = [
+        k
+        for k, row in enumerate(columns.equations.rows)
+        if not row.is_velocity and row.friction < 0 and share[k] > MAX_SHARE
+    ]
+    if not worst:
+        return []
+    k = max(worst, key=lambda k: float(share[k]))
+    row = columns.equations.rows[k]
+    return [
+        f"multipliers of the first steps are off, of {row.owner!r} by {percent(float(share[k]))} % of its largest: "
+        "index 3 has them with an error of first order in dt after the start and each event, until its damping has "
+        "taken that away; formulation='ggl' has them with order 2"
+    ]

@@ -20,11 +20,11 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
+from mbd.results.stored_states import counted, function_of
 from mbd.simulation.run.boundaries import WINDOW_STEPS, Boundaries
 from mbd.simulation.run.event_log import EventLog
 from mbd.simulation.run.idle import stepper_of
 from mbd.simulation.run.stepper import Stepper, is_compiled
-from mbd.simulation.run.whole_turns import TurnCounter
 from mbd.state import State
 
 __all__ = ["EnergyFindings", "RoomFindings", "RunData", "Savepoint"]
@@ -154,7 +154,7 @@ class RunData:
         self.energy = EnergyFindings()
         self.room = RoomFindings()
         controllers = getattr(model, "controllers", ())
-        self.turns = TurnCounter()
+        self.turns = _TurnCounter()
         self.integrator = integrator
         self.boundaries = Boundaries(controllers, start.time, dt, end)
         self.begins_behind_jump = False
@@ -303,3 +303,39 @@ def _first_table(rows: int, width: int) -> Matrix:
             if rows < 1024:
                 raise
             rows //= 4
+
+
+class _TurnCounter:
+    """Counts the turns made since a stored row, whenever a state is asked for; see `mbd.results.stored_states`."""
+
+    def __init__(self) -> None:
+        self._row = 0
+        self._turns = self._first = np.zeros(0)
+
+    def count(self, mechanism: Mechanism, v: Kernel, stored: int, table: Matrix) -> None:
+        """Write the turns of the accepted state into the anchors of a run that has stored these rows."""
+        wrapped = mechanism.equations.wrapped
+        waiting = int(v.n_stored)
+        if not wrapped or stored + waiting == 0:
+            return
+        anchors = [turn.anchor for turn in wrapped]
+        if not len(self._first):
+            self._first = v.anchors[anchors].copy()
+        if stored <= self._row or not len(self._turns):  # none yet, or the run went back
+            self._row, self._turns = 0, self._first
+        n_q, n_v = v.n_q, v.n_v
+        now = np.concatenate([[float(v.time)], v.q[:n_q], v.y[:n_v]])
+        width = len(now)
+        fresh = v.store.reshape(-1, v.width)[:waiting, :width]
+        rows = np.vstack([table[self._row : stored, :width], fresh, now])
+        inputs = {
+            "t": rows[:, 0], "q": rows[:, 1 : 1 + n_q], "v": rows[:, 1 + n_q :],
+            "anchor": np.tile(v.anchors[: v.n_anchors], (len(rows), 1)),
+        }  # fmt: skip
+        inputs["anchor"][:, anchors] = self._turns
+        found = mechanism.kept(function_of, lambda: function_of(wrapped))(inputs, v.params)
+        turns = np.array([counted(rows[:, 0], *found[2 * k : 2 * k + 2]) for k in range(len(wrapped))])
+        v.anchors[anchors] = self._turns + turns[:, -1]
+        if stored > self._row:
+            self._turns = self._turns + turns[:, stored - 1 - self._row]
+            self._row = stored - 1

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector, read_only
-from mbd.compile.mechanism import Mechanism
+from mbd.compile.mechanism import AccelerationTerms, Mechanism
 from mbd.equal import DIRECT_PIVOT_RTOL
-from mbd.equations.equations import Equations
+from mbd.equations.equations import Equations, Row
 from mbd.equations.programs import ActiveSet, follows_multipliers, mass_matrix
 from mbd.errors import SimulationError
 from mbd.integrators.base import Integrator, Point, StepReport, StepResult, System, Terms
+from mbd.kernel.algebra.redundancy import JOINT_SHARE, MIN_LIMIT_SHARE
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, TOO_NEAR
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.memory import start_step
 from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, fill_block, refresh_scales, take_consistent
-from mbd.simulation.run.shared_loads import shares
 from mbd.simulation.run.user_calls import call_user
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
-__all__ = ["MechanismSystem", "PlainScheme", "loads_act", "row_units", "unit_blocks"]
+__all__ = ["MechanismSystem", "PlainScheme", "loads_act", "row_units", "shares", "unit_blocks"]
 
 
 def loads_act(equations: Equations) -> bool:
@@ -360,3 +360,29 @@ class PlainScheme:
         K.slope[:] = (K.rate1 - K.rate) / h
         K.lam_slope[:] = (K.lam1 - K.lam) / h
         K.q[:], K.y[:], K.rate[:], K.aux[:], K.lam[:] = K.q1, K.y1, K.rate1, K.aux1, K.lam1
+
+
+def shares(rows: Sequence[Row], terms: AccelerationTerms, kept: Sequence[int], dependent: Sequence[int]) -> Matrix:
+    """S (d, k) of ``λ_d = S λ_kept``, the multipliers of least norm: ``S = W_d C W_kept⁻¹`` with ``B_d = C B_kept``.
+
+    W is that of `mbd.kernel.algebra.redundancy.share`: of joints far above 1, of contacts 1, or the limit of the
+    friction that holds a row over the largest of all.
+
+    Parameters
+    ----------
+    rows : all rows of the equations
+    terms : B and the limits of the frictions at the present multipliers
+    kept, dependent : numbers of the rows that are solved with and of those that depend on them
+    """
+    weights = np.array([_weight(row, terms.limits) for row in rows])
+    dependence = np.linalg.lstsq(terms.B[list(kept)].T, terms.B[list(dependent)].T)[0].T
+    return np.asarray(weights[list(dependent)][:, None] * dependence / weights[list(kept)])
+
+
+def _weight(row: Row, limits: Vector) -> float:
+    largest = float(np.max(limits, initial=0.0))
+    if row.friction < 0 and row.contact < 0:
+        return JOINT_SHARE
+    if row.friction < 0 or largest == 0.0:
+        return 1.0
+    return float(max(limits[row.friction] / largest, MIN_LIMIT_SHARE))
