@@ -25,11 +25,9 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.integrators import Integrator
 from mbd.notebook import table
 from mbd.progress import share_bar
-from mbd.results.archive import named_file, write_whole
 from mbd.results.identity import identity, identity_of_model
 from mbd.results.names import scalars
 from mbd.results.study_file import StudyFile
-from mbd.results.tables import text_cell
 from mbd.results.titled import Titled
 from mbd.simulation.simulate import simulate
 from mbd.state import State
@@ -106,21 +104,6 @@ class Sweep(Titled):
     def _attributes(self, title: str) -> dict[str, str]:
         """What xarray notes of a column."""
         return {"units": self.units[title]} if self.units.get(title) else {}
-
-    def to_csv(self, path: str | Path) -> Path:
-        """Write the table with a line for each run."""
-        import csv
-
-        path = named_file(path)
-
-        def fill(partial: Path) -> None:
-            with partial.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                writer.writerow(map(text_cell, self.columns))
-                writer.writerows(map(text_cell, row) for row in zip(*self.columns.values(), strict=True))
-
-        write_whole(path, fill)
-        return path
 
     def __repr__(self) -> str:
         return "\n".join(self._lines())

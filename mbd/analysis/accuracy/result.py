@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from mbd.analysis.accuracy.advice import advice
 from mbd.analysis.accuracy.points import Point
 from mbd.analysis.accuracy.published import Published
-from mbd.analysis.rows import Rows
 from mbd.dataclass import dataclass
 from mbd.later import later
 from mbd.notebook import paragraphs, table
+from mbd.results.titled import Tabular, by_title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +37,7 @@ MAPPINGS = ("errors", "end_errors")
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy(Rows):
+class Accuracy(Tabular):
     """Errors and costs of schemes with steps and tolerances.
 
     Attributes
@@ -125,6 +125,11 @@ class Accuracy(Rows):
                 row[f"error at the end of {name}"] = point.end_errors.get(name)
             found.append(row)
         return found
+
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        """The same by title."""
+        return by_title(self.rows())
 
     # pictures -------------------------------------------------------------------------------------------------------
     def plot(self, path: str | Path | None = None) -> Figure:

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbd.analysis.effects.contribution import Contribution, Together
-from mbd.analysis.rows import Rows
 from mbd.dataclass import dataclass
 from mbd.errors import UnknownNameError, nearest
 from mbd.later import later
 from mbd.notebook import folded, paragraphs, table
+from mbd.results.titled import Tabular, by_title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ WHEN = {"always": "", "while closed": "*", "while sliding": "†"}
 
 
 @dataclass(frozen=True, eq=False)
-class Effects(Rows):
+class Effects(Tabular):
     """What each effect of a scene costs, carries and changes.
 
     Attributes
@@ -134,6 +134,11 @@ class Effects(Rows):
             }  # fmt: skip
             found.append(row | {f"change of {name}": change.outputs.get(name) for name in self.outputs})
         return found
+
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        """The same by title."""
+        return by_title(self.rows())
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Bars: share of the energy, change without it, operations and time.
