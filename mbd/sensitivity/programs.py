@@ -4,8 +4,8 @@ Each program lists values and, row by row, those of their derivatives by the col
 
     x (n_v) | v, z (n) | v̇, ż (n) | λ (R) | t | anchors | chosen parameters
 
-that are not always zero. Where coordinates do not add, x is the increment from the q of the block
-(`mbd.sensitivity.charts`).
+that are not always zero. Where coordinates do not add, x is the increment from the q of the
+block (`_chart_columns`).
 
 =============  =============================================================================================
 `steps`        r (n), h (R), ḣ (R): the balance over all rows, penalties behind their switches, frictions behind slips
