@@ -294,7 +294,7 @@ def _jumps(columns: ModelColumns, total: Vector, driven: bool) -> list[Part]:
             impacts[name][row] -= loss
             left[row] += loss
     reset = _resets(columns.equations, record, len(left))
-    at_impacts = [*together, *(row for given in kicks.values() for row in np.flatnonzero(given))]
+    at_impacts = [*together, *(row for given in kicks.values() for row in np.flatnonzero(given).tolist())]
     beyond = np.zeros(len(left))
     beyond[at_impacts] = left[at_impacts]
     beyond[reset] = 0.0
