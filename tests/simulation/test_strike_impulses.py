@@ -90,9 +90,14 @@ def test_the_ledger_closes_where_rows_take_an_impulse(order):
 
 @pytest.mark.parametrize("order", ["before", "after"])
 def test_the_ledger_closes_where_friction_takes_a_part_of_an_impulse(order):
-    """A sledge on a belt is pressed down as a ball strikes; friction takes what that costs, and follows its load."""
+    """A sledge on a belt is pressed down as a ball strikes; friction takes what that costs, and follows its load.
+
+    Nothing of it is that of an impulse on a body apart.
+    """
     model = mbd.Model("pressed")
-    sledges = [mbd.PointMass(name, 1.0) for name in ("sledge", "ball")]
+    sledges, apart = [mbd.PointMass(name, 1.0) for name in ("sledge", "ball")], mbd.PointMass("apart", 1.0)
+    model.connect(mbd.Prismatic("apart", model.ground.origin, apart.origin))
+    model.constrain(mbd.Impulse("push", apart.origin, 1.0, "ball floor", direction=(1, 0), order=order))
     for sledge in sledges:
         model.connect(mbd.Translation(f"{sledge.name} place", model.ground.origin, sledge.origin))
         belt = mbd.touchdown(sledge.origin, mbd.Plane(velocity=(-1.0, 0.0)))
@@ -105,6 +110,7 @@ def test_the_ledger_closes_where_friction_takes_a_part_of_an_impulse(order):
     before = 2.0 - 0.3 * (9.81 * (end := run.events[-1].time) + 0.15 * (1.0 - math.cos(20.0 * end)))
     assert run.final["sledge place.x.rate"] == pytest.approx(before + gained, rel=1e-12)
     assert np.max(np.abs(run.energy.numerical)) < 1e-11
+    assert run.energy["push"][-1] == pytest.approx(0.5, rel=1e-12)
     between = run.at(0.5 * (run.time[:9] + run.time[1:10]))
     np.testing.assert_allclose(between["sledge floor.friction"], -0.3 * between["sledge floor.force"], rtol=1e-12)
 

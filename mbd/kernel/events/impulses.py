@@ -11,7 +11,7 @@ from mbd.kernel.codes import LOG_OPENED, LOG_PUSHED
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.contact.impact import impact
 from mbd.kernel.contact.impact_solve import loss_elsewhere
-from mbd.kernel.records import Contacts, Switching
+from mbd.kernel.records import Contacts, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate
 
 __all__ = ["AFTER", "BEFORE", "BESIDE", "is_followed_by_impulse", "push"]
@@ -54,16 +54,15 @@ def push(K: Switching, order: int) -> int:
     for j in range(K.n):
         K.pushed_from[j] = K.y[j]
         K.y[j] += K.jump[j]
-    # what closed contacts and other rows make of it, and what their friction takes of the work
+    # what closed contacts and other rows make of it; what their friction takes is that of those whose work they change
     taken = 0.0
-    for i in range(K.n_impulses):
-        taken -= work_of(K, i) if is_pushed(K, i, order) else 0.0
+    changed = 0.0
     if order != BESIDE:
         for c in range(K.n_contacts):
             K.pushed_closing[c] = K.closing[c]
             K.closing[c] = 0
         status = impact(K, False)
-        taken += loss_elsewhere(K)
+        taken = loss_elsewhere(K)
         for c in range(K.n_contacts):
             if status == 0 and K.kind[c] == 0 and K.closed[c] == 1 and K.active[c] == 0:
                 K.closed[c] = 0
@@ -73,17 +72,22 @@ def push(K: Switching, order: int) -> int:
             K.active[c] = 0
         if status != 0:
             return status
-    for i in range(K.n_impulses):
-        taken += work_of(K, i) if is_pushed(K, i, order) else 0.0
+        for i in range(K.n_impulses):
+            change = half_product(K, i, K.jump) if is_pushed(K, i, order) else 0.0
+            taken += change
+            changed += abs(change)
+    # P w · (v⁻ + v⁺)/2
     for i in range(K.n_impulses):
         if is_pushed(K, i, order):
-            log_event(K, LOG_PUSHED, i, taken / count - work_of(K, i), NO_IMPULSE)
+            work = half_product(K, i, K.pushed_from) + half_product(K, i, K.y)
+            part = abs(half_product(K, i, K.jump)) / changed if changed > 0.0 else 0.0
+            log_event(K, LOG_PUSHED, i, part * taken - work, NO_IMPULSE)
     return 0
 
 
-def work_of(K: Switching, i: int) -> float:
-    """Work of an impulse until now, P w · (v⁻ + v)/2."""
-    work = 0.0
+def half_product(K: Contacts, i: int, v: Reals) -> float:
+    """Half the product of impulse i and velocities: its work is the sum of two, of those before and after."""
+    product = 0.0
     for j in range(K.n_v):
-        work += 0.5 * K.pushes[i * K.n_v + j] * (K.pushed_from[j] + K.y[j])
-    return work
+        product += 0.5 * K.pushes[i * K.n_v + j] * v[j]
+    return product
