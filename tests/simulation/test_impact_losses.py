@@ -79,8 +79,11 @@ def test_no_stored_force_pulls_where_multipliers_of_index_3_ring():
 
 
 @cache
-def strut(space):
-    """A bar hangs from a pin and comes down on a foot, on its way to the vertical, at an angle of arccos 0.9."""
+def strut(space, beside=""):
+    """A bar hangs from a pin and comes down on a foot, on its way to the vertical, at an angle of arccos 0.9.
+
+    A ball falls beside it, which a thread may join to the bar.
+    """
     model = mbd.Model("strut")
     bar = mbd.RigidBody("bar", 2.0, (0.2, 0.25, 0.3) if space else 0.3)
     pin = mbd.Revolute("pin", model.ground.point(0.1, 0.9), bar.point(0.0, 0.4), axis=(0.6, 0.0, 0.8) if space else "z")
@@ -88,7 +91,28 @@ def strut(space):
     floor = mbd.Plane(normal=(0.0, 1.0, 0.0)) if space else None
     foot = mbd.touchdown(bar.point(0.0, -0.6), floor)
     model.constrain(mbd.Unilateral("foot", foot, restitution=0.5, friction=1.0))
+    if beside:
+        ball = mbd.PointMass("ball", 0.3)
+        model.connect(mbd.Translation("fall", model.ground.origin, ball.origin))
+        model.constrain(mbd.Unilateral("floor", mbd.touchdown(ball.origin), restitution=0.6))
+    if beside == "joined":
+        model.apply(mbd.Spring("thread", bar.origin, ball.origin, 1e-9))
     return model
+
+
+@pytest.mark.parametrize("beside", ["apart", "joined"])
+@pytest.mark.parametrize("law", ["newton", "poisson", "sequential"])
+def test_a_ball_beside_a_strut_that_jams_gets_nothing_of_its_work(law, beside):
+    given = {"position": {"pin.angle": 0.5}, "velocity": {"pin.rate": -2.0}}
+    how = {"dt": 1e-3, "until": 0.03, "impact": law}
+    alone = mbd.simulate(strut(False), mbd.assemble(strut(False), **given), mbd.RungeKutta853(), **how)
+    given["position"] = {"pin.angle": 0.5, "fall.x": 1.0, "fall.y": 0.5 * 9.81 * alone.events[0].time ** 2}
+    model = strut(False, beside)
+    run = mbd.simulate(model, mbd.assemble(model, **given), mbd.RungeKutta853(), **how)
+    struck = {event.name: event for event in reversed(run.events)}
+    assert struck["floor"].time == struck["foot"].time and struck["floor"].row == struck["foot"].row
+    assert struck["floor"].impulse[0] == pytest.approx(0.3 * 1.6 * 9.81 * alone.events[0].time, rel=1e-9)
+    assert struck["foot"].impulse == pytest.approx(alone.events[0].impulse, rel=1e-9)
 
 
 @pytest.mark.parametrize("contact", ["events", "nonsmooth"])

@@ -25,6 +25,7 @@ from mbd.kernel.contact.impact_solve import (
     let_rebound,
     loosen,
     prepare,
+    relative_gain,
     restitution_of,
     solve_impact,
     speed,
@@ -135,7 +136,6 @@ def poisson_law(K: Switching, energetic: bool) -> int:
     status = solve_impact(K)
     if status != 0:
         return status
-    work = 0.0  # of the normal impulses in compression, each counted with its e²
     K.trial_jump[: K.n] = K.total_jump[: K.n]
     for k in range(K.n_rows):
         K.trial[k] = K.total[k]
@@ -146,8 +146,7 @@ def poisson_law(K: Switching, energetic: bool) -> int:
             K.trial_given[row] = K.restitution[c] * K.total[row]
             if not energetic:
                 note_zero(K, c, K.trial_given[row])
-            work += 0.5 * K.restitution[c] * K.restitution[c] * K.total[row] * (row_speed(K, row) + speed(K, row))
-    status = give_back_work(K, max(work, 0.0)) if energetic else give_back(K, 1.0)
+    status = give_back_work(K) if energetic else give_back(K, -1, 1.0)
     fastest = 0.0
     for c in range(K.n_contacts):
         K.touched[c] = 1 if (K.kind[c] == 0 and (K.closed[c] == 1 or K.closing[c] > 0)) else 0
@@ -157,8 +156,8 @@ def poisson_law(K: Switching, energetic: bool) -> int:
     return status
 
 
-def give_back(K: Switching, factor: float) -> int:
-    """The second phase with this factor on the impulses K.trial_given, from the end of the first.
+def give_back(K: Switching, cluster: int, factor: float) -> int:
+    """The second phase with this factor on the impulses K.trial_given of a cluster, from the end of the first.
 
     Contacts that are given an impulse part under it, unless they would approach; their tangents stay.
     """
@@ -166,7 +165,7 @@ def give_back(K: Switching, factor: float) -> int:
     K.total_jump[: K.n] = K.trial_jump[: K.n]
     for k in range(K.n_rows):
         K.total[k] = K.trial[k]
-        K.given[k] = factor * K.trial_given[k]
+        K.given[k] = K.trial_given[k] * (factor if K.cluster[K.n + k] == cluster else 1.0)
     for c in range(K.n_contacts):
         if K.kind[c] == 0 and K.trial_given[K.normal[c]] != 0.0:
             K.parting[c] = 1
@@ -176,47 +175,84 @@ def give_back(K: Switching, factor: float) -> int:
     return solve_impact(K)
 
 
-def work_given_back(K: ContactForces) -> float:
-    """Work of the normal impulses of the second phase, ½ Σ Λ (γ_c + γ⁺)."""
-    work = 0.0
+def work_given_back(K: ContactForces, row: int) -> float:
+    """Work of a normal impulse in the second phase, ½ Λ (γ_c + γ⁺)."""
+    before = row_speed(K, row)
+    for j in range(K.n):
+        before += K.acc[K.acc_B + row * K.n + j] * K.trial_jump[j]
+    return float(-0.5 * (K.total[row] - K.trial[row]) * (before + speed(K, row)))
+
+
+def work_to_give_back(K: ContactForces, row: int) -> float:
+    """e² of the work of a normal impulse in compression."""
+    rate = row_speed(K, row)
+    for j in range(K.n):
+        rate += 0.5 * K.acc[K.acc_B + row * K.n + j] * K.trial_jump[j]
+    e = K.restitution[K.row_contact[row]]
+    return float(e * e * K.trial[row] * rate)
+
+
+def done_in(K: ContactForces, cluster: int) -> float:
+    """Work that a cluster has been given back."""
+    done = 0.0
     for k in range(K.n_rows):
-        if K.trial_given[k] != 0.0:
-            before = row_speed(K, k)
-            for j in range(K.n):
-                before += K.acc[K.acc_B + k * K.n + j] * K.trial_jump[j]
-            work -= 0.5 * (K.total[k] - K.trial[k]) * (before + speed(K, k))
-    return work
+        if K.trial_given[k] != 0.0 and K.cluster[K.n + k] == cluster:
+            done += work_given_back(K, k)
+    return done
 
 
-def give_back_work(K: Switching, work: float) -> int:
-    """The second phase with the largest factor that gives back no more than this work, and no energy in all.
+def give_back_work(K: Switching) -> int:
+    """The second phase, in which each of the clusters that nothing connects gives back its own work."""
+    status = 0
+    for cluster in range(K.n_clusters):
+        found = False
+        for k in range(K.n_rows):
+            found = found or (K.trial_given[k] != 0.0 and K.cluster[K.n + k] == cluster)
+        if found and status == 0:
+            status = give_back_in(K, cluster)
+    return status
+
+
+def give_back_in(K: Switching, cluster: int) -> int:
+    """The second phase with the largest factor that gives back no more than the work, and no energy in all.
 
     The work grows with the square of the factor while no branch changes; where one does, the factor is bisected. Less
     than the work is given back where friction would add to it, because it follows the direction at the end of a phase.
-    Where friction jams, no factor gives any back: the impulses are Poisson's then.
+    Where friction jams, no factor gives any back: that work is lost, and impulses are Poisson's where all of it is.
     """
-    status = give_back(K, 1.0)
-    if status != 0:
+    status = give_back(K, cluster, 1.0)
+    work = 0.0
+    done = 0.0
+    for k in range(K.n_rows):
+        if K.trial_given[k] != 0.0 and K.cluster[K.n + k] == cluster:
+            own = work_to_give_back(K, k)
+            back = work_given_back(K, k)
+            if abs(back) > ROUND_OFF_RTOL * own:
+                work += own
+                done += back
+    if status != 0 or done == 0.0:
         return status
-    done = work_given_back(K)
-    if abs(done) <= ROUND_OFF_RTOL * work:
-        return 0
+    work = max(work, 0.0)
     factor = sqrt(work / done) if done > 0.0 else 0.0
-    status = give_back(K, factor)
-    if status != 0 or (abs(work_given_back(K) - work) <= 1e-12 * work and energy_gain(K) <= 1e-13):
-        return status
-    low = 0.0
-    high = max(2.0, 2.0 * factor)
-    for _ in range(64):
-        factor = 0.5 * (low + high)
-        status = give_back(K, factor)
-        if status != 0:
-            return status
-        if work_given_back(K) <= work and energy_gain(K) <= 1e-13:
-            low = factor
-        else:
-            high = factor
-    return give_back(K, low)
+    status = give_back(K, cluster, factor)
+    if status == 0 and (abs(done_in(K, cluster) - work) > 1e-12 * work or relative_gain(K, cluster) > 1e-13):
+        low = 0.0
+        high = max(2.0, 2.0 * factor)
+        for _ in range(64):
+            factor = 0.5 * (low + high)
+            status = give_back(K, cluster, factor)
+            if status != 0:
+                return status
+            if done_in(K, cluster) <= work and relative_gain(K, cluster) <= 1e-13:
+                low = factor
+            else:
+                high = factor
+        factor = low
+        status = give_back(K, cluster, factor)
+    for k in range(K.n_rows):
+        if K.cluster[K.n + k] == cluster:
+            K.trial_given[k] *= factor
+    return status
 
 
 def sequential_law(K: Switching) -> int:

@@ -12,7 +12,7 @@ from mbd.kernel.tangent_rules import note_edges
 
 __all__ = [
     "energy_gain", "gather", "is_held_through", "let_rebound", "loosen", "loss_elsewhere", "loss_in", "prepare",
-    "restitution_of", "solve_impact", "speed", "start_over", "strikes",
+    "relative_gain", "restitution_of", "solve_impact", "speed", "start_over", "strikes",
 ]  # fmt: skip
 
 
