@@ -47,6 +47,26 @@ def test_no_penalty_pulls_that_opens_before(kind):
         assert np.min(forces) >= -EXACT * np.max(forces), seed
 
 
+@pytest.mark.parametrize("contact", ["events", "nonsmooth"])
+@pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
+def test_a_pad_from_which_an_impact_throws_a_body_lets_go_as_it_happens(scheme, contact):
+    model, body = mbd.Model("pad and wall"), mbd.PointMass("body", 1.0)
+    model.connect(mbd.Translation("flight", model.ground.origin, body.origin))
+    model.constrain(mbd.Penalty("pad", mbd.touchdown(body.origin), 500.0, 40.0, release="pull"))
+    wall = mbd.touchdown(body.origin, mbd.Plane((-0.6, 0.8), offset=-0.1))
+    model.constrain(mbd.Unilateral("wall", wall, restitution=0.7, friction=0.0))
+    velocity = {"flight.x": 8.0, "flight.y": -1.0}
+    start = mbd.assemble(model, {"flight.x": -0.2, "flight.y": -0.001}, velocity, closed="pad")
+    how, name, step = {"dt": 2e-3, "until": 0.07, "contact": contact}, "pad.damping", 1e-3
+    run = mbd.simulate(model, start, scheme, **how)
+    assert [(event.name, event.row) for event in run.events] == [(name, run.events[0].row) for name in ("wall", "pad")]
+    assert np.min(run["pad.force"]) >= 0.0
+    if contact == "events":
+        rate = mbd.sensitivities(model, start, scheme, wrt=[name], of=["flight.y"], **how).matrix[0, 0]
+        ends = [mbd.simulate(model, start, scheme, parameters={name: 40.0 + d}, **how) for d in (-step, step)]
+        assert rate == pytest.approx((ends[1].final.q[1] - ends[0].final.q[1]) / (2.0 * step), rel=1e-5)
+
+
 @pytest.mark.parametrize("number", [10524, 10858, 23384])
 def test_fuzzed_feet_do_not_pull_just_before_they_open(number):
     made = scene(number)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from mbd.kernel.algebra.redundancy import find_dependent, sharing
-from mbd.kernel.codes import NEW_MODE
+from mbd.kernel.codes import LOG_OPENED, NEW_MODE, PULL
 from mbd.kernel.contact.cones import let_directions_go
+from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.contact.contact_modes import resolve_contact_modes
 from mbd.kernel.events.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
-from mbd.kernel.records import Balance, DependentRows, Kernel
+from mbd.kernel.records import Balance, DependentRows, Kernel, Switching
 from mbd.kernel.stepping.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.stepping.contact_step import find_pace
 from mbd.kernel.stepping.control import first_step
@@ -45,6 +46,7 @@ def find_mode(K: DependentRows) -> int:
 def restart(K: Kernel) -> int:
     """Make the state consistent in its mode and start the scheme from it."""
     K.least_pivot = 1.0
+    let_go(K)
     status = resolve_contact_modes(K)
     if status != 0:
         return status
@@ -81,6 +83,24 @@ def restart(K: Kernel) -> int:
         let_directions_go(K)
     K.looks_ahead = 0
     return 0
+
+
+def let_go(K: Switching) -> None:
+    """Penalty contacts that open on pull open where they clearly pull, as an impact has turned them around."""
+    known = False
+    force = 0.0
+    for c in range(K.n_contacts):
+        if K.kind[c] == 1 and K.closed[c] == 1 and K.opens[c] == 0:
+            if not known:
+                watch(K, K.time, K.q, K.y, K.rate, K.lam, K.guards0)
+                refresh_scales(K)
+                for i in range(K.n_v):
+                    force = max(force, K.scale[i])
+                known = True
+            if K.guards0[K.at_force + c] < -PULL * force and K.guards0[K.at_gap_rate + c] >= 0.0:
+                K.closed[c] = 0
+                K.armed[c] = 2
+                log_event(K, LOG_OPENED, c, 0.0, NO_IMPULSE)
 
 
 def restart_after_event(K: Kernel) -> int:
