@@ -15,7 +15,7 @@ from mbd.compile.host import host
 from mbd.compile.ir import Module
 from mbd.compile.layout import Layout
 from mbd.compile.llvm import Library, call, emit_object, load_object
-from mbd.compile.lowering import MAX_OPERATIONS, MIN_RUNS, MIN_ZEROS
+from mbd.compile.lowering import MAX_OPERATIONS, MIN_RUNS, MIN_ZEROS, PART_OPERATIONS
 from mbd.errors import ModelError, UnknownNameError
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Tape
@@ -53,6 +53,20 @@ def test_big_functions_are_cut_and_small_ones_are_not():
     whole = by_llvm({"r": big.outputs}, big.layout, large=10 * MAX_OPERATIONS)["r"]
     cut = by_llvm({"r": big.outputs}, big.layout)["r"]
     assert np.array_equal(results(whole, big), results(cut, big))
+
+
+def test_no_function_has_many_stores_whatever_is_asked_for_how_often():
+    """LLVM takes quadratic time to order them."""
+    links, rng = chain(5), np.random.default_rng(0)
+    values = [*links.outputs, *(links.tape.input("p", k) for k in range(3))]
+    asked = rng.integers(len(values), size=3000).tolist() + [len(values) - 1] * 600
+    few, many = ({"f": outputs} for outputs in (values, [values[k] for k in asked]))
+    most = max(sum("store " in line for line in body.lines) for body in Module(many, links.layout).bodies)
+    assert most <= 2 * PART_OPERATIONS
+    alone, out = np.empty(len(values)), np.empty(len(asked))
+    by_llvm(few, links.layout)["f"](*state(links), alone)
+    by_llvm(many, links.layout)["f"](*state(links), out)
+    assert np.array_equal(out, alone[asked])
 
 
 @given(graphs(size=60))
