@@ -210,6 +210,12 @@ def test_a_friction_that_had_its_joint_cut_is_left_out_from_the_same_place():
     scene = reduced(Scene(model, start, {}), run, ["pin friction"], "auto")
     assert scene.start.names == ("pin.angle",) != start.names
     assert scene.start["pin.angle"] == pytest.approx(1.0) and scene.start["pin.rate"] == pytest.approx(-0.5)
+    found = mbd.effects(model, start, 0.1, dt=2e-3)
+    assert found.outputs == ("pin.angle",) and found["pin friction"].change.comparable
+    assert (
+        "rod floating.x"
+        in mbd.effects(model, start, 0.1, dt=2e-3, outputs="rod floating.x")["pin friction"].change.failure
+    )
 
 
 @pytest.mark.parametrize("loss", [mbd.Viscous(0.1), mbd.PinFriction(0.3, 0.02)])

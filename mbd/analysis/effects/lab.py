@@ -63,7 +63,7 @@ def effects(
     until : end time [s], or the event that ends the run, or (event, latest time)
     integrator : default ``HHT(alpha=0.05)``
     dt : step [s]
-    outputs : names of results to judge by; default all coordinates
+    outputs : names of results to judge by; default all coordinates, of joints that are cut their own
     tolerance : change that is allowed, relative to the range of an output in the whole scene [-]
     progress : True for a bar on a terminal, or ``progress(done, total)``
     options : those of `mbd.simulate`: contact, impact, locate, parameters, rest_speed, backend
@@ -114,7 +114,7 @@ class Bench:
             raise SimulationError(f"the whole scene fails: {self.whole.message}", self.whole)
         if not self.whole.time[-1] > self.whole.time[0]:
             raise ModelError(f"until must be after the start at {self.whole.time[0]:g} s, not {self.until!r}")
-        self.outputs = _outputs(self.whole, outputs)
+        self.outputs = _outputs(self.scene.model, self.whole, outputs)
         self.instants = np.linspace(float(self.whole.time[0]), float(self.whole.time[-1]), 4001)
         self.scales = ranges(self.whole, self.outputs, self.instants)
         if isinstance(self.until, str):  # without an effect it may never happen
@@ -144,10 +144,9 @@ class Bench:
         names = tuple(names)
         try:
             scene = reduced(self.scene, self.whole, names, self.backend)
-            run = self.run(scene)
+            return scene, change(self.run(scene), self.whole, self.scales, self.instants)
         except MbdError as error:
             return None, Change(failure=str(error))
-        return scene, change(run, self.whole, self.scales, self.instants)
 
     def study(self, tolerance: float) -> Effects:
         """Every effect alone, their times, and all together that may go; what is known if it is interrupted."""
@@ -246,8 +245,12 @@ def _check(model: Any, start: Any, tolerance: Any, outputs: Any, options: Mappin
         raise ModelError(faults)
 
 
-def _outputs(run: Trajectory, wanted: Any) -> tuple[str, ...]:
+def _outputs(model: Any, run: Trajectory, wanted: Any) -> tuple[str, ...]:
     """Scalars behind the names; every wrong name with the nearest."""
     if wanted is None:
-        return tuple(name for name, _ in run.facts.coordinates)
+        names = [name for name, _ in run.facts.coordinates]
+        own = [name for joint in getattr(model, "joints", ()) for name in joint.coordinate_names]
+        if own and not {*names} <= {*own}:  # without the friction that cuts a joint, bodies float no more
+            names = own
+        return tuple(names)
     return scalars_wanted(run, wanted, "outputs", "output")
