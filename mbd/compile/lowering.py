@@ -97,7 +97,7 @@ def lower(
     ----------
     programs : names and what each function writes to ``out``
     target : makes a function from its name, the names of its arrays, and whether it is a part of another
-    large, part : operations above which a function is cut, and those of a part
+    large, part : operations above which a function is cut, and those of a part; stores beyond two parts cut it too
     rolled : operations from which on what repeats is written once (see `elements`)
 
     Raises
@@ -113,13 +113,16 @@ def lower(
         steps, places = list(_steps(live(outputs))), _places(outputs)
         _clear_at_once(whole, outputs, places)
         operations, direct = sum(len(nodes) for nodes, _ in steps), _direct(outputs, places)
-        stores = len(direct) + sum(len(own) for own in places.values() if outputs[own[0]].args)
-        if operations <= large and stores <= 2 * part:
+        stores = sum(len(own) for own in places.values() if outputs[own[0]].args)
+        small = operations <= large and stores <= 2 * part
+        if small and stores + len(direct) <= 2 * part:
             _Body(whole, places, layout, {}).steps(steps).rest(direct)
         else:
             # what repeats as elements, all else as parts, and outputs that nothing computes as parts of their own
             kinds = _rolled(steps, places, layout) if operations >= rolled else None
-            parts = [(each, direct[:0]) for each in ([] if kinds else _parts(steps, part, places))]
+            parts = [
+                (each, direct[:0]) for each in ([] if kinds else [steps] if small else _parts(steps, part, places))
+            ]
             slots = kinds.slots if kinds else _slots([each for each, _ in parts])
             whole.room("work", len(slots) + 1)
             if kinds:
@@ -442,13 +445,13 @@ def _groups(ranked: list[Node], level: dict[int, int]) -> Iterator[list[Node]]:
 
 
 def _parts(steps: list[Step], size: int, places: Mapping[int, Sequence[int]]) -> Iterator[list[Step]]:
-    """The same steps in portions of about `size` operations and stores."""
+    """The same steps in portions of about `size` operations, or stores where these are more."""
     portion: list[Step] = []
     filled = 0
     for nodes, angles in steps:
         piece: list[Node] = []
         for node in nodes:
-            weight = 1 + len(places.get(node.index, ()))
+            weight = max(1, len(places.get(node.index, ())))
             if filled and filled + weight > size:
                 yield [*portion, (piece, ())]
                 portion, piece, filled = [], [], 0
