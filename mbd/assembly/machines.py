@@ -39,8 +39,8 @@ def begun_in(model: Any, mechanism: Mechanism, state: State) -> tuple[State, Seq
     if len(state.anchors) != mechanism.layout.n_anchors:
         state = replace(state, anchors=first_anchors(mechanism, own))
         return stored_anew(mechanism, state, own, machines), machines
-    anew = stored_anew(mechanism, state, own, machines).anchors
-    off = np.abs(anew - state.anchors) > ROUND_OFF_RTOL * np.maximum(1.0, np.abs(anew))
+    fresh = stored_anew(mechanism, state, own, machines).anchors
+    off = np.abs(fresh - state.anchors) > ROUND_OFF_RTOL * np.maximum(1.0, np.abs(fresh))
     return state, [each for each in machines if not np.any(off[list(each.anchors[1:])])]
 
 

@@ -47,7 +47,7 @@ def inconsistent(run, size):
     columns = run.columns
     record, equations = columns.record, columns.equations
     bare = replace(columns.rows, phase=np.where(np.abs(columns.rows.phase) == 1, 0, columns.rows.phase))
-    M, _, R, B, _, _, bias, _ = columns.balance.terms_at(bare)
+    M, _, R, B, _, _, bias, *_ = columns.balance.terms_at(bare)
     rate, found = np.hstack([record.a, record.s]), []
     for i in range(len(run.time)):
         held, ways = [], []

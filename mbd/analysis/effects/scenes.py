@@ -80,16 +80,16 @@ def reduced(scene: Scene, run: Trajectory, names: Iterable[str], backend: str) -
     return Scene(model, made, mine)
 
 
-def _anchors(equations: Equations, whole: Equations, start: State, anew: Any = None) -> Any:
+def _anchors(equations: Equations, whole: Equations, start: State, fresh: Any = None) -> Any:
     """What the contacts and machines that are left hold, and the whole turns of cut joints.
 
-    anew : anchors of a start in other coordinates, of which machines alone hold what they held
+    fresh : anchors of a start in other coordinates, of which machines alone hold what they held
     """
     if not len(start.anchors):
-        return start.anchors if anew is None else anew
-    held, before = np.zeros(equations.n_anchors) if anew is None else anew.copy(), _places_of_anchors(whole)
+        return start.anchors if fresh is None else fresh
+    held, before = np.zeros(equations.n_anchors) if fresh is None else fresh.copy(), _places_of_anchors(whole)
     for key, anchor in _places_of_anchors(equations).items():
-        if key in before and (anew is None or key[0] == "machine"):
+        if key in before and (fresh is None or key[0] == "machine"):
             held[anchor] = start.anchors[before[key]]
     return held
 

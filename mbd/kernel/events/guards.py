@@ -389,10 +389,10 @@ def margin(K: Switching, f: int, t1: float) -> float:
     if consistent(K, t1, K.q1, K.y1) != 0:
         return float(K.guards1[K.at_limit + f] - friction_size(K, f, K.lam1))
     K.loads[: K.n_rows] = K.impulse[: K.n_rows]
-    if K.n_cones > 0 and K.n_dropped > 0:  # what all feet together have left, though this one may be at its limit
-        K.loads[: K.n_rows] = K.lam_at_limit[: K.n_rows]
     evaluate_loaded(K, K.loads)
-    return float(limit_of(K, f) - friction_size(K, f, K.loads))
+    if K.n_cones > 0 and K.n_dropped > 0:  # what all feet together have left, though this one may be at its limit
+        return float(limit_of(K, f) - friction_size(K, f, K.lam_at_limit))
+    return float(limit_of(K, f) - friction_size(K, f, K.impulse))
 
 
 def guard_value(K: Switching, kind: int, index: int, t1: float) -> float:

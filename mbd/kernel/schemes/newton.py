@@ -86,11 +86,10 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     moved = 1e300
     last = 0.0
     further = 0
-    wanted = further_corrections() + (1 if together else 0)  # shares follow loads: residuals that pass fall slowly
-    for iteration in range(K.max_iterations + wanted):
+    for iteration in range(K.max_iterations + further_corrections()):
         tangent = not fresh
-        if together and (iteration == 0 or before < 1e300):  # not where the tangent alone is renewed
-            share_loads(K, m, iteration > 0)
+        if together:
+            share_loads(K, m, False)
         if tangent:
             straight = renew(K, m, tangents)
             note_matrix(K)
@@ -124,7 +123,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
                 return no_candidate(K, h, t1, int(-error))
         whole = last if halvings == 0 else 0.0  # what is left of a correction by half is no round-off
         if error <= 1.0 and (K.uneven_masses == 0 or has_settled(moved, whole, 1e-4 * first)):
-            if further == wanted:
+            if further == further_corrections():
                 return conclude_step(K, h, t1)
             further += 1
         if not tangent and error > max(1.0, 0.3 * before):
