@@ -321,7 +321,7 @@ class Body(Writer):
 
     def field(self, table: str, name: str, kind: str) -> str:
         place = self.emit(f"getelementptr inbounds i64, ptr {table}, i64 {self.places[name]}")
-        return self.emit(f"load {LLVM[kind]}, ptr {place}")
+        return self.emit(f"load {LLVM[kind]}, ptr {place}, !invariant.load !0")
 
     def _Element(self, node: tree.Element) -> str:
         return self.load(node, self.place(node))

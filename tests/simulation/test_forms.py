@@ -77,7 +77,7 @@ SCENES = {
         lambda: states.pendulum(states.SpringDashpot(20.0, 2.0) + mbd.Viscous(0.1)), (HHT, RADAU), 2e-3, 0.2
     ),
     "law with a state": Scene(states.mat, BOTH, 2e-3, 0.2),
-    "mat that knows its blow": Scene(
+    "mat that knows its impulse": Scene(
         at(lambda: penalties.ball(stiffness=1e4, restitution=0.5), {"fall.displacement": 3e-3}, {"fall.rate": -1.0}),
         (HHT, ALPHA), 1e-3, 0.06,
     ),

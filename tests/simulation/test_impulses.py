@@ -10,7 +10,7 @@ from tests.simulation.mechanisms import point, run
 
 
 @pytest.mark.parametrize("law", ["newton", "poisson", "sequential"])
-def test_a_corner_that_rests_takes_a_part_of_the_blow_on_the_other(law):
+def test_a_corner_that_rests_takes_a_part_of_the_impulse_on_the_other(law):
     """A box that tips about its sticking left corner: m v of the box is what both corners give."""
     trajectory = mbd.simulate(*_tipping(), dt=1e-3, until=("right", 2.0), impact=law)
     strike = trajectory.events[-1]

@@ -49,7 +49,7 @@ def test_no_penalty_pulls_that_opens_before(kind):
 
 @pytest.mark.parametrize("contact", ["events", "nonsmooth"])
 @pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RadauIIA(), mbd.RungeKutta853()], ids=repr)
-def test_a_pad_from_which_an_impact_throws_a_body_lets_go_as_it_happens(scheme, contact):
+def test_a_pad_from_which_an_impact_throws_a_body_opens_as_it_happens(scheme, contact):
     model, body = mbd.Model("pad and wall"), mbd.PointMass("body", 1.0)
     model.connect(mbd.Translation("flight", model.ground.origin, body.origin))
     model.constrain(mbd.Penalty("pad", mbd.touchdown(body.origin), 500.0, 40.0, release="pull"))

@@ -264,9 +264,10 @@ def clear_dependent(K: DependentRows, lam: Reals) -> None:
 
     Where loads are shared, they have been part of it.
     """
-    together = sharing(K)
+    if K.n_dropped == 0 or sharing(K):
+        return
     for d in range(K.n_rows):
-        if K.dropped[d] == 1 and not together:
+        if K.dropped[d] == 1:
             lam[d] = 0.0
 
 

@@ -89,7 +89,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     for iteration in range(K.max_iterations + further_corrections()):
         tangent = not fresh
         if together:
-            share_loads(K, m, False)
+            share_loads(K, m)
         if tangent:
             straight = renew(K, m, tangents)
             note_matrix(K)

@@ -158,7 +158,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     for iteration in range(K.max_iterations + further_corrections()):
         # tangent and residual at the iterate
         if sharing(K):
-            share_loads(K, m, iteration > 0)
+            share_loads(K, m)
         clear_tangent(K, m, K.out)
         call(K, K.tangent_program, K.out)
         K.n_tangents += 1

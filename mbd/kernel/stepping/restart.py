@@ -364,16 +364,9 @@ def minimum_norm_multipliers(K: Balance, lam: Reals) -> None:
         keep_in_cones(K, lam)
 
 
-def share_loads(K: Balance, m: int, corrected: bool) -> None:
-    """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate.
-
-    Limits that shares follow are those of all multipliers: where those of the m rows in K.rows have been corrected, so
-    have the others, with the shares that this was found with.
-    """
+def share_loads(K: Balance, m: int) -> None:
+    """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate."""
     K.loads[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
-    if corrected:
-        take_shares(K, K.loads)
-        K.block[K.o_lam : K.o_lam + K.n_rows] = K.loads[: K.n_rows]
     call(K, ACCELERATIONS, K.acc)
     find_dependence(K, m)
     find_limits_of_loads(K)

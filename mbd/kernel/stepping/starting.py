@@ -46,7 +46,7 @@ def find_mode(K: DependentRows) -> int:
 def restart(K: Kernel) -> int:
     """Make the state consistent in its mode and start the scheme from it."""
     K.least_pivot = 1.0
-    let_go(K)
+    open_pulling_penalties(K)
     status = resolve_contact_modes(K)
     if status != 0:
         return status
@@ -85,8 +85,8 @@ def restart(K: Kernel) -> int:
     return 0
 
 
-def let_go(K: Switching) -> None:
-    """Penalty contacts that open on pull open where they clearly pull, as an impact has turned them around."""
+def open_pulling_penalties(K: Switching) -> None:
+    """Open penalty contacts that open on pull and clearly pull, as where an impact has turned them around."""
     known = False
     force = 0.0
     for c in range(K.n_contacts):
