@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
+from mbd.bodies.level import Level
 from mbd.bodies.point_mass import PointMass
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
@@ -89,11 +90,12 @@ def _plan(model: Description, wanted: set[str]) -> Plan:
     links = links_of(model, without=wanted)
     tree, closing, reached = spanning_tree(links, model.ground.name)
     edges = _oriented(tree, [model.ground.name])
+    levels = _levels(model) if planar and wanted else {}
     floating: list[Joint] = []
     for body in model.bodies.values():
         if body.name in reached:
             continue
-        floats = floating_joint(model, body, planar)
+        floats = floating_joint(model, body, planar, levels.get(body.name, model.ground.origin))
         more, closes, found = spanning_tree(links, body.name)
         floating.append(floats)
         edges += [floats, *_oriented(more, [body.name])]
@@ -137,9 +139,22 @@ def is_planar(model: Description) -> bool:
     return all(joint.is_planar and joint.parent.is_planar and joint.child.is_planar for joint in model.joints)
 
 
-def floating_joint(model: Description, body: Body, planar: bool) -> Joint:
-    """The joint by which a body floats against the ground, without constraining it."""
-    name, origin = f"{body.name} floating", model.ground.origin
+def _levels(model: Description) -> dict[str, Level]:
+    """The origin of the ground at the heights at which joints hold the bodies of a planar model, by body."""
+    ground = model.ground
+    tree, _, _ = spanning_tree(links_of(model), ground.name)
+    found = {ground.name: Level(ground, "origin")}
+    for joint in _oriented(tree, [ground.name]):
+        near, far = joint.parent, joint.child
+        x, y, z = found[near.body.name].offset
+        raised = (x, y, z + near.offset[2] - far.offset[2])
+        found[far.body.name] = Level(ground, "level", raised, steps=(*found[near.body.name].steps, (near, far)))
+    return found
+
+
+def floating_joint(model: Description, body: Body, planar: bool, origin: Frame) -> Joint:
+    """The joint by which a body floats against a frame of the ground, without constraining it."""
+    name = f"{body.name} floating"
     if isinstance(body, PointMass) and not _is_turned(model, body):
         return Translation(name, origin, body.origin, axes="xy" if planar else "xyz")
     if planar:

@@ -160,7 +160,8 @@ class Bodies:
             given = {label: name for label, name in names.items() if name in self.told.tree}
             if not given:
                 continue
-            place = fixed(np.eye(4), n)
+            level = 0.0 if "orientation.w" in given or "z" in given else self._heights().get(body, 0.0)
+            place = fixed(matrix_of(None, np.array([0.0, 0.0, level])), n)
             for label, axis in (("x", X), ("y", Y), ("z", Z)):
                 if label in given:
                     place = product(place, shift(axis, self.told.coordinate(given[label])))
@@ -169,6 +170,19 @@ class Bodies:
             if "orientation.w" in given:
                 place = product(place, ball(self.told.attitude(f"{body} floating")))
             self.placed[body] = place
+
+    def _heights(self) -> dict[str, float]:
+        """How high above the plane of the ground joints hold the bodies of a mechanism that moves in a plane."""
+        found = {self.model.ground.name: 0.0}
+        for _ in self.model.joints:
+            for joint in self.model.joints:
+                a, b = joint.parent, joint.child
+                rise = float(self.constant(a)[2, 3] - self.constant(b)[2, 3])
+                if a.body.name in found:
+                    found.setdefault(b.body.name, found[a.body.name] + rise)
+                elif b.body.name in found:
+                    found[a.body.name] = found[b.body.name] - rise
+        return found
 
     def _place(self, joint: Joint, forward: bool) -> None:
         between = self.between(joint)

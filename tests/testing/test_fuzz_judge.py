@@ -375,8 +375,8 @@ def test_the_judge_sees_accelerations_that_alternate_around_those_of_a_drive():
     assert "a drive gives its acceleration" in laws_broken(wrong, model, made.parameters)
 
 
-FORMS = [8, 10000501]
-"""Masses in another unit; a driven table that is turned, in halves and beside others."""
+FORMS = [8, 10000501, 10020026]
+"""Masses in another unit; a driven table that is turned, in halves and beside others; a raised plane."""
 
 
 @pytest.mark.parametrize("number", FORMS)

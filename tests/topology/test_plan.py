@@ -1,5 +1,6 @@
 """Spanning trees, cut joints, floating bodies, mobility."""
 
+import numpy as np
 import pytest
 
 import mbd
@@ -94,6 +95,27 @@ def test_a_point_mass_on_an_arm_turns_with_it_however_it_is_cut(axis):
         start = mbd.assemble(model, {"pin.angle": 0.5})
         ends.append(mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.2)["bob.center"][-1])
     assert ends[0] == pytest.approx(ends[1], abs=1e-10)
+
+
+@pytest.mark.parametrize("cut", ["all", ["lower"]])
+def test_bodies_of_a_planar_mechanism_float_in_the_planes_where_joints_hold_them(cut):
+    """Layers of a linkage lie at different heights z, which follow the parameters of their pins."""
+    ends = []
+    for each in ("auto", cut):
+        model = mbd.Model("layers", cut=each)
+        rod, bob = mbd.RigidBody("rod", 1.0, 0.1), mbd.PointMass("bob", 1.0)
+        post = model.ground.point(0.1, 0.2, 0.3, name="post")
+        model.connect(
+            mbd.Revolute("upper", post, rod.point(0.0, 0.5, 0.0, name="hole")),
+            mbd.Revolute("lower", rod.point(1.0, 0.0, -0.1), bob.point(0.0, 0.4, 0.2)),
+        )
+        for parameters in ({}, {"ground.post.z": 0.7, "rod.hole.z": -0.1}):
+            start = mbd.assemble(model, {"upper.angle": 0.3, "lower.angle": 1.0}, parameters=parameters)
+            run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=0.2)
+            ends.append([*run["rod.origin"][-1], *run["bob.origin"][-1]])
+    assert np.array(ends[:2]) == pytest.approx(np.array(ends[2:]), abs=1e-10)
+    assert ends[2][5] == pytest.approx(0.0, abs=1e-15)
+    assert ends[3][5] == pytest.approx(0.5, abs=1e-15)
 
 
 def test_a_spatial_body_floats_with_all_six_motions():
