@@ -1,7 +1,5 @@
 """Tests over random examples that count what they compared: an example that ends before it has shown nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from typing import Any

@@ -1,7 +1,5 @@
 """Forward kinematics of joints in plain numpy, written apart from the library's own."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

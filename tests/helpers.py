@@ -1,7 +1,5 @@
 """What tests share: the machinery of `mbd.testing` that they use most, and runs whose results are altered."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

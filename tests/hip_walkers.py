@@ -7,8 +7,6 @@ at their ends, then others. With c the distance of a center from the hip::
     (Iᵢ + mᵢ cᵢ²) θ̈ᵢ + mᵢ cᵢ (cos θᵢ ẍ + sin θᵢ ÿ) = mᵢ cᵢ (g_x cos θᵢ + g_y sin θᵢ) + τᵢ
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Machines with modes simulated without `mbd`: segments of scipy's DOP853, and transitions written out by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -9,8 +9,6 @@ INTEGRATORS  schemes
 PARTS     parts of a leg with their benches
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Random mechanisms to ask for results between rows: trees, loops, redundant rows, closed contacts, free turns."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 

@@ -6,8 +6,6 @@ rest are equations of motion written by hand, integrated by an explicit Runge–
 Hairer, Nørsett & Wanner 1993), which shares nothing with what is tested.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

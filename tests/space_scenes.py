@@ -1,7 +1,5 @@
 """Random mechanisms in space for laws that compare two forms of one run: each joint, in trees, in loops and on feet."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ walking (H. Geyer, A. Seyfarth & R. Blickhan, Compliant leg behaviour explains b
 Proc. R. Soc. B 273 (2006) 2861).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """A consistent start: named values held exactly, the rest completed with least motion, every conflict told."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

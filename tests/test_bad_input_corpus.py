@@ -3,8 +3,6 @@
 Examples of right arguments are found by the names of parameters, so that a new word is tried without a line here.
 """
 
-from __future__ import annotations
-
 import inspect
 import math
 import re

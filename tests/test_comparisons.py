@@ -1,7 +1,5 @@
 """Counting of comparisons in tests over random examples."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings, strategies as st
 

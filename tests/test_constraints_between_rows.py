@@ -4,8 +4,6 @@ Rows of joints, of measures and of closed contacts are evaluated where nothing i
 compared with the tables that prescribe them, whose third derivative jumps within steps.
 """
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

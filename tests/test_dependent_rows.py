@@ -1,7 +1,5 @@
 """Dependent rows: as many as the rank lacks, each a combination of the fewest others, in any order and scale."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st

@@ -1,7 +1,5 @@
 """The pages of docs/ and the README: every Python block runs, and prints what the comment beside it says."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

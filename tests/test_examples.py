@@ -4,8 +4,6 @@ Reference values of walkers, of the double pendulum and of the slider-crank were
 than Newmark's (80-bit Taylor series, DOP853 at 1e-13, closed forms), and agree with the publications named beside them.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from itertools import pairwise

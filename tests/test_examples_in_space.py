@@ -1,7 +1,5 @@
 """The examples in space, on numbers of Euler's equations and of Lagrange's top."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

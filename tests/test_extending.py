@@ -1,7 +1,5 @@
 """What docs/extending.md adds to the library: a copy of the package with these files finds it as its own."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

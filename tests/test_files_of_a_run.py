@@ -1,7 +1,5 @@
 """What docs/files.md says of files is what is in them, and the record keeps its schema."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

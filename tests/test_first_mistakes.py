@@ -1,7 +1,5 @@
 """What people get wrong in their first hour: the errors, warnings and functions that answer it."""
 
-from __future__ import annotations
-
 import gc
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The hard cases as tests, and the command that judges them."""
 
-from __future__ import annotations
-
 import copy
 import math
 import re

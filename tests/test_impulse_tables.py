@@ -1,7 +1,5 @@
 """Impulses in tables: each of a run once, those of contacts that were closed before an impact among them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Ctrl-C in a study gives back what was finished: what is there is, to the bit, the beginning of the whole study."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

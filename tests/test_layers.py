@@ -1,7 +1,5 @@
 """Imports go down: each part knows only the ones before it."""
 
-from __future__ import annotations
-
 import ast
 from functools import cache
 from pathlib import Path

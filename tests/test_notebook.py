@@ -1,7 +1,5 @@
 """What notebooks show: tables that can be read aloud, formulas, an animation; names are names, whatever is in them."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle

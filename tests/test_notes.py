@@ -1,7 +1,5 @@
 """What mbd says without being asked: to the logger, as warnings at the user's line, once, and on a terminal."""
 
-from __future__ import annotations
-
 import logging
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """Numbers that are none where one is expected: complex ones, NaN; and files whose names are those of others."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

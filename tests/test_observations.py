@@ -1,7 +1,5 @@
 """Observations: what a function of the motion says, wherever results go, and nothing of the motion changes."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

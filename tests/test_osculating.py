@@ -1,7 +1,5 @@
 """Polynomials through the rows around, with the derivatives that rows hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Words of users' own whose methods cannot be called, or answer wrongly: named errors before anything runs."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import partialmethod

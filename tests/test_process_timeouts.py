@@ -1,7 +1,5 @@
 """No test waits for ever: whoever starts a process says how long it may take."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Small mistakes are reported by name, where they were made."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

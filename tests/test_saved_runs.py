@@ -1,7 +1,5 @@
 """A run that was saved and read again gives the same bits, at rows and between them."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Sequence
 

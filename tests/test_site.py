@@ -1,7 +1,5 @@
 """What the README, the metadata and the site promise agrees with the repository."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

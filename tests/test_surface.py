@@ -1,7 +1,5 @@
 """The public names: they load lazily, all of them, and each says what it is."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import subprocess

@@ -1,7 +1,5 @@
 """Runs as tables: what `at` gives is what `run.at` gives, every time once, with units and words."""
 
-from __future__ import annotations
-
 import random
 import sys
 

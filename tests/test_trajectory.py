@@ -1,7 +1,5 @@
 """Results by name, values between the rows, files and tables."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from itertools import pairwise

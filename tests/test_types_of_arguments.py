@@ -1,7 +1,5 @@
 """Type checkers and editors know what words take: a text in place of a number is an error before anything runs."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Retired words do not return: code, errors, notes and docs speak the language of docs/glossary.md."""
 
-from __future__ import annotations
-
 import ast
 import re
 from pathlib import Path

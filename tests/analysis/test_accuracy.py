@@ -1,7 +1,5 @@
 """The accuracy lab: its errors are the true ones, its reference is right to its bound, its advice follows."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The study of effects: what is absent costs nothing, what does nothing changes nothing, what it advises holds."""
 
-from __future__ import annotations
-
 import csv
 from importlib.util import find_spec
 

@@ -1,7 +1,5 @@
 """The summary of a run says what it came to by rules, each tried on motions that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

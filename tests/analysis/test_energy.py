@@ -1,7 +1,5 @@
 """The energy ledger and the step table."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters from measured motion: those that made it are found, with honest errors, and faults have names."""
 
-from __future__ import annotations
-
 import json
 import tracemalloc
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Fits of machines with modes: transitions move with what is sought, and their order may change on the way."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

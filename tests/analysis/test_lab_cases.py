@@ -1,7 +1,5 @@
 """The lab on cases with published answers: its reference meets them to its bound, its errors are those against them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """The labs in space: errors they tell are the true ones, effects that never act leave no trace, for every joint."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The energy ledger cause by cause, against closed forms; what it leaves over is the integrator's."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise

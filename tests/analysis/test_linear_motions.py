@@ -1,7 +1,5 @@
 """Small motions with rows on velocities, contacts and friction; right-hand sides, refusals, table and plot."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

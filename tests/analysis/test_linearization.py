@@ -1,7 +1,5 @@
 """Small motions: exact derivatives, natural frequencies in closed form, independence of cut and order."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

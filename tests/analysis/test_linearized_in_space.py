@@ -1,7 +1,5 @@
 """Linear motions in space: the same whichever joints are cut or turned round, and however the world lies."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Degrees of freedom by rank: independent of the cut and of the order of words, redundant rows always named."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numerical criteria of integrators, measured by stepping them, against exact values and closed forms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Inputs and outputs of linearizations: differences, runs, cuts, refusals."""
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Reports of machines without left and right feet: a ball, a hopper on a spring, a wheel of spokes."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

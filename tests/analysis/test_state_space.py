@@ -1,7 +1,5 @@
 """Linear equations with names: sampled, in other libraries, old names, and what is refused."""
 
-from __future__ import annotations
-
 import sys
 import types
 

@@ -1,7 +1,5 @@
 """Files of studies: a file is taken for the study that wrote it alone, and only as that wrote it."""
 
-from __future__ import annotations
-
 import json
 import random
 import re

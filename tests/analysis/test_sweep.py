@@ -1,7 +1,5 @@
 """Sweeps: every combination once, the same numbers wherever the runs are made, faults before the first run."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sweeps on a real cluster of Dask, on this machine."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

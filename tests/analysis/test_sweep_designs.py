@@ -1,7 +1,5 @@
 """Sweeps whose values change together, designs that fill ranges, and files from which a sweep goes on."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

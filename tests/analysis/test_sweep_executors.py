@@ -1,7 +1,5 @@
 """Sweeps by executors: processes keep what they made of a model, and no run takes another with it."""
 
-from __future__ import annotations
-
 import os
 import pickle
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor

@@ -1,7 +1,5 @@
 """How cost grows: the page says what was measured, and its scenes are mechanisms that run."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip("benchmarks")

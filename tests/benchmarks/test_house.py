@@ -1,7 +1,5 @@
 """The counts of the source, on a package of four files whose counts can be read off."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip("benchmarks")

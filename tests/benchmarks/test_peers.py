@@ -1,7 +1,5 @@
 """The scenes that other systems are compared on: their references, and that `mbd` moves as these say."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

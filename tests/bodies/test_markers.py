@@ -1,7 +1,5 @@
 """Named points: always among the results and on the page, wherever they are used, and free for the motion."""
 
-from __future__ import annotations
-
 import pickle
 import random
 

@@ -1,7 +1,5 @@
 """One double pendulum, two point masses on massless rods, in every kind of coordinates."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

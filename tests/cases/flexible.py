@@ -1,7 +1,5 @@
 """Case c2: the slider-crank with an elastic connecting rod of the IVP test set, by its energies."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

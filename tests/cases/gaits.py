@@ -9,8 +9,6 @@ from foot to hip along (sin q, cos q), swing segments hanging from the hip. Mass
 A plastic impact projects the velocities of the masses onto those that the next posture allows, in their metric.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

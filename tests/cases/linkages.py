@@ -1,7 +1,5 @@
 """Planar and spatial linkages whose rows depend on each other, always or in single poses."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

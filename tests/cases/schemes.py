@@ -1,7 +1,5 @@
 """The integrators that the cases are run with."""
 
-from __future__ import annotations
-
 import mbd
 from mbd.integrators.family import NewmarkFamily
 

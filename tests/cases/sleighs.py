@@ -1,7 +1,5 @@
 """Mechanisms that are held by their velocities: a sleigh, a sleigh with a trailer, a rolling wheel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Mechanisms whose small motions are looked at: pendulums, a four-bar, a slider."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import mbd

@@ -1,7 +1,5 @@
 """Mechanisms of the reference cases in space, as their files define them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Effects of no strength, beside the hard case j17: removed by name, given a strength, as run-time inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

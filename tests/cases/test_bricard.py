@@ -1,7 +1,5 @@
 """Bricard's mechanism of the hard case b4: its mobility, and its motion with every joint cut."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

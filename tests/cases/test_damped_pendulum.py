@@ -1,7 +1,5 @@
 """Case a3: a physical pendulum with a viscous damper in its joint, and with a quadratic one beside it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Case a2: two point masses on rods; minimal, partly cut, absolute and natural coordinates give one answer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Case j16: a user's force that becomes NaN during the run."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Starts off their rows, beside the hard case j14: in velocity alone, completed, of several rods."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Case j15 and its kin: constraints that cannot hold together are refused with the smallest set of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The leg of the hard cases h1 and h1b with other numbers: its knee runs into a spring and damper."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

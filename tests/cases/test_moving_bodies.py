@@ -1,7 +1,5 @@
 """Feet and wheels on other bodies: carts, planks, belts, and planes in turned frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

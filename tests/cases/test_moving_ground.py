@@ -1,7 +1,5 @@
 """Balls on ground that moves with time: case j10, paddles, mats and waves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

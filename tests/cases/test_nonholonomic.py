@@ -1,7 +1,5 @@
 """Rows on velocities: what `mbd hardcases` does not judge of d1 (sleigh), d2 (knife edge) and d3 (wheel)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

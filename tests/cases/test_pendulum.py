@@ -1,7 +1,5 @@
 """Cases a1, a1b and b1: a point mass on a rod, swinging widely and turning over, in three kinds of coordinates."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

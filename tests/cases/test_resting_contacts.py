@@ -1,7 +1,5 @@
 """The table of case j11 with its mass off its center."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

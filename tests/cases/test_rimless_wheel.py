@@ -1,7 +1,5 @@
 """Case f4: a rimless wheel rolls down a slope at a steady speed, or rocks to rest on two spokes."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Cases e1 to e4, d4, d5, l7 and l8: bodies that turn freely, with every scheme at its full order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 

@@ -6,8 +6,6 @@ Position level is passed at second order. The stabilized schemes keep their bran
 a pose they are accurate to some 1e-5 rad only, and may end with an error that says so.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Case c3: a slider-crank turned at constant speed by a prescribed motion; the drive torque is its multiplier."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The walkers of the cases as models of bodies, in axes that lie on the slope."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The rimless wheel as a model of bodies, and by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Plain planar chains of n links, written out as a recursion on the tape: the graphs that compilers are tested on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Random graphs of every operation, and their values worked out one node at a time."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import shutil

@@ -1,7 +1,5 @@
 """All backends compute the same numbers, operation by operation."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The choice between machine code and plain Python."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

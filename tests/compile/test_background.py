@@ -1,7 +1,5 @@
 """Large programs run at once and are optimized meanwhile; when that happens changes no bit of anything."""
 
-from __future__ import annotations
-
 import gc
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Object files on disk: found again, verified, whole or absent, and never in the way."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

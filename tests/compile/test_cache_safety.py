@@ -1,7 +1,5 @@
 """What the cache hands over is executed: only what was made for the very key, by this user, is."""
 
-from __future__ import annotations
-
 import os
 import random
 import subprocess

@@ -1,7 +1,5 @@
 """Energies at many states: the same by numpy and by machine code."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

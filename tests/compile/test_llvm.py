@@ -1,7 +1,5 @@
 """Machine code: cut functions, levels, threads, libraries."""
 
-from __future__ import annotations
-
 import gc
 import threading
 

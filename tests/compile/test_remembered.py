@@ -1,7 +1,5 @@
 """Programs that are found by what their equations are: the same to the bit, and found only where they are the same."""
 
-from __future__ import annotations
-
 from dataclasses import fields, is_dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A model that says the same as one before has its equations; one that may mean something else has its own."""
 
-from __future__ import annotations
-
 import math
 import types
 from collections import defaultdict, deque

@@ -1,7 +1,5 @@
 """Sines and cosines in vector registers are as good as those of a C library."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

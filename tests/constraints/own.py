@@ -1,7 +1,5 @@
 """Laws of constraints as a user writes them in a script: a sole that slides, a clutch that slips, a one-way bearing."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mbd

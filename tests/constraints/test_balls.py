@@ -1,7 +1,5 @@
 """Balls that strike, roll on and slip along balls: closed forms, and momentum of both."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid

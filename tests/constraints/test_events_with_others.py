@@ -1,7 +1,5 @@
 """Events that happen with something else: with a strike, with an opening, with another event or a mode."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

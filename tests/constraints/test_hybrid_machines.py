@@ -3,8 +3,6 @@
 The other simulation shares no line with `mbd`: see `tests.hybrid_machines`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

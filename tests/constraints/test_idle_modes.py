@@ -1,7 +1,5 @@
 """Modes that a run never changes say what they waited for, and transitions that cannot come are refused."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Friction and stops that remember: what their papers say of them in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """A hopper whose leg a mode lengthens, and a viscoelastic stop in steps that follow a tolerance, beside scipy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Discrete states: located transitions, timers, memories, laws by state, chains of one instant, and bad input."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

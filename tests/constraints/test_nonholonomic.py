@@ -1,7 +1,5 @@
 """Rows on velocities: words, equations, tangents, every way they meet the other parts."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Force laws that begin to act only while a contact is closed or a measure is positive."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Laws of a user's own: they move as the mechanics says, run compiled, and are refused by name where they cannot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 

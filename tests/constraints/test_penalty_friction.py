@@ -1,7 +1,5 @@
 """Friction of penalty contacts: opposite to sliding in the plane of contact; it dissipates, slows, creeps at rest."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Force laws of contact: what they give back of the approach speed, and that they neither pull nor feed energy in."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random machines: machine code and plain Python agree, and each state's law is what acts in it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

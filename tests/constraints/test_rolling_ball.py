@@ -1,7 +1,5 @@
 """Balls that roll without slip, however they have turned."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

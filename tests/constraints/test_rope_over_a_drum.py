@@ -1,7 +1,5 @@
 """Rope over a drum: `Unilateral` friction on the difference of its two lengths, the law of Euler and Eytelwein."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

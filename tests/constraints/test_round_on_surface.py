@@ -1,7 +1,5 @@
 """Balls and disks on height functions: gaps against a search, motions against equations by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """Sampled feedback: difference equations, hold, delay and resolution against an integration beside it; gaits of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

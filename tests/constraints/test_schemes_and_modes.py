@@ -1,7 +1,5 @@
 """Every scheme keeps its order across transitions of modes, and continues to the bit from within a state."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

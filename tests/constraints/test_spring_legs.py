@@ -1,7 +1,5 @@
 """Spring legs without mass: time on the ground, derivatives, and ends by name; gaits on them are in `tests/gait`."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """What a foot holds where it sticks after a slide is what forces between rows are made from, on curved ground too."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

@@ -1,7 +1,5 @@
 """Stops of a ball joint: a cone of directions and limits of twist, by rows and by springs; what is refused."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mechanisms that the laws of mechanics are tried on: random trees, a leg with everything, loops."""
 
-from __future__ import annotations
-
 import random
 
 import mbd

@@ -1,7 +1,5 @@
 """Friction in the equations: exact tangents where it slides, its loss, and nothing where there is none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

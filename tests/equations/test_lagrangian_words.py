@@ -1,7 +1,5 @@
 """A mechanism given by its energies takes contacts, friction, events and controllers as one of bodies does."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import dataclass
 from typing import Any

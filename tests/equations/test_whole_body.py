@@ -1,7 +1,5 @@
 """Results of the whole body: sums over bodies, conservation laws, and the center of pressure of contacts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

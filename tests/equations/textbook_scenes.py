@@ -1,7 +1,5 @@
 """The same planar mechanisms twice: of bodies, and of energies in the coordinates that these have."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

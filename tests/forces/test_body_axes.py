@@ -1,7 +1,5 @@
 """Forces whose components lie along the axes of a body."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

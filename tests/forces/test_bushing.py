@@ -1,7 +1,5 @@
 """A bushing: the oscillator that it makes, in space and in the plane, and a stiff one that is a weld."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

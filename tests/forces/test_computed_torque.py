@@ -1,7 +1,5 @@
 """M and h as arguments of laws: with them the motion is that of the law alone."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

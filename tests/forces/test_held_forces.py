@@ -1,7 +1,5 @@
 """Laws that read forces of constraints, contacts and joints: solved with them, sampled, or refused by name."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Muscles: curves against OpenSim's, moment arms against differences, equilibrium, order of schemes, energy."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """A force may be named like the spring that a joint could have: it acts all the same."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

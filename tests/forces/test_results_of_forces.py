@@ -1,7 +1,5 @@
 """Forces among the results, under the names of their parameters; each gives the power that the ledger counts."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rotors of drives: reflected inertia on the coordinate of a joint."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

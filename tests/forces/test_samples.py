@@ -1,7 +1,5 @@
 """Signals from tables: what curve goes through them, and what motion they may drive."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

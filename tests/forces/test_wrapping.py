@@ -1,7 +1,5 @@
 """Paths around surfaces: shortest of all ways, moment arms, lifting off, sides and ends, two surfaces, runs."""
 
-from __future__ import annotations
-
 import math
 import warnings
 

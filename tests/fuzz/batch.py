@@ -1,7 +1,5 @@
 """Many fuzzed scenes in processes of their own, and what came of them."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """Forward kinematics of a model from its description and the coordinates that a run reports."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Mechanisms of fuzzed scenes that are driven, held, at rest, balanced or aligned, and feet on curved ground."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

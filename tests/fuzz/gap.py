@@ -1,7 +1,5 @@
 """Gaps and the directions along which their forces act."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -3,8 +3,6 @@
 Written apart from the equations of the library, which it judges: no code is shared.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeAlias
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The verdict on a run, by mechanics written apart from the library's own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Laws that hold at every instant: places, closure of loops, balance of forces, constraints, contacts, energies."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

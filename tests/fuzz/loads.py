@@ -1,7 +1,5 @@
 """All forces and torques on every body: reported reactions and contact forces, everything else from its own law."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Prescribed motions of fuzzed drives: functions of time that models trace and judges call with arrays, and tables."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

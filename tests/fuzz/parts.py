@@ -1,7 +1,5 @@
 """Parts of fuzzed mechanisms: bodies, frames, joints, losses, forces, contacts, events, drawn at random."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

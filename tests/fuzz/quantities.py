@@ -1,7 +1,5 @@
 """Values of what users give: numbers, functions of named things, signals in time; gaps and how they change."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Gaps of balls and disks over planes, and of joints that turn freely before cones and twists."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

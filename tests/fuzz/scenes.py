@@ -1,7 +1,5 @@
 """Fuzzed scenes: a mechanism, values of its parameters, a start, a scheme and its steps, all made from one number."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Mechanisms of fuzzed scenes with joints that turn freely: trees, loops, stops, feet, balls and disks in space."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

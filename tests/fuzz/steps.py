@@ -1,7 +1,5 @@
 """Laws along rows: positions and velocities are integrals, guards that cross make events, passive parts only take."""
 
-from __future__ import annotations
-
 import ast
 
 import numpy as np

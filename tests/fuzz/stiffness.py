@@ -1,7 +1,5 @@
 """How far forces can be known where positions are known to a tolerance only."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

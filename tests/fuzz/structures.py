@@ -1,7 +1,5 @@
 """Mechanisms of fuzzed scenes: each is made from a number, and many scenes share one with other values."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

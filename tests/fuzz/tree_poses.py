@@ -1,7 +1,5 @@
 """Where the bodies of a described tree are, and joints that close loops at that pose."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Springs of joints that turn freely and bushings, by rotation vectors of the description."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

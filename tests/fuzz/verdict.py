@@ -1,7 +1,5 @@
 """A scene is run and judged: well, ended by an error with a name, or bad."""
 
-from __future__ import annotations
-
 import time
 import traceback
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The simplest walker of the case k4, with its equations as they stand there, and the grid of its starts."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

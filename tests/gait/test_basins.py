@@ -1,7 +1,5 @@
 """Basins: the case k4, and that what becomes of a start depends on nothing but the start."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Branches of gaits: maps whose folds, doublings and tori are known, and the cascades of the cases k3 and k3b."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

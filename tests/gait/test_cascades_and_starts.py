@@ -1,7 +1,5 @@
 """Starts anywhere in a walk, cascades of doublings, and errors of special points that hold what they promise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

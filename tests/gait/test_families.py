@@ -1,7 +1,5 @@
 """Gaits that nothing takes energy from: the member of their family with a given energy or speed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Gaits in space: quaternions on the section, reflections, and walkers of the plane among those of space."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from functools import cache

@@ -1,7 +1,5 @@
 """Gaits of machines with discrete states: compared, mirrored by name; what is remembered is part of the gait."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

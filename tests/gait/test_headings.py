@@ -1,7 +1,5 @@
 """Gaits on level ground in space: no heading is another one, and a gait may turn a little with each stride."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

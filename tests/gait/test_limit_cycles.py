@@ -1,7 +1,5 @@
 """Gaits of the cases f1, f1b, f2, f2b, f3, f3b, f5, k1, k2, k2b: fixed points, periods, multipliers, derivatives."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

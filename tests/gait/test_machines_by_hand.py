@@ -1,7 +1,5 @@
 """Gaits of walkers that remember and act beside return maps by hand: states to 1e-9, multipliers to 1e-8."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

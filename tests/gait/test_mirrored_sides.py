@@ -1,7 +1,5 @@
 """Parameters of one side of a mirrored gait, wherever they enter: refused alone, taken with those of the other side."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any

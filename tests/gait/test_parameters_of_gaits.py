@@ -1,7 +1,5 @@
 """Parameters of gaits: derivatives of multipliers in any unit and beside limits, sides of mirrored gaits, bounds."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

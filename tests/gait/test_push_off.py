@@ -1,7 +1,5 @@
 """Case k5: a compass walker on level ground, whose trailing foot pushes off in the reset of the heel strike."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import mbd

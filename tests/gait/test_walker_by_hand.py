@@ -1,7 +1,5 @@
 """Limit cycles in space against a walker with disk feet that was derived and stepped without the library."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

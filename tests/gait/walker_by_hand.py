@@ -4,8 +4,6 @@ Coordinates (x, y, z, roll, left hip, right hip), Lagrange's equations; the stan
 the other one strikes with all three, plastically, and takes the place of the first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

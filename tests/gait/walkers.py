@@ -1,7 +1,5 @@
 """Walkers for tests of gaits: those of the cases, with sides of their own, and the simplest one as its paper has it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import cache

@@ -1,7 +1,5 @@
 """Parallelograms whose cranks lie flat, a singular configuration, and the one rod that they are on their branch."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

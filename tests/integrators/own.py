@@ -1,7 +1,5 @@
 """Integrators as a user would write them: `order`, `start` and `step`, nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motions whose inertia is a small difference of large ones: computed, or refused by name."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

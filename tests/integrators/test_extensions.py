@@ -1,7 +1,5 @@
 """Between rows a run is as accurate as the continuous extension of its scheme says."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

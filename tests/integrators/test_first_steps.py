@@ -1,7 +1,5 @@
 """First steps that are longer than what dies away in them: their error is estimated at two places."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The stepping interface suffices for an integrator of one's own; what a scheme cannot do it refuses, with a reason."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import dataclass
 

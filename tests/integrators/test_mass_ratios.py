@@ -1,7 +1,5 @@
 """Masses that differ by many orders of magnitude: explicit steps keep the digits of accelerations."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import mpmath as mp

@@ -1,7 +1,5 @@
 """Bodies without inertia whose moments have no arm at the start: their balance has no size of its own there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The order of accuracy that each scheme promises is the one observed, with multipliers, in every formulation."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

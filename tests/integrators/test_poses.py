@@ -1,7 +1,5 @@
 """Steps over singular configurations: explicit ones pass between stages, those of Radau IIA with order 5."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

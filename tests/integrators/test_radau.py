@@ -1,7 +1,5 @@
 """Radau IIA: order five of everything, stability at any stiffness, an error estimate of order three."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

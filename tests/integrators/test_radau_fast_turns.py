@@ -1,7 +1,5 @@
 """Bodies that turn by a radian in a step: one Newton matrix does not do for all stages, each takes its own masses."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Friction on stiff mats that slides at one stage of a step and holds at another."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

@@ -1,7 +1,5 @@
 """The explicit scheme of order 8: its coefficients, its order with and without rows, values between its steps."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 

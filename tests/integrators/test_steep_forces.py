@@ -1,7 +1,5 @@
 """Forces far steeper than a step resolves: a run is right, or fails with an error, or says that dt is large."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

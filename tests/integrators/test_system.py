@@ -1,7 +1,5 @@
 """What a scheme may ask of a system: the tangent is that of the residual, and a user's own class gives what it has."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Runs of fixed steps that estimate their errors tell of them where these are not small."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A ball joint with more coordinates than velocities: a unit quaternion, and the angular velocity in child axes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial

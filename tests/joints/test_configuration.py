@@ -1,7 +1,5 @@
 """Coordinates and velocities declared apart: laws of a joint whose coordinates are a unit quaternion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Starts and results of joints that turn freely: every form of an orientation, every frame of an angular velocity."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

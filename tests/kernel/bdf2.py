@@ -7,8 +7,6 @@ with x₀ the last increment of positions and h₀ its step. The first step afte
 Equations I, III.5.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

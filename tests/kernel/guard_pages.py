@@ -7,8 +7,6 @@ a page that can be neither read nor written on each side; what the kernel has ma
 is a fault.
 """
 
-from __future__ import annotations
-
 import ctypes
 import faulthandler
 import mmap

@@ -5,8 +5,6 @@
 With rows, positions and velocities at the end are projected onto them and rates are the consistent ones.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Kernel and models as C99: compiled by a C compiler, they give the bits of LLVM's code without fused multiply-add."""
 
-from __future__ import annotations
-
 import ctypes
 import inspect
 import subprocess

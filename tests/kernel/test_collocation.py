@@ -1,7 +1,5 @@
 """The coefficients of Radau IIA obey the conditions that define it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.kernel.schemes.collocation import RADAU

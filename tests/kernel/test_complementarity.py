@@ -1,7 +1,5 @@
 """Who pushes and who sticks, for matrices of any kind: the solver alone, on arrays of its own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

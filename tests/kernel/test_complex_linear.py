@@ -1,7 +1,5 @@
 """LU factors of complex matrices against numpy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Branches by cones in the whole complementarity solver: degenerate, rank-deficient, infeasible problems."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

@@ -1,7 +1,5 @@
 """Coulomb's law of many contacts at once: redundant, of any friction, held and free, interpreted and compiled."""
 
-from __future__ import annotations
-
 import ctypes
 from functools import lru_cache
 

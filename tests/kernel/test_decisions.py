@@ -1,7 +1,5 @@
 """What a run decides hangs on the motion: not on the last bit of its start, on who computes, or on fused products."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

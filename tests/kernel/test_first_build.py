@@ -1,7 +1,5 @@
 """The first run on a machine begins with a kernel without optimization; the optimized one comes from beside it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

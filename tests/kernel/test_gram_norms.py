@@ -1,7 +1,5 @@
 """What is left of rows beside others: from their Gram matrix what Gram–Schmidt leaves."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The compiled kernel neither reads nor writes beyond any of its arrays, whatever the scene."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Bodies that do not touch each other are problems of their own, whatever else stands beside them."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings, strategies as st
 

@@ -1,7 +1,5 @@
 """The kernel without optimization takes the same steps, bit by bit."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """The small dense solvers of the kernel, against numpy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st

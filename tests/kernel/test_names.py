@@ -1,7 +1,5 @@
 """What the records of the kernel declare is what its functions and its arrays go by."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Factors in an order chosen beforehand: the solutions of numpy, or none where a pivot is not sound."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st

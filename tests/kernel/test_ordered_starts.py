@@ -1,7 +1,5 @@
 """Starts solved in an order chosen beforehand: what the search for pivots finds, with the same dependent rows."""
 
-from __future__ import annotations
-
 from itertools import product
 from random import Random
 

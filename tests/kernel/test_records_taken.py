@@ -1,7 +1,5 @@
 """Functions of the kernel take the least record that has what they and all that they call read or write."""
 
-from __future__ import annotations
-
 import ast
 from functools import lru_cache
 from pathlib import Path

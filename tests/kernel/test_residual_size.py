@@ -1,7 +1,5 @@
 """When residuals of a step pass: beside forces, and beside what rows are made of, however large accelerations are."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

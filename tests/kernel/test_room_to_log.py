@@ -1,7 +1,5 @@
 """Whatever happens in a step, there is room for its lines in the event log and its rows in the store."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A scheme that stands in the list of schemes runs compiled, with rows and events, at its order."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Steps with factors in straight-line code are those with a search for pivots, which takes over where it must."""
 
-from __future__ import annotations
-
 import ctypes
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Translated functions give the same bits as Python does, for everything the kernel may use."""
 
-from __future__ import annotations
-
 import ctypes
 import inspect
 import math

@@ -1,7 +1,5 @@
 """Machine code and plain Python take the same steps, find the same events and give the same rows."""
 
-from __future__ import annotations
-
 import functools
 import random
 from dataclasses import dataclass

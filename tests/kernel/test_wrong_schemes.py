@@ -1,7 +1,5 @@
 """Wrong entries of compiled schemes: each is refused by name, file and line, or breaks the law that it should."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass, replace
 from itertools import count

@@ -1,7 +1,5 @@
 """Recursive Newton–Euler in plain numpy and ground axes, written apart from the library's own equations."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tests.forward_kinematics import placed, turn

@@ -1,7 +1,5 @@
 """Damaged files of every format: a named error, or numbers; one changed cell changes that number alone."""
 
-from __future__ import annotations
-
 import random
 import warnings
 

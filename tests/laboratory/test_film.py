@@ -1,7 +1,5 @@
 """Runs as a laboratory records them: markers with errors of a known size, plates that carry the weight."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

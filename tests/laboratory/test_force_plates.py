@@ -1,7 +1,5 @@
 """Force plates: the forces of contacts as a plate measures them give the same moments, and runs feel them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

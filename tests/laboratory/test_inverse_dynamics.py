@@ -1,7 +1,5 @@
 """Inverse dynamics: moments that closed forms, an independent Newton–Euler, drives and forward runs agree with."""
 
-from __future__ import annotations
-
 import math
 import time
 import warnings

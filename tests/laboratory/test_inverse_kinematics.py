@@ -1,7 +1,5 @@
 """Inverse kinematics: the nearest postures that least_squares finds, with gaps, loops, stops and standard errors."""
 
-from __future__ import annotations
-
 import time
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Reports of measured gaits: beside the simulation that they come from, from events alone, with a band behind."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

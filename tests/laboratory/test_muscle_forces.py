@@ -1,7 +1,5 @@
 """Static optimization: conditions of an optimum, moments that are given, what is said where muscles are too weak."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize

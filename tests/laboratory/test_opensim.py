@@ -3,8 +3,6 @@
 `MBD_OSIM` may name a folder with further files, which are never copied here: the gait models of `osim-rl` 3.0.11, say.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Models of MuJoCo: equations of its own engine, words for joints, losses, limits and couplings."""
 
-from __future__ import annotations
-
 import pickle
 from importlib import metadata
 

@@ -1,7 +1,5 @@
 """Robots from URDF: equations of an independent Newton–Euler and of Pinocchio, words for all that the file says."""
 
-from __future__ import annotations
-
 import math
 import re
 from importlib import metadata

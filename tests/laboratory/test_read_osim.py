@@ -1,7 +1,5 @@
 """Models of OpenSim in its three formats: places and mass matrix of an independent evaluation, words for all else."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

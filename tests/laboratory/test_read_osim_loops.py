@@ -1,7 +1,5 @@
 """Loops that constraints of OpenSim close, and a patella, all of whose motions follow from the knee by a coupler."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

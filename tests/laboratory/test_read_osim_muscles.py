@@ -1,7 +1,5 @@
 """Muscles of OpenSim's files: paths of points that stay, move, and join in a part of a range; numbers and words."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

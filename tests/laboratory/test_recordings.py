@@ -1,7 +1,5 @@
 """Files of other programs: right numbers from every spelling, a named error from what is damaged, and round trips."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A person scaled to a patient: lengths from markers, masses by the table, everything else in proportion."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

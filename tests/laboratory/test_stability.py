@@ -1,7 +1,5 @@
 """Margin of stability: at rest, of a center of mass that moves, and distances to hulls against scipy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Models written as URDF and .osim are read back with the same equations of motion, marks and muscles."""
 
-from __future__ import annotations
-
 import copy
 
 import numpy as np

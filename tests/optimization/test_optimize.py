@@ -1,7 +1,5 @@
 """Optima of runs and gaits: in closed form, at constraints, beside trials that fail; gradients by differences."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

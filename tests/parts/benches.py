@@ -1,7 +1,5 @@
 """Benches on which parts of a leg are tried: a foot that falls, a leg that swings, in any system of units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Derivatives of a run by central differences of runs with equal steps, extrapolated (Richardson 1911)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

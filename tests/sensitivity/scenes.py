@@ -1,7 +1,5 @@
 """Random scenes with impacts, and derivatives of their runs held against differences."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import mbd

@@ -1,7 +1,5 @@
 """Derivatives of friction in planes in space: sliding, coming to rest, letting go, impacts."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derivatives of runs with controllers, what these wrote being held: those of runs in which it is written again."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

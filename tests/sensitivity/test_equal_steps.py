@@ -1,7 +1,5 @@
 """A run with derivatives is the run without them: rows, steps, failures and what the run says of its accuracy."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import mbd

@@ -1,7 +1,5 @@
 """Events at the instant of a strike: those that change nothing, and those that jump over zero in its impact."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

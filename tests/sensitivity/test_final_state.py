@@ -1,7 +1,5 @@
 """Derivatives of the end of a run are those of the numbers that it prints: differences of runs with equal steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

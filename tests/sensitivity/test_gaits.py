@@ -4,8 +4,6 @@ The gait is found by Newton's method on the exact return map; derivatives of per
 follow from the implicit function theorem.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derivatives through impacts in sequence and through Poisson's: closed forms, differences of runs, ties by name."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings, strategies as st

@@ -1,7 +1,5 @@
 """The kernel with derivatives is the same as machine code and read as Python, which share their rules alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Laws of derivatives, on random scenes with impacts: equal to differences, linear in directions, a chain over cuts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derivatives of runs with laws that have states of their own, and kinks at which steps end: limits of differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Starts and ends with derivatives on one side only are refused with both values; elsewhere both sides agree."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`mbd.sensitivities`: what it is asked for, what it refuses, and faults that others have had."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derivatives of runs over singular configurations: of the steps as they were taken; in doubt where these are long."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

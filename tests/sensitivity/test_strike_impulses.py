@@ -1,7 +1,5 @@
 """Derivatives of runs with impulses of the user's at strikes, against central differences of fourth order."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

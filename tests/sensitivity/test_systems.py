@@ -1,7 +1,5 @@
 """Systems of steps in straight-line code (`mbd.sensitivity.tangent.systems`) beside those solved by matrices."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The kernel with derivatives: its printer, and its runs beside differences of runs."""
 
-from __future__ import annotations
-
 import ctypes
 
 import numpy as np

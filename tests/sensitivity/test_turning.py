@@ -1,7 +1,5 @@
 """Derivatives of runs of joints that turn freely: limits of differences, and exact ones of free bodies."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Derivatives of runs of mechanisms that turn freely, held against differences of runs from starts q ⊕ δq, v + δv."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

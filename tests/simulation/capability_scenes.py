@@ -1,7 +1,5 @@
 """A small scene for each law of the capability table: its model, start, end, and the number that is compared."""
 
-from __future__ import annotations
-
 import mbd
 
 __all__ = ["SCENES"]

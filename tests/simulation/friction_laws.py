@@ -1,7 +1,5 @@
 """Coulomb's and Stribeck's laws in every row of a run, from the stored numbers and the equations at the row itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

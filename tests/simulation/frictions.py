@@ -1,7 +1,5 @@
 """Scenes with dry friction, and its laws along any run."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import mbd

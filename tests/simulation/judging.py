@@ -1,7 +1,5 @@
 """What every run must keep, whatever its scene is; run as a program, the worker of a batch (`tests.fuzz.batch`)."""
 
-from __future__ import annotations
-
 import json
 import re
 import sys

@@ -1,7 +1,5 @@
 """Small mechanisms whose contacts have answers in closed form, and a walker."""
 
-from __future__ import annotations
-
 import mbd
 
 __all__ = [

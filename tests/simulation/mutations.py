@@ -4,8 +4,6 @@
 a return code of 0 is a fault.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import random

@@ -1,7 +1,5 @@
 """Linkages that pass singular configurations, each with its motion on one coordinate."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, pi, sin

@@ -1,7 +1,5 @@
 """Whatever the step: no row leaves its constraints, no closed contact pulls, nothing passive gives energy."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

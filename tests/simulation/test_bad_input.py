@@ -1,7 +1,5 @@
 """Wrong arguments are refused before the first step, with one clear sentence each."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

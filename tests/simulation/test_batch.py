@@ -1,7 +1,5 @@
 """`mbd.batch`: the runs of `simulate`, many at a time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """A mass that bounces along a hill is never below it: a gap that rises, falls and rises again in one step is seen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

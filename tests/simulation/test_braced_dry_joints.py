@@ -1,7 +1,5 @@
 """Dry joints of what is braced in a carriage: beyond their limits, without sliding, whatever the carriage does."""
 
-from __future__ import annotations
-
 import math
 import random
 

@@ -1,7 +1,5 @@
 """Users' events whose measure passes zero and comes back within a step."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

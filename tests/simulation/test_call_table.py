@@ -1,7 +1,5 @@
 """What the compiled kernel is called with."""
 
-from __future__ import annotations
-
 import struct
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Every supported pair of law, scheme and strategy runs and agrees with the reference; every other one is refused."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Dry friction along prescribed motion slides from the instant at which the drive moves, however smoothly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Runs whose coordinates do not add: a ball joint by unit quaternion, four coordinates and three velocities."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Friction of contacts in space: opposite to the velocity in the plane, within the exact cone, and its changes."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

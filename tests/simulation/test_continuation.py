@@ -1,7 +1,5 @@
 """Going on from the end of a run, stored rows, and what they cost."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np

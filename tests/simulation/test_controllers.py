@@ -1,7 +1,5 @@
 """Controllers and sampled signals: their instants are step boundaries, and accuracy does not suffer from them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

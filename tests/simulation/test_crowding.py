@@ -1,7 +1,5 @@
 """Instants are located however many contacts there are; a pile goes on in non-smooth steps, however it is cut."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

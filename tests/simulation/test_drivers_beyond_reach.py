@@ -1,7 +1,5 @@
 """Drivers that ask for positions which do not exist: no row is stored there, and the failure names them."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """No silent explosion of energy: what a scheme puts into a mechanism is reported, and right runs hear nothing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import sympy

@@ -1,7 +1,5 @@
 """An event whose guard reaches zero where a contact strikes happens with it, whatever the guard is written in."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An event keeps its instant wherever steps end, also where bodies of little mass make its guard uncertain."""
 
-from __future__ import annotations
-
 import pytest
 from sympy import cos, sin
 

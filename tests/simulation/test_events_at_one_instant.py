@@ -1,7 +1,5 @@
 """Guards of a user that cross zero at one instant: each has its event once, in any order, wherever a run ends."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

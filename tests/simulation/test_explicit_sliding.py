@@ -1,7 +1,5 @@
 """Explicit schemes slide in space: straight, where errors across vanish, and from the onset on, which is stiff."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A run that fails before its first step ends has its start as its first row, whatever the scheme."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

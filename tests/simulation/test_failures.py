@@ -1,7 +1,5 @@
 """A run that cannot go on says why, and keeps everything computed."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

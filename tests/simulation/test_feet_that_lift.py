@@ -1,7 +1,5 @@
 """Corners and feet that lift as their forces pass zero, several at once: no round-off, no error of a step undoes it."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

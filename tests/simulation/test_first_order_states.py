@@ -1,7 +1,5 @@
 """Steps that follow their error where a first-order state of a user's force passes through zero, or begins there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

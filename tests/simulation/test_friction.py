@@ -1,7 +1,5 @@
 """Dry friction: its laws along runs, and scenes whose motion is known."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Feet of one body beside each other: every row just before and after a switch keeps the law of friction."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Wild scenes end in a run that keeps what every run must keep, or in an error that names and advises."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a run ends with changes by no more than the motion itself magnifies a change of its start."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

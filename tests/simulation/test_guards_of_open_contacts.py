@@ -1,7 +1,5 @@
 """When an open contact may close: arming, `only_while`, grazing, contacts that meet at one instant."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

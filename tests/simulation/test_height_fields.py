@@ -1,7 +1,5 @@
 """Points that slide with friction on smooth heights y = H(x, z): Newton's equations by hand, and rest."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Impacts: momentum, complementarity, energy, restitution, and the rules that release contacts at one."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Newton's, Poisson's, the sequential and Stronge's law: what all share, where they agree, and closed forms."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import permutations
 

@@ -1,7 +1,5 @@
 """Events of an impact tell the energy that it took; contacts with a rule in every law; index 3 beside an impact."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A foot that strikes curved ground meets the plane that touches it there: velocities, impulses, their derivatives."""
 
-from __future__ import annotations
-
 import inspect
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Impulses of events: each contact that takes part in an impact is reported once; together they change the momentum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

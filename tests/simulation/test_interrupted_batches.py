@@ -1,7 +1,5 @@
 """Ctrl-C ends a batch: the runs that were over are those of the whole batch, the others were not run."""
 
-from __future__ import annotations
-
 import _thread
 import time
 

@@ -1,7 +1,5 @@
 """Pins are said to jam where their friction can lock the motion, and only those, by every scheme."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

@@ -1,7 +1,5 @@
 """Dry friction in joints, in chains and loops; tables and pictures of it."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

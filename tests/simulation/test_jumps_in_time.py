@@ -1,7 +1,5 @@
 """Forces that jump in time: steps end there, whatever function, table or parameter says when."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

@@ -1,7 +1,5 @@
 """Where events lie in time: to round-off, or by one linear interpolation; rows on both sides; many in one step."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Eccentric hoops that roll fast: near flight rolling asks for more grip than friction can give, and they slip."""
 
-from __future__ import annotations
-
 import random
 from math import pi
 

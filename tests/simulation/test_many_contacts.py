@@ -1,7 +1,5 @@
 """Many contacts, many modes, other doors: what a run does not mind."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

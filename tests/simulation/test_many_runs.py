@@ -1,7 +1,5 @@
 """Runs in one call of the kernel are, to the bit, those that are made one by one."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

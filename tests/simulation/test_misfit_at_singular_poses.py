@@ -1,7 +1,5 @@
 """Redundant legs that do not fit quite, through flat poses: a right motion or an error, never a wrong angle."""
 
-from __future__ import annotations
-
 from math import log10
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files that were damaged or made up are refused by one named error, or what they hold goes on and is reported."""
 
-from __future__ import annotations
-
 import io
 import subprocess
 import sys

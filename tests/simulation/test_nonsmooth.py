@@ -1,7 +1,5 @@
 """Non-smooth steps: laws that hold at the end of every step, whatever the contacts do."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Non-smooth steps with friction in space: first order to located instants, exact cones, redundant feet, impacts."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

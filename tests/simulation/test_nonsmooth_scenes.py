@@ -1,7 +1,5 @@
 """Non-smooth steps on whole scenes: chatter, walkers, moving grounds, friction; who chooses them, what stops them."""
 
-from __future__ import annotations
-
 import runpy
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Motions in which no force acts: rows on rates are all that a step has to hold, and their multipliers are zero."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

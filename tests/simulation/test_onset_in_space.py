@@ -1,7 +1,5 @@
 """As sliding begins or turns around in space: friction at rows is that which moves the body; steps do not multiply."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A block on a table whose motion is prescribed slips where m |ẍ(t)| = F_s: a root of a known function."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline

@@ -1,7 +1,5 @@
 """Models travel to other processes and threads; the same motion comes back."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context

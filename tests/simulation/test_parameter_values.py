@@ -1,7 +1,5 @@
 """A value of a parameter is refused or accepted alike wherever it is given, and then makes the same motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

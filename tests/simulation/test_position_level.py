@@ -1,7 +1,5 @@
 """Multipliers of the first steps of index 3: told where they are off, by about as much as they are."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Multipliers of index 3 that err after a restart, so that a contact seems to pull, cost a run nothing."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """No contact pulls that may not: in rows, in impulses, by its friction; what a rule lets pull is reported."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

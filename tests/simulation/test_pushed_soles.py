@@ -4,8 +4,6 @@ Where a corner of a light foot begins to slide under a heavy load, friction woul
 more than the velocity is, so that the direction of sliding must be found by continuation.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

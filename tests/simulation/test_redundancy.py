@@ -1,7 +1,5 @@
 """Rows that depend on others: what a run says of them, beside the hard cases j2, j11 and j11b."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

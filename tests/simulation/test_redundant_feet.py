@@ -1,7 +1,5 @@
 """Bodies on several feet with friction: which loads they bear at rest, which way they slide, and where they stop."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

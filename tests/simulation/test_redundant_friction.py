@@ -1,7 +1,5 @@
 """Friction that slides on rows that depend on each other: what is reported is what has moved the mechanism."""
 
-from __future__ import annotations
-
 from functools import cache, lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Feet that slide, more of them than determine how they share their load."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st

@@ -1,7 +1,5 @@
 """What is no longer needed is given back: models, equations, machine code and runs."""
 
-from __future__ import annotations
-
 import gc
 import weakref
 

@@ -1,7 +1,5 @@
 """What balances stays at rest, and what nothing acts on keeps its speed: each scheme, dt and tol, tree and cut."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A disk that slides to rest while its friction turns and loads it, and one that falls flat: every row is true."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A wheel rolls while its contact is closed, and has no grip in flight."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

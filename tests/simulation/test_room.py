@@ -1,7 +1,5 @@
 """Runs whose rows would not fit into memory."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """A step that stagnates at round-off says what is left and what is attainable."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Forces of users that grow, overflow or have poles: rows that are kept are those of the motion."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A run that takes the arrays of an earlier one of its kind is, to the bit, the run that has new ones."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings, strategies as st
 

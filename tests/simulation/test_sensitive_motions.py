@@ -1,7 +1,5 @@
 """Motions that make round-off larger than a tolerance: the best run counts, in doubt, and keeps what motions keep."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

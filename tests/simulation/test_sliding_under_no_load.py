@@ -1,7 +1,5 @@
 """Contacts without a load: what nothing presses slides on at its speed, and no round-off opens it."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Friction of contacts that is smooth in the velocity: the tippe-top, Jellett's invariant, shared loads, impacts."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

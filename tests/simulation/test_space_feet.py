@@ -1,7 +1,5 @@
 """Feet in space that are capsules and polygons, and bodies that touch bodies: balls, planes and faces that move."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

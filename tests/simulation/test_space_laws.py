@@ -1,7 +1,5 @@
 """Laws of motion in space over random trees and loops of every joint: energy, momentum, one motion for every cut."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Balls on planes: they slide on a parabola and roll, and keep rolling, or slip, down a slope."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

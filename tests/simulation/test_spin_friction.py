@@ -1,7 +1,5 @@
 """Friction against the spin of a contact about its normal: a moment within a limit, which sticks and slips."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States that were changed by hand: consistent ones are taken, others are refused with the rows they violate."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """First-order states of losses and of laws of constraints, beside those of forces."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Impacts of penalty contacts take the steps that they need: nothing passive gains energy, whatever dt."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What cannot move in space, every joint cut, at rates of round-off: rows that depend on others contradict nothing."""
 
-from __future__ import annotations
-
 import math
 import random
 

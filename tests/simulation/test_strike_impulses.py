@@ -1,7 +1,5 @@
 """Impulses of the user's as contacts close: push-off beside the impact of a strike."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

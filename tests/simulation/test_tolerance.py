@@ -1,7 +1,5 @@
 """Steps that follow their error, and runs that are as accurate as `tol` asks for."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What `tol_of` names is as accurate as `tol` asks for, at rows and between them; nothing else counts."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where drives prescribe a motion, `tol` holds for their forces: over random mechanisms, against Newton and Euler."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

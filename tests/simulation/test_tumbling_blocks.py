@@ -1,7 +1,5 @@
 """Blocks in space that fall onto their corners, bounce, slide to rest there and tip over, with steps of any size."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Angles that no number tells are refused, and turns that steps do not resolve are reported."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows that turn fast beside others that turn with them are never taken for a singular configuration."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

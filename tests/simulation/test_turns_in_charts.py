@@ -1,7 +1,5 @@
 """Long steps of a ball joint by quaternion: events inside them, turns that no chart covers, rows far apart."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

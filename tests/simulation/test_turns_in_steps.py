@@ -1,7 +1,5 @@
 """A step in which an angle turns by more than half a turn says so where forces or masses follow from the angle."""
 
-from __future__ import annotations
-
 import pytest
 
 import mbd

@@ -1,7 +1,5 @@
 """Steps that do not resolve the motion: what a run says, and the step that it asks for."""
 
-from __future__ import annotations
-
 import random
 import re
 import warnings

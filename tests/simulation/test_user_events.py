@@ -1,7 +1,5 @@
 """Users' own events: crossings by direction, resets, ends of runs."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

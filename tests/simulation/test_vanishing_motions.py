@@ -1,7 +1,5 @@
 """Where nothing acts a run goes on: scales are those of the mechanism, not of terms that vanish."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

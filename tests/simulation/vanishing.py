@@ -1,7 +1,5 @@
 """Random mechanisms on which nothing acts for a while: at rest, at constant speed, moved and held, balanced."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

@@ -4,8 +4,6 @@ A scene has a shape, which decides its equations, and numbers. Many scenes share
 derived and compiled once.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Shapes of wild scenes: small mechanisms with everything that switches, each made by a random generator."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """How many operations an expression costs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 

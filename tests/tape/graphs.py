@@ -1,7 +1,5 @@
 """Random expressions, recorded on a tape and evaluated beside it with 60 digits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Elimination on the tape solves what dense LU solves, costs what the zeros leave, and tells where it must not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st

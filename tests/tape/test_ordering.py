@@ -1,7 +1,5 @@
 """Orders of elimination: every unknown once, no entry outside of the pattern, work in proportion to what there is."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, strategies as st
 

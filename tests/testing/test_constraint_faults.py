@@ -1,7 +1,5 @@
 """Wrong constraints of a user, and wrong runs: each is caught by the law it breaks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """Equations with one thing wrong: each is caught by the law it breaks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

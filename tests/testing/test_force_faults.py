@@ -1,7 +1,5 @@
 """Wrong forces and measures of a user: each is caught by the law it breaks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Wrong integrators of a user: each is caught by the law it breaks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Wrong joints and losses of a user: each is caught by the law it breaks, with a reason that can be read."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Scenes that a judge once called bad, each for another reason, keep the laws; those in space may end by name."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.fuzz.verdict import verdict

@@ -1,7 +1,5 @@
 """Small mechanisms for tests of graphs and models."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import mbd

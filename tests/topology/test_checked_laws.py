@@ -1,7 +1,5 @@
 """`check()` finds what `assemble` refuses: every word of a model whose functions cannot be recorded, all at once."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass
 from functools import partial

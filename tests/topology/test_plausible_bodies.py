@@ -1,7 +1,5 @@
 """Numbers that no link has, and a ground that is a child, are told once with the value expected."""
 
-from __future__ import annotations
-
 import re
 import warnings
 

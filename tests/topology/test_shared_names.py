@@ -1,7 +1,5 @@
 """A body may share its name with one joint or one contact: every result is the one it has under names of its own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

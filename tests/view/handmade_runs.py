@@ -1,7 +1,5 @@
 """Runs with known motions, made by hand: what results, plots and pages are tested on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

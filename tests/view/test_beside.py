@@ -1,7 +1,5 @@
 """Files that a forked process writes are those that one process writes, and no error is lost between the two."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Pages of ``mbd accuracy`` and ``mbd effects``: one file each, without a network; their scripts do what they say."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Names that mean something to matplotlib, to a terminal or to a file are shown as they are, or refused."""
 
-from __future__ import annotations
-
 import io
 import json
 import warnings

@@ -1,7 +1,5 @@
 """The page: what it holds, that it needs nothing else, and that it plays."""
 
-from __future__ import annotations
-
 import json
 import re
 from html.parser import HTMLParser

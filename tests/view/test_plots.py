@@ -1,7 +1,5 @@
 """Plots: what they show, without a window."""
 
-from __future__ import annotations
-
 import re
 import struct
 

@@ -1,7 +1,5 @@
 """Pictures of states: what they show lies where forward kinematics puts it, and they need no display."""
 
-from __future__ import annotations
-
 import dataclasses
 import gc
 

@@ -1,7 +1,5 @@
 """Arrows of forces: with the weight they make up what moves the mechanism, whichever words hold it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

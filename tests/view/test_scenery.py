@@ -1,7 +1,5 @@
 """Grounds, wheels and blades of pictures are those of the run, live and from a file."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Spatial pages and pictures: solids, the camera and the points obey the mechanics and the law of projection."""
 
-from __future__ import annotations
-
 import json
 from functools import cache, partial
 from itertools import pairwise
