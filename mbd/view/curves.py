@@ -67,6 +67,5 @@ def extremes(time: Vector, *values: Vector) -> Index:
     first = np.append(0, last[:-1] + 1)
     kept = [first, last]
     for curve in values:
-        order = np.lexsort((curve, part))
-        kept += [order[first], order[last]]
+        kept += [np.lexsort((each, part))[first] for each in (curve, -curve)]  # NaN comes last in both
     return np.unique(np.concatenate(kept))

@@ -172,13 +172,20 @@ def _moves_alike(made: Scene, run: mbd.Trajectory, form: Form) -> list[str]:
     names = [name for joint in made.model.joints for name in joint.coordinate_names]
     place, speed = _beginning(made.model, run)
     position, velocity, parameters = place | form.position, speed | form.velocity, form.parameters
-    again = mbd.assemble(form.model, position=position, velocity=velocity, parameters=parameters, project=True)
     changes: dict[str, Any] = (
         {"dt": made.options["dt"] / 1.5} if "dt" in made.options else {"tol": made.options["tol"] / 4.0}
     )
-    other, finer = run_of(made, model=form.model, start=again), run_of(made, **changes)
-    if not other.success or not finer.success or _happened(made, finer) != _happened(made, run):
+    finer = run_of(made, **changes)
+    if not finer.success or _happened(made, finer) != _happened(made, run):
         return []
+    try:
+        again = mbd.assemble(form.model, position=position, velocity=velocity, parameters=parameters, project=True)
+        other = run_of(made, model=form.model, start=again)
+    except MbdError as error:
+        return [f"{form.what}: refused, {type(error).__name__}: {error}"]
+    if not other.success:
+        other_finer = run_of(made, model=form.model, start=again, **changes)
+        return [] if other_finer.success else [f"{form.what}: fails, {other.message}"]
     faults = [f"{form.what}: {fault}" for fault in judge(other, form.model, parameters).faults]
     if _happened(made, other) != _happened(made, run):
         return faults

@@ -146,6 +146,39 @@ def test_a_person_is_taken_apart_and_changed_by_name():
         assert model.check() == []
 
 
+def test_height_and_center_follow_frames_that_turn_what_hangs_on_them():
+    """A pelvis whose joint of the back is tilted: the head and the center of mass are where the assembled person has
+    them."""
+    person = mbd.human(80.0, 1.8)
+    old = person.bodies["pelvis"]
+    pelvis = mbd.RigidBody("pelvis", old.mass, old.inertia, center=old.center.offset)
+    for point in old.points.values():
+        place = pelvis.point(*point.offset, name=None if point.name == "back" else point.name)
+        if point.name == "back":
+            place.turned(0.4, (0.3, 0.2, 1.0), name="back")
+    bent = person.replaced("pelvis", pelvis)
+    model = mbd.Model("bent")
+    model.connect(*bent.joints)
+    start = mbd.assemble(model, bent.standing())
+    masses = {name: body.fields()["mass"] for name, body in bent.bodies.items()}
+    center = sum(m * start[f"{name}.center"] for name, m in masses.items()) / sum(masses.values())
+    assert bent.center == pytest.approx(center, abs=1e-12)
+    assert abs(bent.center[2]) > 1e-3
+    assert bent.height == pytest.approx(start["head.top.y"], abs=1e-12)
+    assert bent.height < 1.8 - 0.01
+
+
+def test_a_blade_in_place_of_a_foot_reaches_down_to_its_lowest_point():
+    person, blade = mbd.human(80.0, 1.8), mbd.RigidBody("right foot", 1.0, (0.01, 0.001, 0.01))
+    height, ankle = person.standing()["trunk.y"], -person.bodies["right foot"].points["right foot.sole"].offset[1]
+    with pytest.raises(ModelError, match=r"how far 'right foot' reaches down.*name='sole'"):
+        person.replaced("right foot", blade).standing()
+    blade.point(0.1, -0.2, name="tip")
+    assert person.replaced("right foot", blade).standing()["trunk.y"] == pytest.approx(height - ankle + 0.2)
+    rod = mbd.Link("right foot", mass=1.0, length=0.2, center=0.1, inertia=(0.01, 0.001, 0.01))
+    assert person.replaced("right foot", rod).standing()["trunk.y"] == pytest.approx(height - ankle + 0.2)
+
+
 def test_two_persons_live_in_one_model():
     model = mbd.Model("a pair")
     for name in ("Ann", "Bo"):

@@ -19,7 +19,7 @@ from mbd.notes import doubt
 from mbd.parts.arguments import sizes
 from mbd.parts.whole_body.joints import Articulation, articulations
 from mbd.parts.whole_body.moments import await_passive_moments, passive_moments
-from mbd.parts.whole_body.poses import Position, center_of_mass, hips_over_ground, origins, standing
+from mbd.parts.whole_body.poses import Position, center_of_mass, hips_over_ground, origins, place_of, standing
 from mbd.parts.whole_body.segments import SIDES, Segment, segments_of
 from mbd.parts.whole_body.table import SEXES
 
@@ -106,7 +106,7 @@ class Human:
         if top is None:
             raise ModelError(f"human: its height ends at the point 'top' of '{head.name}', which it lacks")
         places = origins("pelvis", self.bodies, self.joints)
-        return hips_over_ground(self.bodies) + places[head.name][1] + top.offset[1]
+        return hips_over_ground(self.bodies) + float(place_of(top.offset, places[head.name])[1])
 
     @property
     def freedoms(self) -> int:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from mbd.bodies.algebra import IDENTITY, ZERO, Rotation, Triple, difference, product, rotate, scaled, total, transpose
 from mbd.bodies.base import Body
 from mbd.bodies.values import Vector3
 from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.parts.whole_body.segments import SIDES
 
-__all__ = ["Position", "center_of_mass", "hips_over_ground", "origins", "standing"]
+__all__ = ["Position", "center_of_mass", "hips_over_ground", "origins", "place_of", "standing"]
 
 Position = float | tuple[float, ...]
 """A coordinate, or a quaternion as a whole."""
@@ -49,7 +50,7 @@ def _legs(bodies: Mapping[str, Body]) -> dict[str, tuple[float, ...]]:
     for side in SIDES:
         own = [bodies.get(f"{side} {name}") for name, _ in parts]
         if all(body is not None for body in own):
-            found[side] = tuple(_length(body, end) for body, (_, end) in zip(own, parts, strict=True))
+            found[side] = tuple(_reach(body, end) for body, (_, end) in zip(own, parts, strict=True))
     return found
 
 
@@ -66,31 +67,45 @@ def _bent(joint: Joint, angle: float) -> dict[str, Position]:
     return {joint.coordinate_names[0]: math.copysign(angle, angle * z)}
 
 
-def _length(body: Body | None, end: str) -> float:
-    """How far down a point is."""
+def _reach(body: Body | None, end: str) -> float:
+    """How far down a point is; of a body without it, such as a blade in place of a foot, the lowest of its others."""
     assert body is not None
-    points = {frame.name: frame for frame in body.points.values()} | body.frames
-    return -points[end].offset[1] if end in points else 0.0
+    points = body.frames | {frame.name: frame for frame in body.points.values()}
+    if end in points:
+        return -points[end].offset[1]
+    down = max(-frame.offset[1] for name, frame in points.items() if name != "center")
+    if down <= 0.0:
+        raise ModelError(
+            f"standing needs to know how far '{body.name}' reaches down; name the point, such as "
+            f"body.point(0.0, -0.08, name={end!r})"
+        )
+    return down
 
 
-def origins(root: str, bodies: Mapping[str, Body], joints: Sequence[Joint]) -> dict[str, Vector3]:
-    """Where the axes of all bodies lie with every joint at zero, against those of the first [m]."""
-    found = {bodies[root].name: (0.0, 0.0, 0.0)}
+def origins(root: str, bodies: Mapping[str, Body], joints: Sequence[Joint]) -> dict[str, tuple[Rotation, Triple]]:
+    """How the axes of all bodies lie with every joint at zero, against those of the first: R, and p [m]."""
+    found: dict[str, tuple[Rotation, Triple]] = {bodies[root].name: (IDENTITY, ZERO)}
     for joint in joints:
-        parent = found.get(joint.parent.body.name)
-        if parent is not None:
-            out, back = joint.parent.offset, joint.child.offset
-            x, y, z = (p + a - b for p, a, b in zip(parent, out, back, strict=True))
-            found[joint.child.body.name] = (x, y, z)
+        if joint.parent.body.name in found:
+            R, p = found[joint.parent.body.name]
+            R = product(R, joint.parent.rotation or IDENTITY)
+            R = product(R, transpose(joint.child.rotation or IDENTITY))
+            out = rotate(found[joint.parent.body.name][0], joint.parent.offset)
+            found[joint.child.body.name] = R, difference(total(p, out), rotate(R, joint.child.offset))
     return found
 
 
-def center_of_mass(places: Mapping[str, Vector3], bodies: Mapping[str, Body]) -> tuple[float, Vector3]:
+def place_of(point: Vector3, body: tuple[Rotation, Triple]) -> Triple:
+    """Where a point of a body is, whose axes lie so [m]."""
+    return total(body[1], rotate(body[0], point))
+
+
+def center_of_mass(places: Mapping[str, tuple[Rotation, Triple]], bodies: Mapping[str, Body]) -> tuple[float, Vector3]:
     """Mass [kg] and center of mass [m] with every joint at zero."""
-    mass, moment = 0.0, [0.0, 0.0, 0.0]
+    mass, moment = 0.0, ZERO
     for body in bodies.values():
-        m, place, center = body.fields()["mass"], places[body.name], body.center.offset
+        m = body.fields()["mass"]
         mass += m
-        moment = [total + m * (p + c) for total, p, c in zip(moment, place, center, strict=True)]
-    x, y, z = (part / mass for part in moment)
+        moment = total(moment, scaled(m, place_of(body.center.offset, places[body.name])))
+    x, y, z = (float(part) / mass for part in moment)
     return mass, (x, y, z)
