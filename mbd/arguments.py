@@ -13,8 +13,6 @@ from typing import Any, TypeVar
 
 from mbd.errors import SHOWN
 
-__all__ = ["explained"]
-
 Word = TypeVar("Word")
 
 

@@ -7,8 +7,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ComplexArray", "Matrix", "Vector", "read_only"]
-
 Vector: TypeAlias = NDArray[np.float64]
 """(n,) array of float64."""
 

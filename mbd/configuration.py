@@ -32,8 +32,6 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
 
-__all__ = ["Configuration"]
-
 
 @dataclass(frozen=True, eq=False)
 class Configuration:

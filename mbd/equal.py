@@ -6,11 +6,6 @@ others ask about results: two states, two sides, two rows of a matrix, each rela
 
 from __future__ import annotations
 
-__all__ = [
-    "BRACKET_RTOL", "DIRECT_PIVOT_RTOL", "EQUAL_RTOL", "HALF_PRECISION_RTOL", "INSTANT_RTOL", "LAW_RTOL", "MIN_DIVISOR",
-    "MIN_SQUARED_SPEED", "NOMINAL_RTOL", "RANK_RTOL", "REST_SPEED", "ROUND_OFF_RTOL", "SMALL_SUM_RTOL",
-]  # fmt: skip
-
 SMALL_SUM_RTOL = 1e-14
 """Round-off of a sum of few terms, relative to the largest of them [-]."""
 ROUND_OFF_RTOL = 1e-12

@@ -6,23 +6,6 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-__all__ = [
-    "AssemblyError",
-    "CapabilityError",
-    "GaitError",
-    "MbdError",
-    "MbdWarning",
-    "MemoryLimitError",
-    "ModelError",
-    "OneSidedError",
-    "SimulationError",
-    "TraceError",
-    "TrajectoryError",
-    "UnknownNameError",
-    "nearest",
-    "quoted",
-]
-
 
 class MbdError(Exception):
     """Base of every error that `mbd` raises on purpose."""

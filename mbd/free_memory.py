@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["ASSUMED_BYTES", "available", "no_collection", "size_in_words"]
-
 ASSUMED_BYTES = 4.0e9
 """Taken for the free memory where the system does not tell it [bytes]."""
 PROC, CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from mbd.constraints.base import Constraint
     from mbd.forces.base import Force
 
-__all__ = ["Lagrangian"]
-
 
 @dataclass(frozen=True, eq=False)
 class Lagrangian(EnergyDescription):

@@ -11,8 +11,6 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
-__all__ = ["later", "register"]
-
 _PLACES: dict[str, str] = {}
 
 

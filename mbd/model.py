@@ -12,9 +12,6 @@ from mbd.topology.description import Description
 if TYPE_CHECKING:
     from mbd.equations.cost import Cost
 
-__all__ = ["Model"]
-
-
 INSTEAD = {
     "; model.without() is a copy": ("copy", "clone", "deepcopy"),
     "; mbd.simulate(model, mbd.assemble(model, position={…}), until=1.0) makes a run": ("simulate", "run", "solve"),

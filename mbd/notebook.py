@@ -7,8 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-__all__ = ["Faults", "Text", "Values", "block", "folded", "paragraphs", "table"]
-
 PLAIN = "tex2jax_ignore mathjax_ignore"
 """Classes of what notebooks do not search for formulas: a name may hold dollar signs."""
 

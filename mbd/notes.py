@@ -18,8 +18,6 @@ from weakref import WeakKeyDictionary
 
 from mbd.errors import MbdWarning
 
-__all__ = ["PROCESS", "called_from_outside", "doubt", "is_heard", "note"]
-
 
 class _Process:
     """What a doubt is of that concerns no model."""

@@ -10,8 +10,6 @@ from importlib.util import find_spec
 from time import perf_counter
 from typing import Any, TypeVar
 
-__all__ = ["Progress", "counted", "in_notebook", "progress_bar", "run_bar", "share_bar", "trial_bar"]
-
 BAR_DELAY = 3.0
 """Seconds after which a slow run that nobody wanted to watch shows a bar all the same."""
 

@@ -19,8 +19,6 @@ from mbd.notebook import table
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Memory", "Mode", "State", "are_names", "malformed", "of_model"]
-
 
 def _empty() -> Vector:
     return np.zeros(0)

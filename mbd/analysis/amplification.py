@@ -18,8 +18,6 @@ from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator, Point, System, Terms
 from mbd.state import Mode, State
 
-__all__ = ["LinearOscillator", "amplification_matrix", "oscillated"]
-
 SUPERPOSITION, ROUND_OFF = 1e-4, 4e-15
 """Difference of a step from the sum of its parts, relative, above which the scheme is not linear; and the part of it
 that round-off explains where accelerations are (ω dt)² times displacements [-]."""

@@ -9,8 +9,6 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.results.facts import Facts
 from mbd.results.units import unit
 
-__all__ = ["units_of"]
-
 PARAMETERS = {"mass": "kg", "center": "m", "inertia": "kg m²", "length": "m", "radius": "m"}
 """Units of parameters by the last word of their names."""
 ARGUMENTS = {"dt": "s", "until": "s", "time": "s", "rest_speed": "m/s"}

@@ -18,8 +18,6 @@ from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError
 
-__all__ = ["DescriptorForm", "descriptor_form"]
-
 
 @dataclass(frozen=True, eq=False)
 class DescriptorForm:

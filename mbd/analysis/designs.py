@@ -16,8 +16,6 @@ import numpy as np
 from mbd.bodies.values import is_number, shown
 from mbd.errors import ModelError
 
-__all__ = ["latin_hypercube", "sobol"]
-
 Design = dict[tuple[str, ...], list[tuple[float, ...]]]
 """Names that change together, and their values in each run."""
 

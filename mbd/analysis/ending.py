@@ -17,9 +17,6 @@ from mbd.results.summary import cost, entries, of_the_swing, strategy
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Summary", "ending", "summary"]
-
-
 FALLEN_HEIGHT_RATIO = 0.5
 """Height over that of the start below which a mechanism has fallen [-]."""
 

@@ -21,8 +21,6 @@ from mbd.results.record import EventRecord
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Gait", "Step", "gait", "mirrored"]
-
 SPATIAL = ("solid", "limb", "hinge")
 """Kinds of shapes that runs in space have alone."""
 

@@ -10,8 +10,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import HALF_PRECISION_RTOL, NOMINAL_RTOL
 
-__all__ = ["Independent", "independent", "row_sizes"]
-
 ROW_RTOL = 1e-10
 """Size of a row, relative to the largest, below which it acts on nothing [-]."""
 ORDER_PREFERENCE = 1e-6

@@ -29,8 +29,6 @@ from mbd.simulation.run.plain import MechanismSystem, shares
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 
-__all__ = ["Instant", "instant"]
-
 REASONS = {
     codes.NOT_FINITE: "a force, a mass or a row is not finite there",
     codes.CONFLICT: "no accelerations satisfy all rows there",

@@ -16,8 +16,6 @@ from mbd.equations.linearization import LinearTerms
 from mbd.equations.ports import PortTerms
 from mbd.errors import ModelError
 
-__all__ = ["LinearMotion", "Prescribed", "linear_motion", "multiplier_map", "singular"]
-
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:

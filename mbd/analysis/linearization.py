@@ -24,8 +24,6 @@ from mbd.notes import doubt
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Linearization", "NaturalMode"]
-
 
 @dataclass(frozen=True)
 class NaturalMode:

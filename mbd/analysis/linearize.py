@@ -23,8 +23,6 @@ from mbd.errors import ModelError
 from mbd.notes import doubt
 from mbd.state import State
 
-__all__ = ["linearize"]
-
 ADVICE = "; linearize beside it, or make the function smooth there"
 """What to try."""
 

@@ -21,8 +21,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.integrators.base import Integrator
 
-__all__ = ["Spectrum", "argument_faults", "spectrum"]
-
 MAX_OMEGA_DT = 1e6
 """Largest ω dt that can be told from round-off [rad]."""
 NYQUIST = float(np.pi)

@@ -15,8 +15,6 @@ from mbd.errors import ModelError
 from mbd.notebook import table
 from mbd.results.tables import library
 
-__all__ = ["StateSpace"]
-
 METHODS = ("zoh", "bilinear", "euler", "backward_diff", "foh", "impulse")
 """Ways to sample that `scipy.signal.cont2discrete` knows by a name alone."""
 

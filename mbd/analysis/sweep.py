@@ -35,8 +35,6 @@ from mbd.state import State
 if TYPE_CHECKING:
     from xarray import Dataset
 
-__all__ = ["Sweep", "SweepFile", "sweep"]
-
 OUTCOME = ("success", "message")
 """Columns of every table."""
 

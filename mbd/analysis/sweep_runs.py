@@ -28,8 +28,6 @@ from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.topology.description import Description
 
-__all__ = ["NOT_RUN", "SETTINGS", "Results", "Row", "Runs", "cell", "rows_of"]
-
 SETTINGS = ("integrator", "dt", "tol", "until", "contact", "impact", "locate", "rest_speed")
 """Arguments of `simulate` that may take several values, beside the model's parameters."""
 

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from mbd.analysis.linearization import Linearization
     from mbd.analysis.numerical import Criteria
 
-__all__ = ["criteria_table", "linear_html", "linear_table"]
-
 MAX_NAMED = 4
 """Coordinates that are named in a line at most."""
 ZERO_EIGENVALUE_RTOL = 3e-8

@@ -8,8 +8,6 @@ from mbd.bodies.values import names_given
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["names_wanted", "scalars_wanted"]
-
 
 def names_wanted(wanted: Any, what: str) -> tuple[tuple[str, ...], list[str]]:
     """Names given as the argument `what`, and its faults."""

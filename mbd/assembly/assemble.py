@@ -35,8 +35,6 @@ from mbd.kernel.stepping.begin_run import MAX_START_DEPTH
 from mbd.notes import doubt
 from mbd.state import State, of_model
 
-__all__ = ["assemble"]
-
 
 def assemble(
     model: Any,

@@ -16,8 +16,6 @@ from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.errors import AssemblyError
 from mbd.state import State, of_model
 
-__all__ = ["changed_start", "start_names"]
-
 
 def start_names(mechanism: Mechanism) -> dict[str, tuple[str, int]]:
     """('q' or 'y', number) by name: every coordinate that adds, rate and first-order state of a start.

@@ -17,8 +17,6 @@ from mbd.errors import UnknownNameError
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 
-__all__ = ["Condition", "conditions"]
-
 PLACES = frozenset({"t", "q", "x", "p"})
 """Kinds of inputs that a position may depend on; a rate depends on v as well."""
 

@@ -12,8 +12,6 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equal import NOMINAL_RTOL
 from mbd.equations.equations import Row
 
-__all__ = ["residuals", "violations"]
-
 ASSEMBLED_RESIDUAL = 1e-8
 """The same residuals below which it always is: ten times what an assembly leaves."""
 

@@ -14,9 +14,6 @@ from mbd.assembly.posture import Posture
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 
-__all__ = ["Attempt", "contradictions", "infeasible"]
-
-
 PROJECT_ADVICE = ", or use assemble(..., project=True) to move all"
 """Advice to those who have not followed it yet."""
 

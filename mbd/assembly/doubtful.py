@@ -10,8 +10,6 @@ from mbd.tape.derivatives import gradient, live, substitute
 from mbd.tape.node import Node
 from mbd.topology.doubts import doubts, in_radians
 
-__all__ = ["degrees", "doubtful"]
-
 
 def doubtful(model: Any, equations: Equations, position: Mapping[str, float]) -> list[str]:
     """Sentences on values of a start and of the model that look like mistakes."""

@@ -17,8 +17,6 @@ from mbd.equal import NOMINAL_RTOL
 from mbd.errors import AssemblyError, ModelError, UnknownNameError, nearest
 from mbd.state import State
 
-__all__ = ["FootPlaces", "foot_places"]
-
 
 @dataclass(frozen=True)
 class FootPlaces:

@@ -23,8 +23,6 @@ from mbd.topology.check import faults
 from mbd.topology.description import Description
 from mbd.topology.plan import Plan, plan
 
-__all__ = ["require_inertia", "weighted_velocities"]
-
 MIN_EIGENVALUE_RATIO = 1e-16
 """Smallest over largest eigenvalue of the scaled mass matrix below which no correction finds its inverse [-]."""
 

@@ -19,8 +19,6 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
-__all__ = ["MAX_ANGLE", "GivenState", "beyond_angles", "fits", "given_state"]
-
 MAX_ANGLE = 1e12
 """Beyond this, neighbouring numbers differ by more than 1e-4 rad: poses, and what depends on them, are round-off."""
 

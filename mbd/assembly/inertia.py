@@ -14,8 +14,6 @@ from mbd.assembly.posture import Posture
 from mbd.compile.orders import MIN_UNKNOWNS
 from mbd.equal import ROUND_OFF_RTOL
 
-__all__ = ["alike_islands", "islands_of_rows", "lost_inertia", "lost_sentence", "undetermined"]
-
 ENERGY_RTOL = 1e-26
 """Kinetic energy of a motion, over what M adds up for it, below which it is that of round-off in velocities [-]."""
 LOST_ENERGY_RTOL = 1e-17

@@ -14,8 +14,6 @@ from mbd.assembly.posture import Posture, close_positions, descend, descents
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 
-__all__ = ["Held", "acceleration_conflict", "named_conflict", "position_conflicts", "velocity_conflict"]
-
 MAX_CONFLICTING_SETS = 5
 """Conflicting sets that are reported at once."""
 

@@ -17,8 +17,6 @@ from mbd.tape.node import Node, Scalar
 from mbd.topology.description import Description
 from mbd.topology.plan import plan, uncut
 
-__all__ = ["opening"]
-
 Values = dict[str, float]
 """Values of coordinates or of their velocities, by name."""
 

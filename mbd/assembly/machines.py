@@ -16,8 +16,6 @@ from mbd.equations.equations import Machine
 from mbd.errors import ModelError, nearest
 from mbd.state import State
 
-__all__ = ["begun_in", "first_anchors", "hold", "store_first", "stored_anew", "without_held"]
-
 
 def first_anchors(mechanism: Mechanism, parameters: Vector) -> Vector:
     """Anchors of which machines hold what they do before a start, and zeros elsewhere."""

@@ -9,8 +9,6 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.trivial_rows import trivial_rows
 from mbd.kernel.contact.active_set import ActiveSetManager
 
-__all__ = ["manager_of"]
-
 
 @dataclass
 class _Last:

@@ -22,8 +22,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.state import State, malformed
 
-__all__ = ["Mobility", "mobility"]
-
 IN_PLANE = ("x", "y", "turn z", "turn about")
 """Parts of rows that hold places and angles of the plane x–y."""
 

@@ -19,8 +19,6 @@ from mbd.assembly.conditions import Condition
 from mbd.assembly.posture import Posture, close_nearby, close_positions, move
 from mbd.equal import EQUAL_RTOL, RANK_RTOL
 
-__all__ = ["nearest_positions", "nearest_velocities"]
-
 CHANGE_ATOL = 1e-10
 """Change [m, rad] below which it has arrived."""
 UNNAMED_WEIGHT = 1e-6

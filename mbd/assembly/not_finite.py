@@ -12,8 +12,6 @@ from mbd.equations.equations import Effect, Equations
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node
 
-__all__ = ["first_cause", "tape_inputs"]
-
 Key = Node | tuple[str, int]
 Inputs = Mapping[Key, float]
 

@@ -12,8 +12,6 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.tape.derivatives import gradient
 
-__all__ = ["REVERSED_JOINT", "faced", "facing_cosines", "reversed_joints"]
-
 OPPOSITE_RTOL = 1e-3
 """(1 + cos θ)/2 below which a direction counts as opposite: within 4° of half a turn."""
 REVERSED_JOINT = (

@@ -14,8 +14,6 @@ from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 from mbd.kernel.contact.active_set import ActiveSetManager
 
-__all__ = ["Posture"]
-
 
 @dataclass
 class Posture:

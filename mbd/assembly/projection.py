@@ -19,8 +19,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.errors import AssemblyError
 from mbd.state import State, of_model
 
-__all__ = ["project"]
-
 
 def project(model: Any, state: State, parameters: Mapping[str, float] | None = None, backend: str = "auto") -> State:
     """The state nearest to a given one that satisfies all constraints, at its time and with its closed contacts.

@@ -16,16 +16,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.state import State
 from mbd.tape.derivatives import live
 
-__all__ = [
-    "choose_turns",
-    "directed",
-    "hold_directions",
-    "keep_wrapped",
-    "name_wrapped",
-    "nearest_turns",
-    "whole_turns",
-]
-
 
 def whole_turns(angle: float) -> int:
     """How many turns an angle lies away from (−π, π]."""

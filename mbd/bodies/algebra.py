@@ -11,11 +11,6 @@ from mbd.tape.derivatives import jvp, substitute
 from mbd.tape.functions import cos, sin, sqrt
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = [
-    "IDENTITY", "ZERO", "Rotation", "Triple", "axis_rotation", "basis", "constant_rotation", "cross", "derivatives_at",
-    "difference", "dot", "norm", "product", "rotate", "scaled", "sum_of", "total", "transpose",
-]  # fmt: skip
-
 Triple: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Rotation: TypeAlias = tuple[Triple, Triple, Triple]
 

@@ -14,8 +14,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Body", "Frame", "Parameter", "ParameterSource", "frames_in_words"]
-
 Parameter = Callable[[str], Scalar]
 """Gives the value of a field of a body, a number or a run-time input."""
 

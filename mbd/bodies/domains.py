@@ -8,8 +8,6 @@ from math import inf
 from mbd.bodies.values import named_number_faults
 from mbd.dataclass import dataclass
 
-__all__ = ["Domain", "Parameterized", "ParameterCheck", "at_least_zero", "positive"]
-
 
 @dataclass(frozen=True)
 class Domain:

@@ -7,8 +7,6 @@ from typing import Any, Protocol, TypeAlias
 
 from numpy.typing import NDArray
 
-__all__ = ["Expression", "Function", "GivenInertia", "NumberByMode", "Numbers"]
-
 
 class Expression(Protocol):
     """An expression of sympy."""

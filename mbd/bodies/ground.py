@@ -7,8 +7,6 @@ from mbd.bodies.base import Body, Parameter, ParameterSource
 from mbd.bodies.mass import MassProperties
 from mbd.dataclass import dataclass
 
-__all__ = ["Ground"]
-
 
 @dataclass(frozen=True)
 class Ground(Body):

@@ -13,8 +13,6 @@ from mbd.bodies.values import Vector3, among, number, size, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 
-__all__ = ["SEGMENTS", "Solid", "box", "cylinder", "disk", "rod", "segment", "sphere"]
-
 
 @dataclass(frozen=True)
 class Solid:

@@ -7,8 +7,6 @@ from mbd.bodies.base import Frame, ParameterSource
 from mbd.dataclass import dataclass
 from mbd.tape.node import Scalar
 
-__all__ = ["Level"]
-
 
 @dataclass(frozen=True, repr=False)
 class Level(Frame):

@@ -19,8 +19,6 @@ from mbd.bodies.mass import (
 from mbd.bodies.values import name_of, number
 from mbd.dataclass import dataclass
 
-__all__ = ["Link"]
-
 
 @dataclass(frozen=True, init=False)
 class Link(Body):

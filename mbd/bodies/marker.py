@@ -9,8 +9,6 @@ from mbd.bodies.values import name_of, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
-__all__ = ["Marker"]
-
 
 @dataclass(frozen=True, repr=False, init=False)
 class Marker(Frame):

@@ -15,8 +15,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError
 from mbd.tape.node import Scalar
 
-__all__ = ["Inertia", "MassProperties", "inertia_faults", "inertia_fields", "inertia_matrix", "inertia_of"]
-
 Inertia: TypeAlias = float | tuple[float, ...]
 """About the center of mass in body axes [kg m²]: a number (about z), (Ixx, Iyy, Izz), or these and (Ixy, Ixz, Iyz)."""
 

@@ -8,8 +8,6 @@ from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import name_of, number
 from mbd.dataclass import dataclass
 
-__all__ = ["PointMass"]
-
 
 @dataclass(frozen=True)
 class PointMass(Body):

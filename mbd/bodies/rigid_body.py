@@ -19,8 +19,6 @@ from mbd.bodies.values import Vector3, among, name_of, number, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 
-__all__ = ["FORMS", "RigidBody"]
-
 FORMS = ("box", "cylinder", "ball")
 """As which a body may be drawn."""
 

@@ -17,8 +17,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, UnknownNameError, nearest
 from mbd.tape.node import Node
 
-__all__ = ["LEVEL", "Backend", "Function", "Functions", "Twins", "backend"]
-
 LEVEL = "MBD_OPTIMIZATION_LEVEL"
 """Environment variable: optimization level of machine code, '0' where programs are many and runs are short."""
 

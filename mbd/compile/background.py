@@ -18,8 +18,6 @@ from typing import Protocol
 
 from mbd.compile import forking  # noqa: F401  (a fork stops the thread first, then waits for locks)
 
-__all__ = ["Job", "finish", "submit", "wake"]
-
 
 class Job(Protocol):
     """Something to be done in steps."""

@@ -10,8 +10,6 @@ from mbd.compile.lowering import MAX_OPERATIONS, PART_OPERATIONS, lower
 from mbd.tape.node import Node
 from mbd.trees.c import HEAD, Straight
 
-__all__ = ["c_source"]
-
 
 def c_source(
     programs: Mapping[str, Sequence[Node]],

@@ -22,8 +22,6 @@ from pathlib import Path
 from mbd.dataclass import dataclass
 from mbd.notes import PROCESS, doubt
 
-__all__ = ["MAX_BYTES", "ObjectCache", "default_cache", "key_of"]
-
 MAX_BYTES = 256 * 2**20
 """Bytes above which the entries that were used longest ago are removed (a model takes 10 to 200 kB)."""
 MAX_NOTE_AGE = 60.0

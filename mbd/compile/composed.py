@@ -18,8 +18,6 @@ from mbd.compile.backend import Function
 from mbd.dataclass import dataclass
 from mbd.equations.composition import BOTTOM, MATRIX, RATE, RESIDUAL, RIGHT, TURNING, VALUE
 
-__all__ = ["Composed", "Shape", "Term"]
-
 Places = NDArray[np.int64]
 FIRST_TERM = 7
 """Numbers of a plan before those of its terms."""

@@ -17,8 +17,6 @@ import numpy as np
 from mbd.dataclass import dataclass
 from mbd.tape.node import Node
 
-__all__ = ["MIN_OPERATIONS", "MIN_REPEATED", "Angle", "Element", "Step", "elements", "stretches"]
-
 MIN_OPERATIONS, MIN_REPEATED = 30_000, 3
 """Operations of a program, and how often those of a kind occur on average, from which on its code is written once.
 

@@ -15,8 +15,6 @@ from mbd.equations.equations import Equations
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = ["Energies"]
-
 MIN_CALLS = 4
 """Calls after which machine code is made: it takes some milliseconds, and saves one of a large mechanism in each."""
 MIN_STATES = 256

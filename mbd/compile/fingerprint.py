@@ -26,8 +26,6 @@ from mbd.equations.equations import Effect, Equations, Guard, Parameter
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Tape
 
-__all__ = ["fingerprint", "source_digest", "sources_of"]
-
 SOURCES = (
     "arrays.py", "configuration.py", "equal.py", "scope.py", "bodies", "compile", "equations", "joints", "tape",
     "trees",

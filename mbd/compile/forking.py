@@ -13,8 +13,6 @@ import threading
 from contextlib import AbstractContextManager
 from typing import Any
 
-__all__ = ["COMPILING", "free_in_child"]
-
 COMPILING = threading.RLock()
 """Held while LLVM is at work."""
 

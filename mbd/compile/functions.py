@@ -7,8 +7,6 @@ from typing import Generic, TypeVar
 
 from mbd.errors import UnknownNameError, nearest
 
-__all__ = ["ByName"]
-
 F = TypeVar("F")
 
 

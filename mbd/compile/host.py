@@ -11,8 +11,6 @@ import llvmlite.binding as llvm
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 
-__all__ = ["TURNED_OFF", "Host", "host"]
-
 TURNED_OFF = "MBD_CPU_FEATURES"
 """Environment variable: features of the processor that machine code is to do without, '-fma,-avx512f'."""
 

@@ -15,8 +15,6 @@ from mbd.compile.lowering import MAX_OPERATIONS, PART_OPERATIONS, lower
 from mbd.tape.node import Node
 from mbd.trees.llvm import Straight, helpers
 
-__all__ = ["MAX_LINES", "Module"]
-
 MAX_LINES = 2500
 """Lines of text after which a piece is full: some 1000 operations, with what goes in and out of their functions."""
 

@@ -7,8 +7,6 @@ import weakref
 
 from mbd.compile.llvm import Machine, cached_object, emit_object
 
-__all__ = ["Jump"]
-
 AT_ONCE = 64
 """Jumps that are made together."""
 

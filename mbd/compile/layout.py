@@ -14,8 +14,6 @@ from functools import cached_property
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
 
-__all__ = ["Layout"]
-
 
 @dataclass(frozen=True)
 class Layout:

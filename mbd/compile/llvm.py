@@ -50,11 +50,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError, ModelError
 from mbd.tape.node import Node
 
-__all__ = [
-    "LEVEL", "MAX_QUICK_LINES", "Build", "Library", "Machine", "MachineFunction", "cached_object", "call",
-    "emit_object", "load_object", "tag_key",
-]  # fmt: skip
-
 LEVEL = 2
 """Default optimization level, see above."""
 

@@ -21,8 +21,6 @@ from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Table
 from mbd.trees.trigonometry import WIDTHS
 
-__all__ = ["MAX_OPERATIONS", "MIN_RUNS", "MIN_ZEROS", "PART_OPERATIONS", "Target", "lower"]
-
 MAX_OPERATIONS = 2500
 """Operations above which a function is cut into parts."""
 PART_OPERATIONS = 250

@@ -13,8 +13,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
 
-__all__ = ["at_blocks", "at_inputs"]
-
 CHUNK = 128
 """Rows of inputs that are laid out at once, so that they stay in the processor's cache."""
 

@@ -36,8 +36,6 @@ from mbd.free_memory import no_collection
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = ["AccelerationTerms", "Mechanism", "ModeCode", "rate_names"]
-
 
 @dataclass(frozen=True)
 class ModeCode:

@@ -26,18 +26,6 @@ from mbd.dataclass import dataclass
 from mbd.tape.node import Node
 from mbd.tape.ordering import Order, order
 
-__all__ = [
-    "MIN_SAVING",
-    "MIN_UNKNOWNS",
-    "Filled",
-    "elimination_order",
-    "flat_order",
-    "is_unit",
-    "may_pay",
-    "pattern",
-    "written",
-]
-
 HEADER_SIZE = 3
 """Numbers before the lists of an order."""
 MIN_UNKNOWNS = 21

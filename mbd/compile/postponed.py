@@ -9,8 +9,6 @@ from typing import Any
 
 from mbd.arrays import Vector
 
-__all__ = ["Postponed"]
-
 _ENTRY = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 
 

@@ -17,8 +17,6 @@ from typing import Any
 from mbd.compile.fingerprint import fingerprint
 from mbd.equations.equations import Equations
 
-__all__ = ["Facts", "Remembered"]
-
 Facts = Mapping[str, Any]
 """What was found besides programs, as JSON has it."""
 

@@ -22,8 +22,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["CannotTellError", "Reader", "as_it_is", "changing", "codes_of", "digest_of_words", "values_of"]
-
 PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...))
 
 

@@ -24,8 +24,6 @@ from mbd.errors import ModelError
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node
 
-__all__ = ["parts_of_row", "trivial_rows"]
-
 SAMPLED_POSES = 3
 """Positions at which rows are looked at [-]."""
 

@@ -12,8 +12,6 @@ from mbd.forces.base import frame_of
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["Ball"]
-
 
 @dataclass(frozen=True)
 class Ball:

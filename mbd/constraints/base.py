@@ -14,8 +14,6 @@ from mbd.constraints.measure import mentioned_names
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Scalar
 
-__all__ = ["KINDS", "Constraint", "VelocityConstraint"]
-
 KINDS = ("bilateral", "nonholonomic", "unilateral", "penalty", "event", "machine", "impulse")
 """What a constraint may be to the active-set manager."""
 

@@ -23,8 +23,6 @@ from mbd.tape.derivatives import live
 from mbd.tape.functions import atan2, cos, sin
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Bilateral"]
-
 
 @dataclass(frozen=True)
 class Bilateral(OfQuantities, Constraint):

@@ -15,8 +15,6 @@ from mbd.joints.losses.base import StateRates
 from mbd.tape.functions import maximum, minimum, sqrt, where
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Bristles"]
-
 
 @dataclass(frozen=True)
 class Bristles:

@@ -11,8 +11,6 @@ from mbd.bodies.values import name_of, names_of, number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
-__all__ = ["Controller"]
-
 Update = Callable[[float, Mapping[str, float], Any], Any]
 """``update(time, values, state)`` → the parameters to write {name: value}, or (that, next state)."""
 

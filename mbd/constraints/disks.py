@@ -23,8 +23,6 @@ from mbd.forces.quantities import Mention
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["DiskTouchdown", "disk_touchdown", "slip_along", "steepness", "to_edge"]
-
 
 def steepness(center: Frame, axis: Vector3, ground: Plane, scope: Scope) -> Scalar:
     """|n × a|: 1 of an upright disk, 0 of one that lies flat."""

@@ -19,8 +19,6 @@ from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Event"]
-
 
 @dataclass(frozen=True)
 class Event(Machine):

@@ -8,8 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-__all__ = ["evaluated", "function_of_expression", "is_expression", "plain", "quantities_in"]
-
 
 def is_expression(value: Any) -> bool:
     """Whether a value is a sympy expression, with symbols or without."""

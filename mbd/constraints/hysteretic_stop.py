@@ -14,8 +14,6 @@ from mbd.dataclass import dataclass
 from mbd.tape.functions import maximum
 from mbd.tape.node import Scalar
 
-__all__ = ["HystereticStop"]
-
 
 @dataclass(frozen=True)
 class HystereticStop(StopWithMemory):

@@ -19,8 +19,6 @@ from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of,
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
-__all__ = ["ORDERS", "Impulse"]
-
 ORDERS = ("before", "with", "after")
 """When an impulse acts beside the impact of the contact that it waits for."""
 

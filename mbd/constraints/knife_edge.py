@@ -16,8 +16,6 @@ from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Scalar
 
-__all__ = ["KnifeEdge"]
-
 
 @dataclass(frozen=True)
 class KnifeEdge(VelocityConstraint):

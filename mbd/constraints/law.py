@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from mbd.constraints.measure import Measure
     from mbd.constraints.rules import When
 
-__all__ = ["Closing", "Drag", "Equation", "Hold", "Law", "Rubbing"]
-
 Hold: TypeAlias = "Callable[[Sequence[Scalar]], Sequence[Scalar]]"
 
 

@@ -17,8 +17,6 @@ from mbd.constraints.base import Constraint
 from mbd.dataclass import dataclass
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Change", "Machine", "state_of"]
-
 SEPARATOR = ": "
 """Between the name of a machine and that of a state: 'knee phase: stance'."""
 

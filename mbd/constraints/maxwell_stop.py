@@ -13,8 +13,6 @@ from mbd.constraints.stop_with_memory import StopWithMemory
 from mbd.dataclass import dataclass
 from mbd.tape.functions import maximum
 
-__all__ = ["MaxwellStop"]
-
 
 @dataclass(frozen=True)
 class MaxwellStop(StopWithMemory):

@@ -12,8 +12,6 @@ from mbd.bodies.scope import Scope
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Scalar
 
-__all__ = ["Measure", "gap_of", "mentioned_names"]
-
 
 class Measure(ABC):
     """Where: a signed distance or angle g of the posture, with ``g ≥ 0`` open where it serves a contact.

@@ -15,10 +15,6 @@ from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
-__all__ = [
-    "Distance", "Height", "JointMeasure", "Separation", "distance", "extension", "flexion", "height", "separation",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class JointMeasure(Measure):

@@ -17,8 +17,6 @@ from mbd.errors import ModelError, nearest
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Mode", "Transition"]
-
 INDEX, SINCE, REMEMBERED = 0, 1, 2
 """Numbers that a mode holds: of its state, when that began [s], what it remembers."""
 

@@ -26,8 +26,6 @@ from mbd.forces.quantities import (
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import traced_scalar
 
-__all__ = ["Nonholonomic"]
-
 TIME = (("t", "t"),)
 
 

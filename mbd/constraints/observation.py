@@ -17,8 +17,6 @@ from mbd.joints.base import Joint
 from mbd.tape.node import Node, Scalar
 from mbd.tape.tracing import traced
 
-__all__ = ["Observation"]
-
 
 @dataclass(frozen=True, init=False)
 class Observation:

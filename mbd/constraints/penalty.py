@@ -26,8 +26,6 @@ from mbd.tape.derivatives import substitute
 from mbd.tape.functions import maximum, sqrt
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Penalty"]
-
 MIN_APPROACH_SPEED = 1e-6
 """Least approach speed of the χ laws [m/s or rad/s], the default of 'name.slowest': a touch at rest divides by it."""
 

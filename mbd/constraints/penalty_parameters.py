@@ -20,8 +20,6 @@ from mbd.constraints.restitution import (
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
-__all__ = ["PenaltyParameters", "largest_dt", "penalty_parameters"]
-
 STEPS_OF_APPROACH = 5.0
 """Steps until the deepest point that resolve an impact: its restitution and depth are right to about a hundredth."""
 

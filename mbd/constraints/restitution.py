@@ -18,11 +18,6 @@ from mbd.arrays import Vector
 from mbd.bodies.values import among
 from mbd.errors import ModelError, nearest
 
-__all__ = [
-    "KELVIN_VOIGT", "MIN_RESTITUTION", "impact_integral", "chi_for", "damping_ratio_for", "law_of", "over_angle",
-    "restitution_of_chi", "restitution_of_ratio", "stored_work", "wanted",
-]  # fmt: skip
-
 MIN_RESTITUTION = 0.05
 """Below it a force law is nearly a dashpot: stiffer equations than those of an impact, for the same motion."""
 KELVIN_VOIGT = "kelvin-voigt"

@@ -21,8 +21,6 @@ from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Rolling"]
-
 
 @dataclass(frozen=True)
 class Rolling(VelocityConstraint):

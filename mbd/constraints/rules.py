@@ -12,10 +12,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 
-__all__ = [
-    "When", "condition_details", "condition_faults", "condition_of", "contacts_of", "mentions_of", "releases_of",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class When:

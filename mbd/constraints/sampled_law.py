@@ -18,8 +18,6 @@ from mbd.tape.functions import floor
 from mbd.tape.node import Node, Scalar
 from mbd.tape.tracing import traced_scalar
 
-__all__ = ["SampledLaw"]
-
 INDEX, NEXT, FIRST = 0, 1, 2
 """Numbers that a sampled law holds: whether it waits to put out, when its next sample is, then its values."""
 

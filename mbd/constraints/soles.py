@@ -16,8 +16,6 @@ from mbd.tape.interpolation import Pieces, joined
 from mbd.tape.node import Tape
 from mbd.tape.tracing import traced_scalar
 
-__all__ = ["Sole", "sole_of"]
-
 FINENESS = math.radians(3.0)
 """Largest distance of tangents at which the support function is known [rad]."""
 

@@ -22,8 +22,6 @@ from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Scalar
 
-__all__ = ["SphereTouchdown", "sphere_touchdown"]
-
 
 @dataclass(frozen=True)
 class SphereTouchdown(Measure):

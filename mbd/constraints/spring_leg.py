@@ -17,8 +17,6 @@ from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.tape.functions import cos, sin, sqrt, where
 
-__all__ = ["SpringLeg"]
-
 FIELDS = ("stiffness", "length", "touchdown_angle")
 
 

@@ -17,8 +17,6 @@ from mbd.errors import ModelError
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Node
 
-__all__ = ["StopWithMemory"]
-
 
 @dataclass(frozen=True)
 class StopWithMemory(Constraint):

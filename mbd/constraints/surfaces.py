@@ -17,8 +17,6 @@ from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced_scalar
 
-__all__ = ["Plane", "Surface", "spin_about", "surface_of"]
-
 STILL: Vector3 = (0.0, 0.0, 0.0)
 
 PLACES = ("x", "z", "t")

@@ -16,8 +16,6 @@ from mbd.forces.base import frame_of
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Touchdown", "touchdown"]
-
 
 @dataclass(frozen=True)
 class Touchdown(Measure):

@@ -16,8 +16,6 @@ from mbd.joints.base import Joint
 from mbd.tape.functions import atan2, sqrt, where
 from mbd.tape.node import Scalar
 
-__all__ = ["Cone", "Twist", "cone", "twist"]
-
 SQUARED_SINE_ATOL = 1e-24
 """Square of the sine of a tilt below which its direction is not asked for [-]."""
 

@@ -15,8 +15,6 @@ from mbd.forces.quantities import ArgumentSpec, Mention, arguments_of, mentioned
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import traced_scalar
 
-__all__ = ["UserMeasure", "measure", "measured"]
-
 
 @dataclass(frozen=True)
 class UserMeasure(Measure):

@@ -19,8 +19,6 @@ from mbd.equations.placement import Axes, Mark, Placement, Point
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["partials", "rates"]
-
 
 def partials(placement: Placement, outputs: Sequence[Node]) -> list[dict[Node, Node]]:
     """For each velocity v_j, the derivative along it of the places and rotations that the outputs are made of."""

@@ -7,8 +7,6 @@ from typing import Any
 from mbd.tape.derivatives import jvp, substitute
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["chart_end", "chart_maps", "chart_motion"]
-
 
 def chart_maps(equations: Any) -> tuple[tuple[Node, ...], ...]:
     """q ⊕ x | other ⊖ q | ẋ by x, v | v by x, ẋ in the place of v | ẍ by x, v, v̇ | v̇ by x, ẋ, ẍ in those of v, v̇.

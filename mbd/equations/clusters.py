@@ -12,8 +12,6 @@ from mbd.equations.equations import Equations
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = ["clusters"]
-
 
 def clusters(equations: Equations) -> tuple[int, ...]:
     """The number of the cluster of each component of the balance and of each row (n_v + n_z + m), counted from 0.

@@ -38,8 +38,6 @@ from mbd.equations.placement import Placement
 from mbd.tape.derivatives import Sweeps, jvp
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Branches", "turns_by_numbers"]
-
 Flat = tuple[Scalar, Scalar]
 """A vector of the plane."""
 NOWHERE: Flat = (0.0, 0.0)

@@ -16,11 +16,6 @@ from mbd.equations.equations import Equations
 from mbd.tape.derivatives import live, substitute
 from mbd.tape.node import Node, Tape
 
-__all__ = [
-    "BOTTOM", "MATRIX", "RATE", "RESIDUAL", "RIGHT", "TURNING", "VALUE", "Part", "Sparse", "composes",
-    "own_program",
-]  # fmt: skip
-
 MIN_COMPOSED_CONTACTS = 8
 """Contacts from which on modes are composed [-]."""
 MATRIX, RIGHT, BOTTOM, RESIDUAL, VALUE, RATE, TURNING = range(7)

@@ -27,8 +27,6 @@ from mbd.tape.derivatives import gradient, live, substitute
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["anchors_held", "laws"]
-
 Drags = tuple[tuple[str, Node, Node], ...]
 
 

@@ -16,8 +16,6 @@ from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp, vjp
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["CoordinateScope", "identifier"]
-
 
 def identifier(name: str) -> str:
     """The name as a Python argument: 'hip.angle' → 'hip_angle'."""

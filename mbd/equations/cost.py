@@ -12,8 +12,6 @@ from mbd.notebook import table
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = ["Cost", "cost", "operations"]
-
 
 def operations(nodes: Sequence[Node]) -> int:
     """Scalar operations that some outputs take, each counted once."""

@@ -29,8 +29,6 @@ from mbd.tape.derivatives import jvp, live, substitute
 from mbd.tape.functions import sin
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["DerivationContext", "placeholders"]
-
 
 def placeholders(tape: Tape) -> tuple[Rotation, Triple]:
     """R, p of a joint as fresh inputs, for asking how its rows depend on them."""

@@ -14,8 +14,6 @@ from mbd.equations.parameters import ParameterTable
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["DerivationScope", "Generalized", "Resolving"]
-
 
 class Resolving(Protocol):
     """What stands for places and velocities in words' expressions."""

@@ -26,8 +26,6 @@ from mbd.equations.tree_elimination import TreeFactors, tree_factors
 from mbd.tape.derivatives import vjp
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Dynamics", "Work"]
-
 
 @dataclass
 class Work:

@@ -18,8 +18,6 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.base import Force
 from mbd.topology.description import all_are, served
 
-__all__ = ["Coordinate", "EnergyDescription", "Expression"]
-
 Expression: TypeAlias = Any
 """A sympy expression, a number, or a plain Python function whose arguments are named after what they mean."""
 

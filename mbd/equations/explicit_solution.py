@@ -15,8 +15,6 @@ from mbd.equations.equations import Equations
 from mbd.tape.elimination import Factors, factors
 from mbd.tape.node import Node
 
-__all__ = ["ExplicitSolution", "explicit_solution"]
-
 MAX_UNKNOWNS = 64
 """Unknowns above which a system is not eliminated on the tape."""
 MAX_OPERATIONS = 12000

@@ -12,8 +12,6 @@ from mbd.bodies.marker import Marker
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["Segments", "figure_of", "shown_markers"]
-
 Segments = list[tuple[str, tuple[str, ...]]]
 """(body, its frames in the order of a line); one frame alone is a point. Places are the results 'body.frame.x', …"""
 

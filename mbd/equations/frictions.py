@@ -19,8 +19,6 @@ from mbd.tape.derivatives import substitute
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["dry_friction", "dry_joint", "sliding_contact"]
-
 SPIN = ("spin", "rad")
 """Part and unit of the row that holds the spin of a contact about its normal."""
 

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 
 from mbd.errors import ModelError, TraceError
 
-__all__ = ["Gathered"]
-
 
 class Gathered:
     """Errors of the words of a model, each of which may say more than one fault."""

@@ -18,8 +18,6 @@ from mbd.joints.base import Joint
 from mbd.joints.reversed import Reversed
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Headings", "Spin", "direction", "spin"]
-
 
 class Spin(NamedTuple):
     """How a planar joint turns its child: by ``offset + Σ slope · coordinate`` [rad]."""

@@ -18,8 +18,6 @@ from mbd.constraints.touchdown import Touchdown
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["HELD_BY", "WAYS", "held_contacts", "offer_held"]
-
 WAYS = ("arm", "normal", "forward", "sideways")
 """Vectors of each: from the center to where it touches [m], and three directions of the ground."""
 

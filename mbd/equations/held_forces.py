@@ -29,8 +29,6 @@ from mbd.topology.held_forces import OF_GAPS, REACTIONS, names_of_held_forces
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["HeldForces", "held_force_faults"]
-
 FIRST_PLACEHOLDER = 1 << 30
 """Number of the first placeholder, far above those of rows."""
 ADVICE = (

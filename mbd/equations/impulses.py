@@ -13,8 +13,6 @@ from mbd.equations.gathered import Gathered
 from mbd.errors import ModelError, nearest
 from mbd.tape.derivatives import live
 
-__all__ = ["impulses_of"]
-
 
 def impulses_of(
     scope: DerivationScope, dynamics: Generalized, words: Sequence[Impulse], contacts: Sequence[Constraint],

@@ -11,8 +11,6 @@ from mbd.equations.equations import Chart, Equations
 from mbd.tape.derivatives import jvps, vjp
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Inputs"]
-
 
 @dataclass(frozen=True)
 class Inputs:

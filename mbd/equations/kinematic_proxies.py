@@ -17,8 +17,6 @@ from mbd.equations.placement import Axes, Heading, Placement, Point
 from mbd.tape.derivatives import live, substitute, vjp
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Wrench", "View", "KinematicProxies"]
-
 
 @dataclass(frozen=True, eq=False)
 class View:

@@ -23,10 +23,6 @@ from mbd.joints.base import Joint
 from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = [
-    "Column", "Edge", "Moving", "Twist", "carried", "ground_motion", "joint_motion", "moving_body", "spin_of", "twists",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Column:

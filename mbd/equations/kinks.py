@@ -11,8 +11,6 @@ from mbd.equations.laws import Laws
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["kinks"]
-
 STATES = frozenset({"z"})
 MOVES = frozenset({"x", "v", "z"})
 """Inputs that follow the motion."""

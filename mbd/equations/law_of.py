@@ -16,8 +16,6 @@ from mbd.errors import ModelError, nearest
 from mbd.tape.derivatives import gradient, live
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Holding", "law_of"]
-
 
 @dataclass
 class Holding:

@@ -9,8 +9,6 @@ from mbd.dataclass import dataclass
 from mbd.equations.equations import Contact, Effect, Friction, Guard, Machine, Row, StrikeImpulse
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Laws"]
-
 
 @dataclass
 class Laws:

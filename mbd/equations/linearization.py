@@ -15,8 +15,6 @@ from mbd.equations.programs import balance_with, constraint_jacobian
 from mbd.tape.derivatives import jvp, jvps
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["LinearTerms", "across", "along_places", "linearization", "row_changes"]
-
 
 @dataclass(frozen=True)
 class LinearTerms:

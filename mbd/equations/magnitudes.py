@@ -9,8 +9,6 @@ from mbd.tape.derivatives import live
 from mbd.tape.functions import maximum, minimum, sqrt, where
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["magnitudes", "of_directions"]
-
 MAX_SUM_RATIO = 16.0
 """How far the sum of the terms of a force may lie above the root of their squares, and in iterations that above the
 largest of them: as far as those of 256 equal ones do."""

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.equations.outputs import Outputs
 
-__all__ = ["contact_places", "effort_name", "net_moments", "offer_net_moments"]
-
 
 def net_moments(equations: Equations, outside: Collection[str]) -> list[Node]:
     """``τ_k = −Σ f_k − Σ λ ∂h/∂q_k`` (n_v,), the sums over losses, springs, motors, stops, locks and closed loops.

@@ -18,8 +18,6 @@ from mbd.tape.node import Node, Scalar, Table
 if TYPE_CHECKING:
     from mbd.equations.derivation_context import DerivationContext
 
-__all__ = ["offer_observations"]
-
 UNSTEADY = {"a": "accelerations", "s": "rates of first-order states", "lam": "forces of constraints"}
 """Inputs whose rates the equations do not give."""
 

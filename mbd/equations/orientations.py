@@ -15,8 +15,6 @@ from mbd.joints.quaternions import rotation_of, rotation_vector
 from mbd.joints.reversed import Reversed
 from mbd.tape.node import Scalar
 
-__all__ = ["offer_orientations"]
-
 
 def offer_orientations(outputs: Outputs, scope: Scope, joints: Sequence[Joint]) -> None:
     """'ball.angular_velocity.parent' and '.ground', and among the names that are not listed '.rotation_vector' and

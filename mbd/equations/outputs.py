@@ -8,8 +8,6 @@ from functools import partial
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["AXES", "Outputs"]
-
 AXES = "xyz"
 """Components of a vector result: 'left shank.end.x', …"""
 

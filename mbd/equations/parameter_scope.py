@@ -10,8 +10,6 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.tape.node import Node, Scalar, Table, Tape
 from mbd.tape.selection import by_state
 
-__all__ = ["ParameterScope"]
-
 
 class ParameterScope:
     """A tape with the inputs of the equations and the run-time parameters.

@@ -10,8 +10,6 @@ from mbd.errors import ModelError
 from mbd.forces.quantities import INCREMENT_PREFIX
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["ParameterTable"]
-
 STRUCTURAL = (0.0, 1.0, -1.0)
 """Values that fold away when the equations are built, unless their name is tunable."""
 

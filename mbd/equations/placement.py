@@ -14,8 +14,6 @@ from mbd.dataclass import dataclass
 from mbd.equations.kinematics import Column, Moving
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Axes", "Heading", "Mark", "Placement", "Point"]
-
 
 @dataclass(frozen=True, eq=False)
 class Point:

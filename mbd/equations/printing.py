@@ -16,9 +16,6 @@ from mbd.tape.node import Node
 from mbd.tape.printing import listing
 from mbd.tape.sympy import raise_to_sympy
 
-__all__ = ["Report", "report"]
-
-
 MAX_FORMULAS = 300
 """Lines of formulas that a notebook sets; more of them it shows as text."""
 

@@ -39,13 +39,6 @@ from mbd.tape.derivatives import gradient, jvp, jvps, live, substitute, vjp
 from mbd.tape.elimination import Factors, factors
 from mbd.tape.node import Node, Scalar
 
-__all__ = [
-    "ActiveSet", "Correction", "accelerations", "balance_with", "compose", "constraint_jacobian", "constraint_terms",
-    "correction", "eliminated_tangent", "MAX_OPERATIONS", "MAX_UNKNOWNS",
-    "follows_multipliers", "free_rates", "guard_terms", "guards", "increment_rates", "is_judged", "law_forces",
-    "loaded_balance", "mass_matrix", "newton", "residual", "row_forces", "scales", "switched_balance", "system",
-]  # fmt: skip
-
 
 class ActiveSet(NamedTuple):
     """What acts in a contact mode, and in which form its rows are held: all that the programs of a mode depend on.

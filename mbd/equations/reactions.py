@@ -22,9 +22,6 @@ from mbd.joints.reversed import Reversed
 from mbd.tape.derivatives import substitute, vjp
 from mbd.tape.node import Scalar
 
-__all__ = ["Wrench", "cut_reaction", "reaction"]
-
-
 Direction: TypeAlias = tuple[Triple, Triple]
 """Angular and linear velocity of a joint's child for one unit of a coordinate's rate."""
 

@@ -21,8 +21,6 @@ from mbd.tape.node import Node, Scalar, Tape
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["offer_contacts", "offer_effects", "offer_results", "offer_rows"]
-
 
 def offer_results(
     outputs: Outputs,

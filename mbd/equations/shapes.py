@@ -30,8 +30,6 @@ from mbd.tape.node import Scalar
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["HEIGHT", "NUMBERS", "PLACE", "Shape", "drawn", "offer_shapes", "shapes_of"]
-
 PLACE = "place"
 """Kind of the inputs x (number 0) and z (number 1) of a height function that is drawn."""
 

@@ -11,16 +11,6 @@ from mbd.errors import ModelError
 from mbd.free_memory import available, size_in_words
 from mbd.topology.plan import Plan
 
-__all__ = [
-    "MIN_LOOP_ENTRIES",
-    "OF_PAIR",
-    "operations",
-    "pairs_on_paths",
-    "require_room",
-    "require_room_for_tangent",
-    "tangent_refused",
-]
-
 OF_PAIR = {True: 10.0, False: 40.0}
 """Operations for each pair of coordinates on one path, of planar and of spatial models [-]."""
 OF_COORDINATE = {True: 285.0, False: 920.0}

@@ -29,8 +29,6 @@ from mbd.joints.base import Joint
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["offer_solids", "solids_of"]
-
 LIKE = (0.5, 1.3)
 """Radius of the uniform ball of a body's mean moment of inertia, over that with which it touches, if it is a ball: from
 one whose mass lies deep inside to a shell, √(5/3) [-].

@@ -8,8 +8,6 @@ from mbd.equations.derivation_scope import DerivationScope
 from mbd.errors import ModelError
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["has_pairs", "state_balance", "with_states"]
-
 
 def has_pairs(given: object) -> bool:
     """Whether it is a sequence of pairs."""

@@ -26,8 +26,6 @@ from mbd.tape.evaluate import Key, evaluate_arrays
 from mbd.tape.node import Node
 from mbd.tape.operations import CONDITIONS
 
-__all__ = ["Jump", "Switch", "instant_slopes", "jumps_between", "switches_of", "table_faults"]
-
 EPS = sys.float_info.epsilon
 ROUND_OFF = 8.0 * EPS
 """How far round-off moves an instant, relative to it and to what is compared [-]."""

@@ -15,8 +15,6 @@ from mbd.equations.inputs import Inputs
 from mbd.tape.derivatives import Sweeps, live, rebuild
 from mbd.tape.node import Node, Tape
 
-__all__ = ["Columns", "factored", "seeded", "tangent"]
-
 Columns = list[list[Node]]
 """A matrix, column by column."""
 

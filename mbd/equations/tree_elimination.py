@@ -26,8 +26,6 @@ from mbd.equations.kinematics import Moving, carried, joint_motion, spin_of
 from mbd.tape.derivatives import jvps, live, substitute
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Branch", "TreeFactors", "tree_factors"]
-
 Matrix = list[list[Node]]
 Inertia = Callable[[Moving], Sequence[Wrench]]
 """The forces of inertia on a body that moves so."""

@@ -18,8 +18,6 @@ from mbd.equations.outputs import AXES, Outputs
 from mbd.tape.functions import sqrt, where
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["offer_whole_body"]
-
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 

@@ -28,8 +28,6 @@ from mbd.forces.quantities import (
 )
 from mbd.tape.node import Scalar
 
-__all__ = ["Applied"]
-
 
 @dataclass(frozen=True)
 class Applied(OfQuantities, Force):

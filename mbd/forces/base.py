@@ -15,8 +15,6 @@ from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Action", "Force", "Result", "frame_of", "joint_of"]
-
 
 @dataclass(frozen=True)
 class Action:

@@ -18,8 +18,6 @@ from mbd.joints.quaternions import increment_rates, of_rotation, rotation_vector
 from mbd.tape.functions import atan2
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Bushing"]
-
 FIELDS = ("stiffness", "rotational_stiffness", "damping", "rotational_damping")
 
 

@@ -16,8 +16,6 @@ from mbd.forces.quantities import Mention
 from mbd.joints.losses.base import Loss, loss_of, rates_of
 from mbd.joints.losses.viscous import Viscous
 
-__all__ = ["Damper"]
-
 
 @dataclass(frozen=True)
 class Damper(Force):

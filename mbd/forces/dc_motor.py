@@ -14,8 +14,6 @@ from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of,
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
-__all__ = ["DCMotor"]
-
 
 @dataclass(frozen=True)
 class DCMotor(OfQuantities, Force):

@@ -10,8 +10,6 @@ from mbd.bodies.values import names_of
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
-__all__ = ["InertialArgument", "bias_forces", "mass_matrix"]
-
 
 @dataclass(frozen=True)
 class InertialArgument:

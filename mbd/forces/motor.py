@@ -14,8 +14,6 @@ from mbd.forces.base import Action, Force, Result, joint_of
 from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of, mentioned, quantity_of, scalar
 from mbd.joints.base import Joint
 
-__all__ = ["Motor"]
-
 
 @dataclass(frozen=True)
 class Motor(OfQuantities, Force):

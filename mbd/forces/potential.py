@@ -12,8 +12,6 @@ from mbd.errors import ModelError
 from mbd.forces.base import Action, Force
 from mbd.forces.quantities import Mention, arguments_of, mentioned, quantity_of, scalar, value_parameters
 
-__all__ = ["Potential"]
-
 
 @dataclass(frozen=True)
 class Potential(Force):

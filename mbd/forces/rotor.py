@@ -12,8 +12,6 @@ from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 from mbd.tape.node import Node
 
-__all__ = ["Rotor"]
-
 
 @dataclass(frozen=True)
 class Rotor(Force):

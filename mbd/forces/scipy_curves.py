@@ -12,8 +12,6 @@ from mbd.errors import ModelError
 from mbd.tape.interpolation import Pieces
 from mbd.tape.table import Table
 
-__all__ = ["Curve", "curves_of", "is_curve"]
-
 KIND = {"CubicSpline": "spline", "PchipInterpolator": "monotone", "Akima1DInterpolator": "monotone"}
 """Kinds of curves that their class tells."""
 BY_JUMP = ("hold", "linear", "monotone", "spline", "spline")

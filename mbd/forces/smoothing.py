@@ -11,8 +11,6 @@ from mbd.arrays import Vector
 from mbd.equal import NOMINAL_RTOL
 from mbd.errors import ModelError
 
-__all__ = ["smoothed"]
-
 MIN_SAMPLES = 5
 """Samples that generalized cross-validation needs at least."""
 

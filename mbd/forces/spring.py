@@ -14,8 +14,6 @@ from mbd.forces.base import Action, Force, Result, frame_of
 from mbd.forces.quantities import Mention
 from mbd.tape.node import Scalar
 
-__all__ = ["Spring"]
-
 
 @dataclass(frozen=True)
 class Spring(Force):

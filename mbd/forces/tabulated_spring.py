@@ -14,8 +14,6 @@ from mbd.joints.base import Joint
 from mbd.tape.interpolation import Pieces, integral
 from mbd.tape.node import Scalar
 
-__all__ = ["TabulatedSpring"]
-
 
 @dataclass(frozen=True, init=False)
 class TabulatedSpring(Force):

@@ -12,8 +12,6 @@ from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
-__all__ = ["TorsionSpring"]
-
 
 @dataclass(frozen=True)
 class TorsionSpring(Force):

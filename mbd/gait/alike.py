@@ -31,8 +31,6 @@ from mbd.gait.reflection import reflections
 from mbd.joints.reflected import exchanged
 from mbd.sensitivity.resets import reset_expressions
 
-__all__ = ["moves_sides_alike", "require_alike", "sides_faults"]
-
 POSES = (0.4, 0.4, 2.5)
 """Largest changes of coordinates at the states at which a mechanism is compared with its mirror image [m, rad].
 

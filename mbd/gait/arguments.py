@@ -12,8 +12,6 @@ from mbd.integrators import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 
-__all__ = ["Functions", "check_arguments", "increments_named", "section_named"]
-
 LEAST, MOST = 1e-15, 1e9
 """Bounds of steps, times and tolerances that anybody can mean [s, m, rad]."""
 

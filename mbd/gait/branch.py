@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-__all__ = ["Branch", "branch"]
-
 FIRST_DISTANCE, MAX_DISTANCE, MIN_DISTANCE = 0.02, 0.1, 1e-6
 """First, largest and least distance of two points in (c, p/σ) [-]."""
 MIN_DISTANCE_RATIO = 1e-3

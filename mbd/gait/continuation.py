@@ -25,8 +25,6 @@ from mbd.gait.return_map import Arrival, ReturnMap
 from mbd.gait.section import Chart, Section
 from mbd.state import State
 
-__all__ = ["NOT_CONVERGED", "QUICK", "BranchPoint", "Continuation", "Corrected", "Forbidden", "way_of"]
-
 CORRECTIONS, QUICK = 10, 4
 """Newton corrections of a point, and how many count as few."""
 NOT_CONVERGED = "does not converge"

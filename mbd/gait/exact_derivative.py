@@ -36,8 +36,6 @@ from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
-__all__ = ["exact_derivative", "motion_on_section"]
-
 
 @dataclass(frozen=True)
 class _Return:

@@ -10,8 +10,6 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, MIN_DIVISOR
 
-__all__ = ["extrapolated", "slopes_of"]
-
 FUNCTION_LEVELS, FUNCTION_CHANGE, FUNCTION_TRIES = 6, 2.0**-7, 40
 """Differences of a function of parameters, each twice the one before; what the largest changes of a parameter, over its
 size, and how often it is made longer or shorter for that [-]."""

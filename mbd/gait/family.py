@@ -27,8 +27,6 @@ from mbd.gait.section import Chart
 from mbd.sensitivity.starts import Direction, programs_of
 from mbd.state import State
 
-__all__ = ["Member", "across", "energy_of", "energy_slope", "floquet", "member_of"]
-
 DIFFERENCE_STEP = 1e-5
 """Difference of a value, relative to 1 or it, whose function of parameters has no slopes [-]."""
 UNIT_MULTIPLIER_ATOL = 1e-3

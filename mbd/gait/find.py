@@ -27,8 +27,6 @@ from mbd.notebook import table
 from mbd.progress import share_bar
 from mbd.state import State
 
-__all__ = ["GaitSearch", "Try", "find_gait"]
-
 MAX_PROJECTION = 1.0
 """Distance [m, rad] over which a start is moved onto the section."""
 MAX_TRIES = 1_000_000

@@ -11,8 +11,6 @@ from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
 from mbd.equal import NOMINAL_RTOL
 
-__all__ = ["Multipliers", "multipliers_of"]
-
 RANK_RTOL = 1e-7
 """Singular value of P relative to its largest, or to `MAX_RANK_SCALE`, below which the map forgets a direction [-]."""
 MAX_RANK_SCALE = 100.0

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-__all__ = ["PointCurve", "follow"]
-
 DIFFERENCE_STEP = 0.001
 """Distance along the tangent at which a test function is asked for a second time [-]."""
 LIMIT_DISTANCE = 0.02

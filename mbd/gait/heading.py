@@ -26,8 +26,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.gait.heading_parts import Part, parts_of
 from mbd.gait.reflection import in_space
 
-__all__ = ["Heading", "heading_of"]
-
 ROUNDS, FINE = 12, 1e-15
 """Newton steps by which a state is turned as another, and the last of them [rad]."""
 

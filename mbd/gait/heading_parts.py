@@ -24,8 +24,6 @@ from mbd.joints.quaternions import quaternion_product
 from mbd.joints.reflected import AsWritten
 from mbd.topology.plan import plan
 
-__all__ = ["Part", "parts_of", "rotation"]
-
 
 @dataclass(frozen=True, eq=False)
 class Part:

@@ -28,8 +28,6 @@ from mbd.notes import doubt
 from mbd.simulation.capabilities import refusals
 from mbd.state import State
 
-__all__ = ["limit_cycle", "map_of"]
-
 FIRST_STEP = 1e-2
 """Step of the first return where none is given [s]; later ones follow from its length."""
 DRIFT_RTOL = 1e-3

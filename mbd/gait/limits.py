@@ -20,8 +20,6 @@ from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival
 from mbd.gait.special_points import SpecialPoint
 
-__all__ = ["changed_events", "limit_between", "limit_beyond"]
-
 NEAREST, FURTHEST = 1e-6, 2e-2
 """Distances along the tangent at which a limit is looked for ahead of the last gait [-]."""
 MAX_TRIALS, CLOSER = 200, 8.0

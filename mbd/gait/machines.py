@@ -20,18 +20,6 @@ from mbd.joints.reflected import exchanged
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = [
-    "counted_from",
-    "image_faults",
-    "in_state",
-    "images",
-    "instants_stored",
-    "remembered",
-    "state_anchors",
-    "stored_by",
-    "times_since",
-]
-
 Numbers = NDArray[np.intp]
 OWN = "its measure or timer"
 """What causes a transition with when= or after=, in words."""

@@ -23,8 +23,6 @@ from mbd.gait.extrapolation import extrapolated
 from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart
 
-__all__ = ["EXACT", "MapDerivative", "Measured", "differences", "map_derivative", "measured", "numbers_of"]
-
 STATE_STEP, PARAMETER_STEP = 2e-4, 2e-3
 """Least of the three differences of coordinates of the section [m, rad, 1/s of them], and the first of parameters that
 is tried, over them or 1."""

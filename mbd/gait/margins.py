@@ -21,8 +21,6 @@ from mbd.gait.return_map import ReturnMap, Values
 from mbd.gait.special_points import SpecialPoint, zero_between
 from mbd.state import State
 
-__all__ = ["Margin", "Margins", "least_margins", "margin_at", "margin_points", "watched_feet"]
-
 NEIGHBOUR_ROWS = 3
 """Rows on each side of the smallest one through which a polynomial goes."""
 

@@ -23,8 +23,6 @@ from mbd.gait.reflection import Reflection
 from mbd.joints.reflected import exchanged
 from mbd.state import Mode, State
 
-__all__ = ["Mirror", "mirror_of"]
-
 Numbers = NDArray[np.intp]
 
 

@@ -20,8 +20,6 @@ from mbd.gait.return_map import Arrival, ReturnMap, Values
 from mbd.gait.section import Chart, Section
 from mbd.state import State
 
-__all__ = ["FixedPoint", "fixed_point"]
-
 MIN_DAMPING = 1.0 / 64.0
 """Least part of a Newton step that is tried [-]."""
 MIN_DECREASE = 0.25

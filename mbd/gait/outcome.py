@@ -13,8 +13,6 @@ from mbd.dataclass import dataclass
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Outcome", "fall_of"]
-
 
 @dataclass(frozen=True)
 class Outcome:

@@ -20,8 +20,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.joints.reflected import ACROSS, mirrored_signs
 from mbd.topology.plan import is_planar, plan
 
-__all__ = ["Reflection", "in_space", "reflections"]
-
 
 @dataclass(frozen=True, eq=False)
 class Reflection:

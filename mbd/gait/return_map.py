@@ -37,8 +37,6 @@ from mbd.simulation.repeated import End, RepeatedRun
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
-__all__ = ["Arrival", "ReturnMap", "Values"]
-
 Values = Mapping[str, float]
 """Parameters and values of functions of parameters, by name."""
 

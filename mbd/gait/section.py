@@ -38,8 +38,6 @@ from mbd.sensitivity.programs import Programs, State as At
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
-__all__ = ["Chart", "Section", "section_of"]
-
 GAP_ATOL = 1e-7
 """Gap of the section's event [m, rad] after a reset up to which it still holds."""
 CORRECTIONS, FINE = 12, 1e-14

@@ -21,8 +21,6 @@ from mbd.equal import BRACKET_RTOL
 from mbd.errors import GaitError, MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 
-__all__ = ["KINDS", "TESTS", "SpecialPoint", "polished", "special_points", "zero_between"]
-
 MAX_EVALUATIONS = 40
 """Evaluations of a test function or a margin between two points at most."""
 

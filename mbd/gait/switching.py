@@ -23,8 +23,6 @@ from mbd.gait.cycle import LimitCycle
 from mbd.gait.map_derivative import Measured, measured
 from mbd.gait.search import Search, search
 
-__all__ = ["doubled"]
-
 AMPLITUDE, FALL, TIMES = 0.02, 0.4, 9
 """Distance from the doubling along its mode at which the other branch is looked for first [-], its factor where that
 leads too far, and how often. In a cascade of doublings each leads less far than the one before by about this factor."""

@@ -15,8 +15,6 @@ from mbd.equations.equations import Equations
 from mbd.gait.machines import in_state, instants_stored, times_since
 from mbd.tape.derivatives import jvps, live
 
-__all__ = ["depends_on_time", "moving_on", "reset_names"]
-
 FAR, FAR_STATES = 20.0, 8
 """How far along a coordinate [m, rad], and at how many states, nothing may change where the tape cannot decide."""
 

@@ -14,8 +14,6 @@ from mbd.compile.mechanism import Mechanism
 from mbd.equal import EQUAL_RTOL
 from mbd.gait.unmoved import reset_names
 
-__all__ = ["angles", "unwound", "whole_turn_changes_nothing"]
-
 
 def angles(mechanism: Mechanism) -> list[int]:
     """Numbers of the increments that are angles of their own, none of a quaternion's."""

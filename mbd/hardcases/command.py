@@ -19,8 +19,6 @@ from mbd.hardcases.page import write_page
 from mbd.hardcases.table import as_text, write_markdown
 from mbd.progress import counted
 
-__all__ = ["run"]
-
 
 def run(
     names: Sequence[str] = (),

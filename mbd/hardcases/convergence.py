@@ -19,11 +19,6 @@ from mbd.dataclass import dataclass
 from mbd.hardcases.case import Curve, Figure
 from mbd.hardcases.schemes import has_own_forces, holds_positions_only, is_undamped
 
-__all__ = [
-    "EPS", "Study", "allowance", "at_every_step", "deviation", "error_curve", "force_floor", "halved", "second_order",
-    "study",
-]  # fmt: skip
-
 EPS = float(np.finfo(float).eps)
 MIN_ORDER = 2.0
 """What every scheme that is judged promises at least."""

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["crossing", "falls"]
-
 
 def crossing(run: Any, value: Callable[[Any], Any], left: float, right: float) -> float:
     """The instant between two others at which a value changes its sign, by the run's own interpolation.

@@ -14,8 +14,6 @@ from mbd.hardcases.known import reason
 from mbd.hardcases.schemes import SCHEMES, scheme
 from mbd.notebook import paragraphs, table
 
-__all__ = ["Judged", "Verdict", "chosen", "judged", "named_schemes", "ratio", "short", "with_schemes"]
-
 
 @dataclass(frozen=True)
 class Judged:

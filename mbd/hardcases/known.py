@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["KNOWN", "reason"]
-
 KNOWN: dict[tuple[str, str], str] = {}
 """Reasons by case and scheme.
 

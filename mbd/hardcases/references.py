@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from mbd.dataclass import dataclass
 from mbd.hardcases.case import definition
 
-__all__ = ["Reference", "accuracy", "distance_to", "numbers", "published", "quantity", "size"]
-
 
 @dataclass(frozen=True)
 class Reference:

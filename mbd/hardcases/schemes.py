@@ -10,10 +10,6 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
 from mbd.integrators.extension import extension_of
 
-__all__ = [
-    "DAMPED", "EVERY", "SCHEMES", "has_own_forces", "holds_positions_only", "is_explicit", "is_undamped", "scheme",
-]  # fmt: skip
-
 SCHEMES: dict[str, Callable[[], Integrator]] = {
     "HHT": lambda: HHT(alpha=0.05),
     "HHT-index3": lambda: HHT(alpha=0.05, formulation="index3"),

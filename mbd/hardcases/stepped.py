@@ -11,8 +11,6 @@ from mbd.hardcases.case import Figure
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import size
 
-__all__ = ["HOW", "stepped_figures", "within_steps"]
-
 TITLE = "non-smooth steps: "
 HOW: tuple[tuple[bool, Any], ...] = ((False, "events"), (True, "events"), (False, "nonsmooth"))
 """Runs of a scene: whether contacts are named the other way round, and how they are treated."""

@@ -11,11 +11,6 @@ from mbd.hardcases.case import Figure
 from mbd.hardcases.judging import Judged, Verdict, ratio, short
 from mbd.results.archive import write_whole
 
-__all__ = [
-    "BEGIN", "END", "as_markdown", "as_text", "figure_text", "number", "summary", "worst_by_scheme", "worst_text",
-    "write_markdown",
-]  # fmt: skip
-
 BEGIN, END = "<!-- table of mbd hardcases -->", "<!-- end of table -->"
 """Between these marks `mbd hardcases --markdown` writes."""
 

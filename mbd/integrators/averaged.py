@@ -13,8 +13,6 @@ from mbd.integrators.stepping import MAX_ITERATIONS, SchemeMemory
 from mbd.kernel.codes import EPS
 from mbd.state import Mode, State
 
-__all__ = ["AveragedStep", "Coefficients"]
-
 
 class AveragedStep:
     """``M(q₁) a₁ + (1−α)(f + Bᵀλ)₁ + α (f + Bᵀλ)₀ = 0``, ``h(q₁) = 0`` with Newmark's formulas for q₁, v₁.

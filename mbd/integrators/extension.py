@@ -13,8 +13,6 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.kernel.schemes.tableau import FOURTH_ORDER, Tableau
 
-__all__ = ["EXTENSIONS", "HERMITE", "OSCULATING", "STEPS_OF_ORDER_4", "STEPS_OF_ORDER_8", "Extension", "extension_of"]
-
 
 @dataclass(frozen=True)
 class Extension:

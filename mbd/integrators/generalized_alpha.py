@@ -7,8 +7,6 @@ from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator
 from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
 
-__all__ = ["GeneralizedAlpha"]
-
 
 class GeneralizedAlpha(NewmarkFamily):
     """The generalized-α scheme: the least low-frequency damping for a wanted damping of the fast modes.

@@ -18,8 +18,6 @@ from mbd.integrators.family import (
 from mbd.integrators.stepping import SchemeMemory
 from mbd.state import Mode, State
 
-__all__ = ["HHT"]
-
 
 class HHT(NewmarkFamily):
     """The HHT scheme: α_m = 0, α_f = α, γ = ½ + α, β = (1+α)²/4.

@@ -7,9 +7,6 @@ from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator
 from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
 
-__all__ = ["Newmark"]
-
-
 MAX_COEFFICIENT = 10.0
 """Coefficient above which the scheme is none: published ones have γ ≤ 3/2 and β ≤ 1 [-]."""
 

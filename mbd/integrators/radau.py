@@ -11,8 +11,6 @@ from mbd.integrators.base import CompiledIntegrator, Integrator, System, complet
 from mbd.integrators.extension import OSCULATING, Extension
 from mbd.integrators.family import DEFAULT_TOLERANCE
 
-__all__ = ["RadauIIA"]
-
 
 @dataclass(frozen=True)
 class RadauIIA(CompiledIntegrator):

@@ -10,8 +10,6 @@ from mbd.integrators.extension import STEPS_OF_ORDER_8, Extension
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.kernel.schemes.tableau import Tableau
 
-__all__ = ["ExplicitRungeKutta", "RungeKutta853"]
-
 
 class ExplicitRungeKutta(CompiledIntegrator):
     """An explicit Runge–Kutta scheme with an embedded error estimate.

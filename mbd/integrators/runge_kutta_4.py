@@ -9,8 +9,6 @@ from mbd.integrators.extension import STEPS_OF_ORDER_4, Extension
 from mbd.integrators.runge_kutta import ExplicitRungeKutta
 from mbd.kernel.schemes.tableau import FOURTH_ORDER, Tableau
 
-__all__ = ["RungeKutta4"]
-
 
 @dataclass(frozen=True)
 class RungeKutta4(ExplicitRungeKutta):

@@ -16,8 +16,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.state import Mode, State
 
-__all__ = ["Point", "StepReport", "StepResult", "System", "Terms", "completed", "composed", "consistent_rates"]
-
 
 @dataclass(frozen=True)
 class Point:

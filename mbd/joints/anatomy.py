@@ -22,8 +22,6 @@ from mbd.bodies.algebra import IDENTITY, product, transpose
 from mbd.bodies.scope import Rotation
 from mbd.joints.euler import euler_angles
 
-__all__ = ["ANATOMY", "Angle", "System", "angles_of", "measured"]
-
 MIRROR: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
 HALF_TURN: Rotation = ((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
 """About y: before and after R it makes a turn about x one about −x."""

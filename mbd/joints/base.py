@@ -16,8 +16,6 @@ from mbd.joints.anatomy import ANATOMY
 from mbd.joints.losses.base import Loss, loss_of
 from mbd.tape.node import Scalar
 
-__all__ = ["AWAITED_ATTRIBUTE", "Joint", "JointLoss", "Label", "row_unit"]
-
 JointLoss = Loss | Mapping[str, Loss] | None
 """A loss on every coordinate of a joint, or by label of its coordinates."""
 

@@ -14,8 +14,6 @@ from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, across_rows, align_rows, angle_about
 from mbd.tape.node import Scalar
 
-__all__ = ["Cylindrical"]
-
 
 @dataclass(frozen=True)
 class Cylindrical(Joint):

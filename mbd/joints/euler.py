@@ -17,10 +17,6 @@ from mbd.bodies.scope import Rotation
 from mbd.joints.quaternions import quaternion_product
 from mbd.tape.functions import atan2, sqrt, where
 
-__all__ = [
-    "ANGLE_SUFFIXES", "SEQUENCES", "euler_angles", "from_euler", "second_from_singular", "sequence_of",
-]  # fmt: skip
-
 SEQUENCES = tuple("".join(s) for s in every("xyz", repeat=3) if s[0] != s[1] != s[2])
 """The twelve sequences."""
 ANGLE_SUFFIXES = "123"

@@ -14,8 +14,6 @@ from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.spherical import ANGULAR_VELOCITY, ORIENTATION
 from mbd.tape.node import Scalar
 
-__all__ = ["Free"]
-
 
 @dataclass(frozen=True)
 class Free(Joint):

@@ -6,8 +6,6 @@ from mbd.joints.anatomy import angles_of
 from mbd.joints.base import Joint
 from mbd.joints.euler import ANGLE_SUFFIXES, SEQUENCES
 
-__all__ = ["orientation_names"]
-
 
 def orientation_names(joint: Joint) -> list[str]:
     """The names of what is read off a joint with a quaternion or of the body, besides coordinates and velocities."""

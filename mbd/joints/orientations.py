@@ -14,8 +14,6 @@ from mbd.errors import ModelError
 from mbd.joints.euler import SEQUENCES, from_euler, second_from_singular, sequence_of
 from mbd.joints.quaternions import normalised, of_rotation
 
-__all__ = ["is_orientation", "orientation_doubt", "quaternion_of"]
-
 SMALL_TURN = math.cos(math.radians(15.0))
 """Scalar of the quaternion of a turn by 30° [-]."""
 ACCEPTED_FORMS = (

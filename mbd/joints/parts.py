@@ -8,8 +8,6 @@ from mbd.bodies.values import Vector3
 from mbd.tape.functions import atan2
 from mbd.tape.node import Scalar
 
-__all__ = ["across_rows", "align_rows", "angle_about", "place_rows", "sine_cosine", "turn_rows"]
-
 Z: Vector3 = (0.0, 0.0, 1.0)
 
 

@@ -13,8 +13,6 @@ from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, align_rows, angle_about
 from mbd.tape.node import Scalar
 
-__all__ = ["Planar"]
-
 
 @dataclass(frozen=True)
 class Planar(Joint):

@@ -21,11 +21,6 @@ from mbd.bodies.scope import Rotation, Triple
 from mbd.tape.functions import atan2, cos, sin, sqrt, where
 from mbd.tape.node import Scalar
 
-__all__ = [
-    "composed", "increment", "increment_rates", "increment_velocities", "normalised", "of_rotation", "quaternion_rates",
-    "quaternion_product", "rotation_of", "rotation_vector",
-]  # fmt: skip
-
 SERIES_LIMIT = 0.25
 """θ² below which functions of it are their series [rad²]."""
 SERIES_TERMS = 9

@@ -18,9 +18,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.equal import EQUAL_RTOL
 from mbd.joints.base import Joint
 
-__all__ = ["ACROSS", "AsWritten", "exchanged", "mirrored_signs", "signs_in_a_mirror"]
-
-
 ACROSS = {axis: np.where(np.arange(3) == "xyz".index(axis), -1.0, 1.0) for axis in "zyx"}
 """Reflections σ across axes, in the order in which they are tried: to the side first."""
 

@@ -11,8 +11,6 @@ from mbd.dataclass import dataclass, forwarded
 from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 
-__all__ = ["Reversed"]
-
 
 @dataclass(frozen=True)
 class Reversed(Joint):

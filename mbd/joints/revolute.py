@@ -14,8 +14,6 @@ from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import Z, align_rows, angle_about, place_rows
 from mbd.tape.node import Scalar
 
-__all__ = ["Revolute"]
-
 
 @dataclass(frozen=True)
 class Revolute(Joint):

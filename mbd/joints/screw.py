@@ -18,8 +18,6 @@ from mbd.joints.parts import Z, across_rows, align_rows, sine_cosine
 from mbd.tape.functions import atan2, cos, sin
 from mbd.tape.node import Scalar
 
-__all__ = ["Screw"]
-
 PITCH = Domain(excluded=(0.0,), problem="makes the thread a hinge; use mbd.Revolute", unit="m")
 
 

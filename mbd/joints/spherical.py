@@ -17,8 +17,6 @@ from mbd.joints.losses.isotropic import isotropic
 from mbd.joints.parts import place_rows
 from mbd.tape.node import Scalar
 
-__all__ = ["Spherical"]
-
 ORIENTATION = tuple(Label(f"orientation.{part}", "") for part in "wxyz")
 ANGULAR_VELOCITY = tuple(Label(f"angular_velocity.{axis}", "rad/s") for axis in "xyz")
 

@@ -14,8 +14,6 @@ from mbd.joints.base import Joint, JointLoss, Label
 from mbd.joints.parts import place_rows, turn_rows
 from mbd.tape.node import Scalar
 
-__all__ = ["Translation"]
-
 
 @dataclass(frozen=True)
 class Translation(Joint):

@@ -16,8 +16,6 @@ from mbd.joints.parts import Z, place_rows
 from mbd.tape.functions import atan2
 from mbd.tape.node import Scalar
 
-__all__ = ["Universal"]
-
 
 @dataclass(frozen=True)
 class Universal(Joint):

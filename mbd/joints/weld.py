@@ -12,8 +12,6 @@ from mbd.joints.base import Joint
 from mbd.joints.parts import place_rows, turn_rows
 from mbd.tape.node import Scalar
 
-__all__ = ["Weld"]
-
 
 @dataclass(frozen=True)
 class Weld(Joint):

@@ -13,8 +13,6 @@ from mbd.kernel import shipped
 from mbd.kernel.build import ENTRY, LISTED, kernel_object, kernel_text, object_of, source_digest, tag
 from mbd.kernel.schemes import contract
 
-__all__ = ["entry"]
-
 
 @lru_cache(maxsize=1)
 def entry() -> Callable[[int], int]:

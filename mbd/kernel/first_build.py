@@ -15,9 +15,6 @@ from collections.abc import Callable
 from mbd.compile.cache import default_cache
 from mbd.compile.llvm import tag_key
 
-__all__ = ["build", "is_allowed", "keep", "start_build"]
-
-
 POLL_SECONDS = 0.5
 """Seconds between two looks at whether another process has built the kernel."""
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from mbd.kernel.records import Kernel, Model, Reals
 
-__all__ = ["call", "call_on", "scheme_accept", "scheme_error", "scheme_resume", "scheme_start", "scheme_step"]
-
 
 def call(K: Model, number: int, out: Reals) -> None:
     """Evaluate model function `number` on the block and parameters."""

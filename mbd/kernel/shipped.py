@@ -18,8 +18,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 from mbd.kernel import build
 
-__all__ = ["FOLDER", "LEVEL_3", "TARGETS", "Target", "load", "write"]
-
 FOLDER = Path(__file__).parent / "objects"
 """Where they lie: of each the sha256 of the sources' digest and of the code, then the code."""
 

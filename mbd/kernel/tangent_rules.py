@@ -7,13 +7,6 @@ from __future__ import annotations
 
 from mbd.kernel.records import Balance, Equations, Integers, Kernel, Reals, Steps
 
-__all__ = [
-    "follow_candidate", "follow_event", "follow_factors", "follow_matrix", "follow_move", "follow_newton",
-    "follow_rates", "follow_solution", "follow_stages", "follows_rows", "further_corrections", "held_at_end",
-    "is_differentiated", "note_edges", "note_matrix", "note_order", "note_solution", "note_zero", "solve_plain",
-    "takes_part",
-]  # fmt: skip
-
 NOT_FOLLOWED = -3
 """Result of `follow_newton` and `follow_stages` where they leave the step to Newton's method."""
 

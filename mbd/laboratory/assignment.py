@@ -15,8 +15,6 @@ from mbd.laboratory.force_plate import ForcePlate
 from mbd.laboratory.recording import MIN_PLATE_LOAD, PlateRecord, Recording
 from mbd.notes import doubt, note
 
-__all__ = ["assign_plates"]
-
 MAX_PRESSURE_DISTANCE = 0.35
 """Farthest that a center of pressure lies from a point of the foot that stands there, along the ground [m]."""
 MIN_DISTANCE_RATIO = 1.25

@@ -10,8 +10,6 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.errors import ModelError
 
-__all__ = ["axis_of", "turn_of", "turn_words"]
-
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 

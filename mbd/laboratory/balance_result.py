@@ -23,8 +23,6 @@ from mbd.results.names import scalars_behind
 from mbd.results.tables import library
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["InverseDynamics"]
-
 
 class InverseDynamics:
     """Moments, powers, reactions and residuals of a motion.

@@ -19,8 +19,6 @@ from mbd.equations.programs import constraint_terms
 from mbd.errors import ModelError
 from mbd.laboratory.least_norm import left_inverses
 
-__all__ = ["ClosedFrames", "close_loops", "refuse_open_loops"]
-
 MAX_CORRECTIONS = 30
 """Newton corrections of a frame."""
 MAX_SWEEPS = 6

@@ -15,8 +15,6 @@ from mbd.laboratory.storage import read_storage
 from mbd.laboratory.text import MAX_HEADER, NUMBER, Lines, numbers_of, read_lines, times_of
 from mbd.laboratory.units import factor_of, is_length, split_unit
 
-__all__ = ["read_csv", "write_csv"]
-
 TIMES = ("time", "t", "times", "zeit", "temps")
 ENDS = ((".x", ".y", ".z"), ("_x", "_y", "_z"), (" x", " y", " z"), ("_X", "_Y", "_Z"), (" X", " Y", " Z"),
         (":X", ":Y", ":Z"), (".X", ".Y", ".Z"))  # fmt: skip

@@ -14,8 +14,6 @@ from mbd.laboratory.inverse_kinematics import inverse_kinematics
 from mbd.laboratory.models.read_model import read_model
 from mbd.laboratory.read import read
 
-__all__ = ["is_model_file", "measured", "model_of_file"]
-
 MODELS = (".osim", ".urdf", ".xml")
 """Endings of files that `mbd.read_model` reads."""
 FEET = (re.compile(r"calcn|calcaneus", re.IGNORECASE), re.compile(r"foot", re.IGNORECASE))

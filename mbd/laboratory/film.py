@@ -15,8 +15,6 @@ from mbd.laboratory.recording import PlateRecord, Recording
 from mbd.notes import doubt
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["film"]
-
 MAX_MEAN_ERROR = 0.01
 """Mean error of what plates carry, over its mean size, above which it is in doubt: schemes err by less [-]."""
 

@@ -26,8 +26,6 @@ from mbd.laboratory.recording import Recording
 from mbd.notes import doubt
 from mbd.state import State
 
-__all__ = ["inverse_kinematics"]
-
 MIN_DISTANCE = 0.02
 """Distance of two markers on a body from which on their distances are compared with the model's [m]."""
 UNIT_RATIOS = (0.1, 10.0)

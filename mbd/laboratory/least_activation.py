@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.errors import SimulationError
 
-__all__ = ["least_activation"]
-
 MAX_ITERATIONS = 200
 """Newton steps; 20 to 40 are usual."""
 CENTERING = (0.1, 0.8)

@@ -9,8 +9,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import HALF_PRECISION_RTOL, RANK_RTOL
 
-__all__ = ["Balanced", "balanced", "left_inverses"]
-
 
 @dataclass(frozen=True, eq=False)
 class Balanced:

@@ -19,8 +19,6 @@ from mbd.equations.linearization import along_places
 from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node
 
-__all__ = ["MarkerProgram", "marker_program", "point_names"]
-
 
 def point_names(equations: Equations, markers: Mapping[str, Any]) -> dict[str, str]:
     """The result that is the place of each marker, by name: 'left shank.end'.

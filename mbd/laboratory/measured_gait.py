@@ -16,8 +16,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 
-__all__ = ["MeasuredGait", "gait_of_dynamics", "gait_of_recording"]
-
 WORDS = {"left": "left", "l": "left", "right": "right", "r": "right"}
 """Sides as files call them."""
 STRIKES, OFFS = ("strike", "contact", "down", "hs", "fs", "ic"), ("off", "to", "fo")

@@ -16,8 +16,6 @@ from mbd.laboratory.recording import PlateRecord, Recording
 from mbd.laboratory.units import factor_of
 from mbd.results.tables import library
 
-__all__ = ["read_c3d", "write_c3d"]
-
 BLOCK_BYTES = 512
 PROCESSORS = {84: "<", 85: "<", 86: ">"}
 """Order of bytes by the kind of the processor: Intel, DEC, MIPS."""

@@ -18,8 +18,6 @@ from mbd.laboratory.motion import Motion
 from mbd.results.record import Record
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["parameters_of", "record_of"]
-
 
 def parameters_of(mechanism: Mechanism, motion: Motion, changed: Mapping[str, float], model: Any) -> Vector | Matrix:
     """The parameters at the frames: those of the run, if it is one of the very same equations, with changes."""

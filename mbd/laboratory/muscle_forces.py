@@ -31,8 +31,6 @@ from mbd.results.columns import ModelColumns
 from mbd.results.tables import library
 from mbd.tape.derivatives import gradient
 
-__all__ = ["MuscleForces", "muscle_forces"]
-
 
 class MuscleForces:
     """Activations and forces of muscles, asked for by name.

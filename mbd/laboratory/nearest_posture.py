@@ -13,8 +13,6 @@ from mbd.equal import RANK_RTOL
 from mbd.errors import ModelError
 from mbd.laboratory.marker_program import MarkerProgram
 
-__all__ = ["Postures", "Problem", "nearest_postures"]
-
 NEAR, CHORD, CONVERGED = 0.03, 1e-3, 1e-10
 """Largest step of a frame after which the next one begins, step of all frames below which JᵀWJ is kept, and error
 after which all frames are done [m, rad]."""

@@ -19,8 +19,6 @@ from mbd.joints.losses import PinFriction
 from mbd.joints.losses.base import LossSum
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["Pin", "pin_moments", "without_pins"]
-
 KNOWN: WeakKeyDictionary[Any, tuple[tuple[Joint, ...], Any, tuple[Pin, ...]]] = WeakKeyDictionary()
 """Joints of models, and these without the friction of their pins, made once for the same joints."""
 

@@ -10,8 +10,6 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.laboratory.recording import PlateRecord
 
-__all__ = ["plates_by_column"]
-
 COLUMN = re.compile(r"^(?P<stem>.*?)_?(?P<kind>force|torque|moment)(?P<number>_?\d+)?_(?P<part>v|p|m)?(?P<axis>[xyz])$")
 """OpenSim's names of loads that act from outside: force (v), point (p) and torque along an axis."""
 

@@ -7,8 +7,6 @@ import numpy as np
 from mbd.arrays import Matrix
 from mbd.errors import ModelError
 
-__all__ = ["make_continuous", "quaternion_rates"]
-
 UNIT_LENGTH_ATOL = 1e-3
 """How far from 1 the length of a given quaternion may be before it is refused [-]."""
 

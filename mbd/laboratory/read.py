@@ -21,8 +21,6 @@ from mbd.laboratory.trc import read_trc
 from mbd.notes import doubt
 from mbd.results.archive import file_to_read
 
-__all__ = ["read"]
-
 READERS: dict[str, tuple[Callable[[Path], Recording], str]] = {
     ".c3d": (read_c3d, "z"), ".trc": (read_trc, "y"), ".mot": (read_storage, "y"), ".sto": (read_storage, "y"),
     ".csv": (read_csv, "y"),

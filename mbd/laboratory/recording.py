@@ -17,8 +17,6 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.smoothing import smoothed
 from mbd.laboratory.measured_gait import MeasuredGait, gait_of_recording
 
-__all__ = ["PlateRecord", "Recording"]
-
 MIN_PLATE_LOAD = 10.0
 """Force along the vertical below which a plate is taken to be unloaded by default [N]."""
 

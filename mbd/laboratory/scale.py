@@ -17,8 +17,6 @@ from mbd.notes import doubt, note
 from mbd.parts.whole_body.human import Human
 from mbd.parts.whole_body.segments import Segment
 
-__all__ = ["scale"]
-
 ENDS = {
     "pelvis": ("left hip", "right hip"), "torso": ("origin", "neck"), "head": ("origin", "top"),
     "left foot": ("heel", "toe"), "right foot": ("heel", "toe"),

@@ -13,8 +13,6 @@ from mbd.equations.equations import Equations
 from mbd.equations.net_moments import effort_name
 from mbd.laboratory.motion import Motion
 
-__all__ = ["Scatter", "noise_remarks", "scatter_of"]
-
 FEWEST, MOST = 20, 600
 """Frames from which the scatter is estimated: of more, those in the middle."""
 SPACING_RTOL = 0.01

@@ -8,8 +8,6 @@ from scipy.linalg.lapack import dpttrf, dpttrs
 
 from mbd.arrays import Matrix, Vector
 
-__all__ = ["GROUP", "Spline", "derivatives"]
-
 GROUP = 8
 """Columns that are differentiated at once, so that they stay in the processor's cache; two orientations."""
 

@@ -12,8 +12,6 @@ from mbd.bodies.base import Frame
 from mbd.bodies.values import shown
 from mbd.errors import ModelError
 
-__all__ = ["margin_of_stability"]
-
 DIRECTIONS = {
     "forward": (1.0, 0.0), "backward": (-1.0, 0.0), "right": (0.0, 1.0), "left": (0.0, -1.0),
 }  # fmt: skip

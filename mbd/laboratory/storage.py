@@ -15,8 +15,6 @@ from mbd.laboratory.text import Lines, numbers_of, read_lines, times_of, with_ta
 from mbd.laboratory.units import split_unit
 from mbd.results.opensim import write_storage
 
-__all__ = ["read_storage", "save_storage"]
-
 NO_ANGLE = re.compile(
     r"(_t[xyz]|_[vp][xyz]|\.[xyz]|\.[wxyz]|\.displacement|\.length|\.gap|force.*|moment.*|torque.*|.*activation"
     r"|.*fiber_length|.*fiber_velocity)$",

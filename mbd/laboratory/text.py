@@ -14,8 +14,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import TrajectoryError
 from mbd.free_memory import available
 
-__all__ = ["MAX_HEADER", "Lines", "numbers_of", "read_lines", "times_of", "with_tabs"]
-
 MAX_HEADER = 100
 """Lines within which the header of a storage file ends."""
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d{1,4})?$")

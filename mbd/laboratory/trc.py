@@ -18,8 +18,6 @@ from mbd.laboratory.recording import Recording
 from mbd.laboratory.text import Lines, numbers_of, read_lines, times_of, with_tabs
 from mbd.laboratory.units import factor_of, is_length
 
-__all__ = ["read_trc", "write_trc"]
-
 
 def read_trc(path: Path) -> Recording:
     """Markers in the axes of the file, in meters.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["factor_of", "is_length", "split_unit"]
-
 FACTORS = {
     "m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0,
     "mm": 1e-3, "millimeter": 1e-3, "millimeters": 1e-3, "millimetre": 1e-3, "millimetres": 1e-3,

@@ -16,8 +16,6 @@ from mbd.laboratory.trc import write_trc
 from mbd.results.archive import named_file, write_whole
 from mbd.results.opensim import KINDS
 
-__all__ = ["write"]
-
 TEXTS: dict[str, Callable[[Recording, Path], str]] = {".trc": write_trc, ".csv": write_csv}
 
 

@@ -14,8 +14,6 @@ from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Tape
 
-__all__ = ["Formula", "formula"]
-
 
 class Formula:
     """A function of numbers, recorded once.

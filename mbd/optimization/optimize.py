@@ -26,8 +26,6 @@ from mbd.optimization.search import METHODS, searched
 from mbd.progress import trial_bar
 from mbd.state import State
 
-__all__ = ["optimize"]
-
 
 def optimize(
     problem: Model | Lagrangian | LimitCycle | Callable[[dict[str, float]], Any],

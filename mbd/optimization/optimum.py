@@ -14,8 +14,6 @@ from mbd.optimization.problem import Trial
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["Active", "Optimum"]
-
 
 @dataclass(frozen=True)
 class Active:

@@ -15,8 +15,6 @@ from mbd.errors import CapabilityError, GaitError, MbdError
 from mbd.optimization.formula import Formula
 from mbd.optimization.points import Point, Source, failed
 
-__all__ = ["Evaluated", "FailedTrial", "Limit", "Problem", "Trial", "TrialsSpent"]
-
 
 @dataclass(frozen=True)
 class Limit:

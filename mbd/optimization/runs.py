@@ -21,8 +21,6 @@ from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Tape
 
-__all__ = ["RunSource"]
-
 Functions = Mapping[str, Callable[[Any], Mapping[str, Any]]]
 
 

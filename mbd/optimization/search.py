@@ -11,8 +11,6 @@ from mbd.arrays import Vector
 from mbd.equal import NOMINAL_RTOL
 from mbd.optimization.problem import Evaluated, FailedTrial, Problem, TrialsSpent
 
-__all__ = ["METHODS", "searched"]
-
 METHODS = ("SLSQP", "trust-constr", "least_squares")
 MAX_BOXES = 60
 """Most boxes."""

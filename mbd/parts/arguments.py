@@ -15,8 +15,6 @@ from mbd.forces.base import frame_of
 from mbd.joints.losses.base import Loss, loss_of
 from mbd.topology.description import Description
 
-__all__ = ["Stop", "added", "between", "check", "constrain_stop", "released", "sizes"]
-
 Stop = Mapping[str, Any] | None
 """Arguments of the `Penalty` at a stop, such as {'stiffness': 1300.0, 'restitution': 0.4}; None: no stop."""
 

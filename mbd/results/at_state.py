@@ -13,8 +13,6 @@ from mbd.results.record import Record
 from mbd.results.trajectory import Trajectory
 from mbd.state import State, malformed
 
-__all__ = ["answered", "instant", "quantity"]
-
 
 def instant(model: Any, state: State) -> Trajectory:
     """A run of one row: the state, without forces.

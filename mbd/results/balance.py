@@ -30,8 +30,6 @@ from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Tape
 
-__all__ = ["Balance", "Held", "Solved", "put", "saddle", "weights"]
-
 RANK_RTOL = 1e-6
 """What is left of a row beside the earlier ones, relative, below which it depends on them [-].
 

@@ -19,8 +19,6 @@ from mbd.results.record import EventRecord
 from mbd.results.states import pack, pack_state, unpack
 from mbd.state import State, malformed
 
-__all__ = ["FORMAT", "load", "packed", "save", "unpacked"]
-
 FORMAT, VERSION = "mbd failure", 1
 
 SUFFIX = ".failure.npz"

@@ -20,8 +20,6 @@ from mbd.results.polynomials import Places, hermite, hermite_rate, quintics
 from mbd.results.record import Rows
 from mbd.tape.node import Node
 
-__all__ = ["Charts"]
-
 
 @dataclass(frozen=True, eq=False)
 class Charts:

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.tape.node import Node
 
-__all__ = ["Alias", "Columns", "ModelColumns", "SavedColumns", "StoredColumns", "asks_for_forces", "gather"]
-
 Alias = tuple[str, int]
 """A named quantity that is itself part of the state: ('q', 0), ('v', 3), …"""
 

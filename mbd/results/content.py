@@ -13,8 +13,6 @@ from mbd.integrators.extension import EXTENSIONS, HERMITE
 from mbd.joints.anatomy import ANATOMY
 from mbd.results.archive import Head, Members, Unreadable
 
-__all__ = ["arrays_of_run", "arrays_within", "expect", "of_kind"]
-
 STATE = {"q": "q", "v": "v", "z": "z", "a": "v", "s": "z", "lam": "lam"}
 """Parts of the state, each with the one whose shape it has."""
 KINDS = ("closed", "opened", "event", "stuck", "slipped", "pushed")

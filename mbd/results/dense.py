@@ -22,8 +22,6 @@ from mbd.results.projection import Projection
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 
-__all__ = ["Restepping"]
-
 SINGULAR_DISTANCE_RATIO = 0.2
 """Distance of a stage from a singular configuration, over that of the farther row, below which it is not used [-]."""
 

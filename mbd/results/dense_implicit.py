@@ -23,8 +23,6 @@ from mbd.results.polynomials import CHUNK, Places, hermite, quintic
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 
-__all__ = ["LedSteps"]
-
 Index = NDArray[np.intp]
 
 NAMES = ("q", "v", "z", "a", "s", "lam")

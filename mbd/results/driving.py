@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["drives_of", "driving_rows", "forces_told", "is_wholly_driven", "own_share", "share"]
-
 FORCE_RTOL = 1e-5
 """Force of a drive, over the terms that cancel in it, below which it is measured by these [-]."""
 

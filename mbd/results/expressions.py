@@ -24,8 +24,6 @@ from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Table, Tape
 from mbd.tape.operations import ARITHMETIC, BINARY, UNARY
 
-__all__ = ["Expressions", "arrays_of_expressions", "read_expressions", "write_expressions"]
-
 ARITY = {
     **dict.fromkeys(("const", "input"), 0), **dict.fromkeys(UNARY, 1), **dict.fromkeys(BINARY, 2),
     **dict.fromkeys(ARITHMETIC, 2), "neg": 1, "where": 3, "table": 1,

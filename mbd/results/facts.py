@@ -19,8 +19,6 @@ from mbd.results.names import AXES
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
 
-__all__ = ["ContactFacts", "Facts"]
-
 ROUND = ("wheel", "ball")
 """Kinds of shapes that have a radius."""
 

@@ -11,8 +11,6 @@ from mbd.dataclass import dataclass
 from mbd.results.record import EventRecord
 from mbd.state import State
 
-__all__ = ["Failure"]
-
 
 @dataclass(frozen=True, eq=False)
 class Failure:

@@ -8,8 +8,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.errors import TrajectoryError
 from mbd.results.facts import Facts
 
-__all__ = ["require_finite"]
-
 
 def require_finite(name: str, values: Vector | Matrix, time: Vector, facts: Facts) -> None:
     """Raise a `TrajectoryError` with the first instant at which an observation is not finite; others pass.

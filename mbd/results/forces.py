@@ -26,8 +26,6 @@ from mbd.results.balance import Balance, Flags, put
 from mbd.results.polynomials import CHUNK, Places
 from mbd.results.record import Rows
 
-__all__ = ["Forces"]
-
 POINTS = np.array([0.2, 0.5, 0.8])
 """Where in an interval both are compared [-]."""
 NOT_EVALUATED = -1

@@ -30,8 +30,6 @@ from mbd.results.storage import Archive, contents
 from mbd.results.trajectory import Trajectory
 from mbd.tape.node import Node
 
-__all__ = ["identity", "identity_of_model"]
-
 PACKAGES = {"mbd", "numpy", "scipy", "sympy", "networkx", "pandas", "xarray", "matplotlib"}
 """What is in them is what its name says; packages of users' own change, wherever they are installed."""
 

@@ -14,8 +14,6 @@ from mbd.results.record import MAX_SHOWN_EVENTS, EventRecord
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["Impulse", "Impulses", "impulses_of"]
-
 WAYS = ("forward", "sideways")
 """Directions in which a disk or a ball rolls."""
 

@@ -18,8 +18,6 @@ from mbd.results.osculating import osculating
 from mbd.results.polynomials import Index, Places, hermite, hermite_rate, parabola, quintics, theta_and_step
 from mbd.results.record import Rows
 
-__all__ = ["Grid", "OneSide", "Side"]
-
 Side = Literal["left", "right", "before", "after"]
 OneSide = Literal["after", "before"]
 

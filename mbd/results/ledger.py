@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-__all__ = ["KINDS", "SPENT", "Ledger", "Part", "titled"]
-
 KINDS = (
     "joint loss", "damper", "friction", "penalty", "impact", "motor", "force", "constraint", "reset",
 )  # fmt: skip

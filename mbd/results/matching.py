@@ -11,8 +11,6 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.results.record import EventRecord
 
-__all__ = ["Matches", "aligned", "apart", "matched"]
-
 UNMATCHED_COST = 0.01
 """What an event without a match costs, as a shift relative to the length of the run [-]."""
 MAX_ASSIGNED = 400

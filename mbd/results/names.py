@@ -11,8 +11,6 @@ from mbd.errors import UnknownNameError
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
 
-__all__ = ["AXES", "VECTORS", "rate_name", "scalars", "scalars_behind"]
-
 AXES = (".x", ".y", ".z")
 """Endings of the components of a vector."""
 

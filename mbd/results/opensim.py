@@ -22,8 +22,6 @@ from mbd.results.units import unit
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["KINDS", "storage_file", "write_storage"]
-
 KINDS = (".sto", ".mot")
 """Endings of the files: in radians, and of motions in degrees."""
 

@@ -17,8 +17,6 @@ from mbd.notes import doubt
 if TYPE_CHECKING:
     from mbd.results.facts import Facts
 
-__all__ = ["ReadOff", "doubt_singular", "read_off"]
-
 VECTOR = re.compile(r"(.+)\.rotation_vector\.([xyz])")
 ANGLES = re.compile(r"(.+)\.euler\.([xyz]{3})(?:\.([123]))?")
 SINGULARITY_ATOL = 1e-4

@@ -21,8 +21,6 @@ from mbd.dataclass import dataclass
 from mbd.results.polynomials import CHUNK, Index, Places
 from mbd.results.quadrature import stretches
 
-__all__ = ["MAX_ERROR_RATIO", "Osculation", "osculating"]
-
 MAX_SIDE_RATIO = 0.25
 """Difference of the two sides, over that from the quintic, below which they see the same motion [-]."""
 MAX_ERROR_RATIO = 0.05

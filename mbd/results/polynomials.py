@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 
-__all__ = ["CHUNK", "Index", "Places", "hermite", "hermite_rate", "parabola", "quintic", "quintics", "theta_and_step"]
-
 Index = NDArray[np.intp]
 
 CHUNK = 1024

@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Effect, Equations
     from mbd.tape.node import Node, Scalar
 
-
-__all__ = ["Lost", "Power", "moving_share", "powers"]
-
 UNKNOWN_RATE = frozenset({"a", "s", "lam"})
 """Inputs whose rates the stored rows do not hold."""
 

@@ -24,8 +24,6 @@ from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
 from mbd.results.record import Rows
 
-__all__ = ["Projection"]
-
 MIN_SINGULAR_VALUE = 0.005
 """Least singular value from which rows are followed: of B over sizes of its columns, then lengths of rows, in the run.
 

@@ -17,8 +17,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.equal import EQUAL_RTOL
 from mbd.results.polynomials import CHUNK
 
-__all__ = ["cumulative", "stretches"]
-
 ROWS_WITH_RATES, ROWS_WITHOUT = 4, 8
 """Rows that the polynomial goes through: eight conditions either way."""
 MAX_LENGTH_RATIO = 8.0

@@ -18,8 +18,6 @@ from mbd.notebook import table
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
 
-__all__ = ["EventRecord", "Events", "Record", "Rows"]
-
 
 def _nothing() -> Vector:
     return np.zeros(0)

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from mbd.errors import TrajectoryError
 
-__all__ = ["pack", "pack_state", "unpack"]
-
 HOMES = ("mbd.state", "mbd.results.record", "mbd.integrators.stepping")
 """The modules whose dataclasses a file may name."""
 RETIRED = ("NewmarkMemory", "RadauMemory", "RungeKuttaMemory")

@@ -25,8 +25,6 @@ ONSET, LEAST = 1e-7, 1e-200
 END_RTOL = 8.0 * float(np.finfo(float).eps)
 """How far from the time of the next row a step ends that is taken again up to it, over the time [-]."""
 
-__all__ = ["StoredStates", "counted", "function_of", "is_smooth", "turns_to"]
-
 MAX_TURN = 1.0
 """Change beside that of the rate up to which turns are certain [rad]; it would be π in the middle of two."""
 

@@ -18,8 +18,6 @@ from mbd.errors import ModelError
 from mbd.notes import doubt
 from mbd.results.archive import named_file, writing
 
-__all__ = ["StudyFile"]
-
 SEAL = "seal"
 """The member of each line that is a hash of the others."""
 

@@ -21,8 +21,6 @@ from mbd.results.units import EFFORTS, unit
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["columns_of", "csv_file", "dataframe", "dataset", "last_number", "library", "long_name", "text_cell"]
-
 WORDS = {
     "x": "place of {} along x", "y": "place of {} along y", "z": "place of {} along z",
     "vx": "velocity of {} along x", "vy": "velocity of {} along y", "vz": "velocity of {} along z",

@@ -15,8 +15,6 @@ from mbd.results.archive import named_file, write_whole
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["Tabular", "Titled", "by_title"]
-
 
 class Tabular(ABC):
     """A result that is a table."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from mbd.results.facts import Facts
 
-__all__ = ["EFFORTS", "unit", "unit_of"]
-
 ENDINGS = {
     "angle": "rad", "first": "rad", "second": "rad", "displacement": "m", "length": "m", "speed": "m/s",
     "reaction_force": "N", "reaction_torque": "N m",

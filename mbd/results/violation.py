@@ -7,8 +7,6 @@ import numpy as np
 from mbd.dataclass import dataclass
 from mbd.results.columns import ModelColumns
 
-__all__ = ["Violation", "violation"]
-
 
 @dataclass(frozen=True)
 class Violation:

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from mbd.results.columns import ModelColumns
     from mbd.tape.node import Node
 
-__all__ = ["readable", "within"]
-
 POINTS = 0.5 * (np.array([-0.8611363115940526, -0.33998104358485626, 0.33998104358485626, 0.8611363115940526]) + 1.0)
 WEIGHTS = 0.5 * np.array([0.34785484513745357, 0.6521451548625464, 0.6521451548625464, 0.34785484513745357])
 """Of Gauss and Legendre with four points over a step: numbers, as `numpy.polynomial` takes 3 ms to import."""

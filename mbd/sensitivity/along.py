@@ -19,8 +19,6 @@ from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.starts import directions, programs_of, restitutions_of, start_tangent
 
-__all__ = ["Along", "along"]
-
 
 @dataclass(frozen=True)
 class Along:

@@ -17,8 +17,6 @@ from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, Source
 from mbd.sensitivity.starts import Direction, directions, programs_of, restitutions_of, start_tangent
 
-__all__ = ["Differentiated", "end_of", "final_state_derivative", "passed"]
-
 
 def final_state_derivative(
     run: Trajectory, wrt: Sequence[str | tuple[str, Mapping[str, float]]], held: Collection[str] = ()

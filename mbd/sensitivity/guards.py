@@ -18,8 +18,6 @@ from mbd.errors import CapabilityError
 from mbd.results.record import EventRecord
 from mbd.sensitivity.run_data import refused, sided
 
-__all__ = ["GRAZING_RTOL", "Numbers", "Trigger", "acts", "refused_graze", "trigger"]
-
 Kind = Literal["closed", "pull", "gap", "force", "press", "event", "stuck", "slipped", "watched"]
 
 GRAZING_RTOL = 1e-7

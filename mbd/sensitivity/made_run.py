@@ -23,8 +23,6 @@ from mbd.simulation.run.ends import call
 from mbd.simulation.run.savepoints import restore, save
 from mbd.simulation.run.stored import columns_of
 
-__all__ = ["MadeRun", "Ready", "made_with"]
-
 Ways = Callable[[Mapping[str, float]], tuple[Sequence[Any], Sequence[str]]]
 """Directions, and names of the start that stay, by the parameters of a run."""
 

@@ -14,8 +14,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.sensitivity.programs import Columns, State
 
-__all__ = ["First", "Mode", "Motion", "Rates", "Tangent"]
-
 
 @dataclass(frozen=True)
 class Mode:

@@ -27,8 +27,6 @@ from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.state import State
 from mbd.tape.node import Node
 
-__all__ = ["refuse_sided_end", "refuse_sided_grip", "refuse_sided_start", "sided_end", "with_both_sides"]
-
 ROUND_OFF, GRAZE = 1e-12, 1e-7
 """Velocity over the sum of its terms that is rest, and rate of a guard over its terms below which it grazes [-]."""
 STEP, LEVELS = 1e-4, 4

@@ -8,8 +8,6 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.sensitivity.motion import Mode, Motion, Rates
 
-__all__ = ["Instant", "Passed"]
-
 
 @dataclass(frozen=True)
 class Instant:

@@ -30,8 +30,6 @@ from mbd.simulation.arguments import end_of
 from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.simulate import BRIEF_TIME_SHARE
 
-__all__ = ["AnotherRun", "Charted", "seed", "tangent_run"]
-
 OWN = ("contact", "impact", "locate", "store", "rest_speed")
 FOLLOWING = ("allowed", "longest", "driven")
 

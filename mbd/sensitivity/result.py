@@ -17,8 +17,6 @@ from mbd.results.trajectory import Trajectory
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-__all__ = ["Sensitivities", "read", "words_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:

@@ -26,8 +26,6 @@ from mbd.sensitivity.programs import watched_nodes
 from mbd.state import State
 from mbd.tape.derivatives import live
 
-__all__ = ["ADVICE", "RunRows", "Source", "held_at", "mode_of", "refused", "sided"]
-
 ADVICE = "mbd.sensitivities(…, controllers='held') leaves that out: what they wrote is then held as it was"
 """What may be asked for where controllers are refused."""
 

@@ -22,8 +22,6 @@ from mbd.sensitivity.tangent_names import expanded
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
 
-__all__ = ["sensitivities"]
-
 Again = Callable[[State, Mapping[str, float]], Trajectory]
 
 

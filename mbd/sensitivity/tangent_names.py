@@ -13,8 +13,6 @@ from mbd.compile.mechanism import rate_names
 from mbd.equations.equations import Equations
 from mbd.errors import UnknownNameError
 
-__all__ = ["expanded", "place_names", "refuse_parts", "start_names", "whole_names"]
-
 
 def place_names(equations: Equations) -> list[str]:
     """Of the n_v directions of a configuration, in the order of its velocities."""

@@ -10,8 +10,6 @@ from mbd.equal import ROUND_OFF_RTOL
 from mbd.sensitivity.motion import Mode, Motion
 from mbd.sensitivity.programs import Programs
 
-__all__ = ["stored_at_start"]
-
 
 def stored_at_start(programs: Programs, motion: Motion, mode: Mode) -> Motion:
     """The motion at a start with derivatives of what machines have stored there; what they hold of before stays."""

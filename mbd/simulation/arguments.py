@@ -15,8 +15,6 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.state import State, malformed
 from mbd.topology.description import Description
 
-__all__ = ["MAX_WAIT", "check_arguments", "end_of"]
-
 MAX_STEP_RATIO = 1e6
 """Step over the latest time above which a run is refused: ends and events are told apart to 1e-12 dt [-]."""
 

@@ -14,8 +14,6 @@ from mbd.equations.equations import Equations
 from mbd.errors import quoted
 from mbd.integrators import KINDS, Integrator
 
-__all__ = ["LAWS", "SCHEMES", "STRATEGIES", "SPACE", "Law", "as_markdown", "as_text", "refusals", "supports"]
-
 
 @dataclass(frozen=True)
 class Law:

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["stopped"]
-
 
 def stopped(run: Trajectory) -> bool:
     """Whether a run ended because the user wanted it to."""

@@ -17,8 +17,6 @@ from mbd.simulation.run.late_resets import may_reset_late
 from mbd.simulation.run.plain import PlainScheme
 from mbd.state import State
 
-__all__ = ["Ends", "ManyRuns", "may_be_many", "start_line"]
-
 MIN_STEPS, CALL_TIME = 20_000, 0.2
 """Least steps of a call of the kernel, and its time [s], after which somebody may interrupt."""
 

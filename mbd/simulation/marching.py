@@ -40,8 +40,6 @@ from mbd.simulation.run.strategy import go_on_unlocated, may_go_on_unlocated
 from mbd.simulation.run.user_calls import call_user
 from mbd.state import State
 
-__all__ = ["Run"]
-
 AHEAD = (1.0, 4.0, 16.0)
 """How many steps beyond the last accepted state are looked at, one after the other [-]."""
 STEP_FAILURES = frozenset(

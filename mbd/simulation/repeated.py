@@ -28,8 +28,6 @@ from mbd.simulation.run.late_resets import reset_ends
 from mbd.simulation.simulate import REST_SPEED, laid_out, prepared
 from mbd.state import State
 
-__all__ = ["End", "RepeatedRun"]
-
 MAX_EVENTS = 32
 """Events of a run of many that are kept; one with more is made alone [-]."""
 

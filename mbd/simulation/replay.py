@@ -25,9 +25,6 @@ from mbd.simulation.marching import Run
 from mbd.simulation.simulate import prepared
 from mbd.state import State
 
-__all__ = ["Iteration", "Replay", "Try", "replay"]
-
-
 MAX_SHOWN = 10
 """Iterations of a try that a printed replay shows; `Replay.tries` has them all."""
 

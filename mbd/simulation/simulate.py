@@ -36,8 +36,6 @@ from mbd.simulation.run.idle import keep_idle
 from mbd.simulation.run.strategy import chosen
 from mbd.state import State, of_model
 
-__all__ = ["REST_SPEED", "laid_out", "prepared", "simulate"]
-
 FIRST_STEP_SHARE = 0.1
 """Longest step that follows its error in a first run, over the length of the run [-]."""
 MIN_STEP_LIMIT_RATIO = 0.01

@@ -23,8 +23,6 @@ from mbd.dataclass import dataclass
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.tape.node import Node, Tape
 
-__all__ = ["Factors", "Pivot", "factors"]
-
 
 @dataclass(frozen=True)
 class Pivot:

@@ -14,8 +14,6 @@ from mbd.tape.node import Node
 from mbd.tape.operations import CONDITIONS, value
 from mbd.tape.printing import input_name
 
-__all__ = ["evaluate", "evaluate_arrays", "values"]
-
 Key = tuple[str, int]
 
 

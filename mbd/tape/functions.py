@@ -9,11 +9,6 @@ from typing import Any
 from mbd.errors import TraceError
 from mbd.tape.node import BINARY, UNARY, Node
 
-__all__ = [
-    "NUMPY", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp", "floor", "hypot", "log", "maximum",
-    "minimum", "mod", "on_numpy", "on_numpy_function", "pi", "sign", "sin", "sinh", "sqrt", "tan", "tanh", "where",
-]  # fmt: skip
-
 _ARRAY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "min": "minimum", "max": "maximum"}
 """numpy's names where they differ."""
 

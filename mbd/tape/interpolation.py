@@ -9,8 +9,6 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from mbd.errors import ModelError
 
-__all__ = ["Beyond", "Ends", "Pieces", "hold", "integral", "joined", "linear", "monotone", "spline"]
-
 Beyond: TypeAlias = Literal["constant", "linear"]
 """How a table goes on outside its samples: at the last value, or along the last slope."""
 

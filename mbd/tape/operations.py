@@ -11,8 +11,6 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-__all__ = ["ARITHMETIC", "BINARY", "CONDITIONS", "EVEN", "ODD", "UNARY", "value"]
-
 
 def _sign(x: float) -> float:
     return 1.0 if x > 0.0 else -1.0 if x < 0.0 else x + 0.0

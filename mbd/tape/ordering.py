@@ -18,8 +18,6 @@ from heapq import heappop, heappush
 
 from mbd.dataclass import dataclass
 
-__all__ = ["Order", "order"]
-
 Place = tuple[int, int]
 """A row and a column."""
 

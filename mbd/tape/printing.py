@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from mbd.tape.node import Node
 
-__all__ = ["input_name", "listing", "text"]
-
 INFIX = {"add": ("+", 4), "sub": ("-", 4), "mul": ("*", 5), "div": ("/", 5), "lt": ("<", 3), "le": ("<=", 3)}
 """Sign and binding strength of the operations written between their arguments."""
 

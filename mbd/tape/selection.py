@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from mbd.tape.functions import where
 from mbd.tape.node import Scalar
 
-__all__ = ["by_state"]
-
 
 def by_state(index: Scalar, values: Sequence[Scalar]) -> Scalar:
     """The value of the state with this number; equal values are one."""

@@ -14,8 +14,6 @@ from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar, Tape
 from mbd.tape.operations import ARITHMETIC
 
-__all__ = ["lower", "raise_to_sympy"]
-
 
 def lower(expression: Any, symbols: Mapping[Any, Scalar], tape: Tape) -> Node:
     """The tape node of a sympy expression.

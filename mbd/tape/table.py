@@ -8,8 +8,6 @@ from collections.abc import Sequence
 
 from mbd.equal import ROUND_OFF_RTOL
 
-__all__ = ["Table"]
-
 
 class Table:
     """A piecewise cubic of one variable, stored beside the parameters and looked up at run time.

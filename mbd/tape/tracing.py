@@ -14,8 +14,6 @@ from mbd.errors import TraceError
 from mbd.tape.node import CONDITIONS, Node, Scalar, Tape
 from mbd.tape.sympy import lower
 
-__all__ = ["Argument", "traced", "traced_scalar"]
-
 CURVES = re.compile(r"[/\\\\]scipy[/\\\\]interpolate[/\\\\]")
 """Files of the curves of scipy."""
 

@@ -25,8 +25,6 @@ from mbd.testing.measures import between, measure_laws
 from mbd.testing.numbers import Numbers, Point, at, derivative, inputs
 from mbd.testing.runs import run_laws
 
-__all__ = ["check_constraint"]
-
 
 def check_constraint(
     constraint: Constraint | mbd.Model | Callable[..., Any],

@@ -15,8 +15,6 @@ from mbd.tape.node import Node
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.numbers import Numbers, Point, at, block, derivative, inputs
 
-__all__ = ["check_model", "equation_laws"]
-
 
 def check_model(model: Any, *, postures: int = 2, seed: int = 0) -> Verdict:
     """The laws of the equations of motion of a model with everything in it.

@@ -9,8 +9,6 @@ import numpy as np
 
 from mbd.dataclass import dataclass
 
-__all__ = ["Findings", "LawBroken", "Verdict"]
-
 
 class LawBroken(AssertionError):
     """A law of mechanics that a class does not keep; `laws` are the names of all the broken ones."""

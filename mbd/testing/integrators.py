@@ -15,8 +15,6 @@ from mbd.state import Mode, State
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.problems import PROBLEMS, Problem, broken, problem
 
-__all__ = ["check_integrator", "observed_order"]
-
 ERROR_FLOOR = 1e-11
 """Errors below are round-off, of the scheme or of the reference."""
 ORDER_ATOL = 0.15

@@ -19,18 +19,6 @@ from mbd.tape.node import Node
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.scope import FreeScope
 
-__all__ = [
-    "Build",
-    "balance",
-    "between",
-    "check_measure",
-    "measure_laws",
-    "relates_bodies",
-    "scope_of",
-    "turn_of",
-    "unsaid",
-]
-
 Build = Callable[[Frame, Frame, Joint], Any]
 """factory(a, b, hinge): frames a and b of two bodies, and a joint 'hinge' with an angle between these bodies."""
 

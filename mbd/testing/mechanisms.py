@@ -13,8 +13,6 @@ from mbd.bodies.base import Frame
 from mbd.bodies.ground import Ground
 from mbd.joints.base import Joint
 
-__all__ = ["random_body", "random_frame", "random_joint", "random_loop", "random_scene", "random_tree"]
-
 
 def random_body(rng: random.Random, name: str, spatial: bool) -> mbd.RigidBody:
     """A body with a center off its origin and an inertia that a real body can have."""

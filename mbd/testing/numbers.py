@@ -16,8 +16,6 @@ Point: TypeAlias = dict[tuple[str, int], float]
 
 Numbers: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
-__all__ = ["Point", "at", "block", "derivative", "inputs", "moved"]
-
 
 def inputs(equations: Equations, seed: int = 0, x: float = 0.0, spread: float = 1.0) -> Point:
     """A random value for every input; parameters at their values, every penalty switched on, no dry friction.

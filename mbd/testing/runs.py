@@ -11,8 +11,6 @@ from mbd.equations.equations import Contact, Equations, Friction
 from mbd.results.ledger import SPENT
 from mbd.testing.findings import Findings
 
-__all__ = ["run_laws"]
-
 LEDGER_RTOL = 1e-2
 """Largest share of the energy's swing that the books may miss at the step of a check; a missing work is of size 1."""
 

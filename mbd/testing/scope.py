@@ -17,8 +17,6 @@ from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["FreeScope", "skew"]
-
 Numbers = np.ndarray[Any, np.dtype[np.float64]]
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -22,8 +22,6 @@ except ImportError as error:
         "python -m pip install 'mbd[test]'; the checks (check_constraint, …) run without it"
     ) from error
 
-__all__ = ["frames", "loops", "postures", "scenes", "states", "trees"]
-
 SEEDS = st.integers(0, 2**32 - 1)
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from mbd.joints.base import Joint
     from mbd.topology.description import Description
 
-__all__ = ["described_constraint", "description", "in_html", "listed", "parts"]
-
 UNITS = {"mass": "kg", "length": "m", "center": "m", "inertia": "kg m²"}
 
 

@@ -24,8 +24,6 @@ from mbd.forces.quantities import Mention
 from mbd.joints.base import Joint
 from mbd.notes import doubt
 
-__all__ = ["Description", "all_are", "on_slope", "served"]
-
 Word = TypeVar("Word")
 
 SHOWN = 120

@@ -18,8 +18,6 @@ from mbd.forces.spring import Spring
 from mbd.joints.base import AWAITED_ATTRIBUTE, Joint
 from mbd.topology.graph import links_of, spanning_tree
 
-__all__ = ["MAX_PLAUSIBLE_ANGLE", "doubts", "in_radians"]
-
 MAX_PLAUSIBLE_ANGLE = 10.0
 """Angle above which a whole number may be one in degrees [rad]."""
 

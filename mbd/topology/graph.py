@@ -10,9 +10,6 @@ from mbd.joints.base import Joint
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["disconnected", "graph_of", "links_of", "mobility", "spanning_tree"]
-
-
 Links = dict[str, dict[str, dict[str, Joint]]]
 """The joints by name between a body and each of its neighbors, by their names: the adjacency of the graph."""
 

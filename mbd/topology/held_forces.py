@@ -11,8 +11,6 @@ from mbd.joints.base import Joint
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["OF_GAPS", "REACTIONS", "names_of_held_forces", "reactions_read"]
-
 OF_ROWS = ("force", "multiplier", "tension", "torque", "spin.torque")
 OF_FRICTION = ("friction", "friction.forward", "friction.sideways")
 OF_GAPS = ("gap", "gap_rate")

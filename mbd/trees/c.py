@@ -14,8 +14,6 @@ from itertools import pairwise
 from mbd.trees import tree
 from mbd.trees.trigonometry import sincos_in_c
 
-__all__ = ["HEAD", "Straight", "c_text"]
-
 C = {
     "bool": "int", "int": "int64_t", "real": "double", "ints": "int64_t *", "reals": "double *", "kernel": "int64_t *",
     "none": "void",

@@ -18,12 +18,6 @@ from dataclasses import field
 from mbd.dataclass import dataclass
 from mbd.errors import CapabilityError
 
-__all__ = [
-    "NUMBERS", "Assign", "Break", "Call", "Choice", "Compare", "Continue", "Convert", "Do", "Element", "Evaluate",
-    "Expression", "Extreme", "Field", "Function", "If", "Junction", "Local", "Number", "Operation", "Range", "Return",
-    "Statement", "Unary", "Update", "While", "joined", "kind_of",
-]  # fmt: skip
-
 NUMBERS = ("bool", "int", "real")
 KINDS = {
     "bool": "a bool", "int": "an int", "real": "a float", "ints": "an array of ints", "reals": "an array of floats",

@@ -21,8 +21,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from struct import pack
 
-__all__ = ["HALF_PI", "LIMIT", "WIDTHS", "sincos", "sincos_in_c"]
-
 WIDTHS = (1, 2, 4)
 """Numbers of angles for which there is a function; more angles take several calls."""
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from mbd.analysis.accuracy import Accuracy, Point
 
-__all__ = ["clear", "frontier", "height", "work_precision"]
-
 SCHEME_MARKERS = "osD^vP*X"
 """Of the schemes in turn."""
 WIDE, HIGH = 36.0, 8.0

@@ -13,8 +13,6 @@ from mbd.view.page import html
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Animation"]
-
 MIN_HEIGHT = 200
 """Height that has room for the mechanism [pixels]."""
 

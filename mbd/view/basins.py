@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from mbd.gait.basin.result import Basin
 
-__all__ = ["basin"]
-
 SHADES = {
     "falls forward": CYCLE[4], "falls backward": CYCLE[5], "falls": CYCLE[6], "scuffs": CYCLE[3], "stands": FAINT,
     "chatters": "#F0E442", "numerical error": INK, "other event": "#8C6BB1", "wrong contacts": "#B2182B",

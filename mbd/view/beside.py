@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-__all__ = ["beside"]
-
 
 @contextmanager
 def beside(write: Callable[[], object]) -> Iterator[None]:

@@ -10,8 +10,6 @@ from mbd.arrays import Matrix
 from mbd.bodies.values import is_number
 from mbd.errors import ModelError, nearest
 
-__all__ = ["FIRST", "VIEWS", "angles_of", "camera"]
-
 FIRST = (-0.6, 0.42)
 """From where a spatial mechanism is seen first: turned about the vertical, and raised [rad]."""
 

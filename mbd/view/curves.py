@@ -14,8 +14,6 @@ from mbd.results.polynomials import Index
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["curves", "extremes"]
-
 CURVE_POINTS = 600
 """Points of a curve that look smooth over the width of a plot [-]."""
 

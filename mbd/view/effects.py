@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from mbd.analysis.effects import Contribution, Effects
 
-__all__ = ["bars"]
-
 NOTE: dict[str, Any] = {"va": "center", "fontsize": 7.5}
 
 

@@ -19,9 +19,6 @@ from mbd.view.scenery import SURFACE_LINES
 from mbd.view.solids import rotations
 from mbd.view.style import INK, NEUTRAL, PAPER, color, tone
 
-__all__ = ["Facets", "facets", "shaded", "size_of", "surfaces"]
-
-
 MAX_FACET_EDGE = 0.035
 """Longest edge of a facet, over the size of the mechanism [-]."""
 

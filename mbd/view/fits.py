@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from mbd.analysis.fitting.fit import Fit
 
-__all__ = ["fitted"]
-
 
 def fitted(fit: Fit, path: str | Path | None = None) -> Figure:
     """A row for each column of the data: measured dots on the computed curve, and the residuals below 0 and above.

@@ -17,9 +17,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import NOMINAL_RTOL
 
-__all__ = ["Form", "Mesh", "equal_inertia", "mesh"]
-
-
 MIN_HALF_SIZE = 0.03
 """Least half size, over the largest [-]: a disk or a rod is drawn with some thickness."""
 

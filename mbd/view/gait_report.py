@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from mbd.analysis.gait_report.curves import Curve
     from mbd.analysis.gait_report.report import GaitReport, Walk
 
-__all__ = ["html", "picture", "write"]
-
 ROWS = ("angle", "moment", "power")
 """Quantities of a joint, one below the other."""
 

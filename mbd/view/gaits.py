@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from mbd.gait.follow import PointCurve
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["branch", "cycle", "point_curve"]
-
 MARKS = {
     "fold": "s", "doubling": "o", "torus": "^", "branch point": "D", "scuff": "X", "graze": "X", "release": "v",
     "slip": ">", "pull": "v", "new event": "P", "lost event": "P", "fall": "*",

@@ -13,8 +13,6 @@ from mbd.view.forms import mesh
 from mbd.view.scene import Scene
 from mbd.view.scenery import SURFACE_LINES, Sheet
 
-__all__ = ["finite", "first_view", "geometry", "packed", "side", "step_of"]
-
 QUANTIZATION_STEPS = 5000.0
 """Steps into which a range of values is divided; finer than a pixel."""
 

@@ -16,8 +16,6 @@ from mbd.dataclass import dataclass
 if TYPE_CHECKING:
     from mbd.results.trajectory import Moments, Trajectory
 
-__all__ = ["Instants"]
-
 
 @dataclass(frozen=True, eq=False)
 class Instants:

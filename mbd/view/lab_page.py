@@ -10,8 +10,6 @@ from typing import Any
 from mbd.view.report import made_with
 from mbd.view.template import filled
 
-__all__ = ["finite", "lab_page"]
-
 
 def lab_page(
     title: str, advice: Sequence[str], notes: Sequence[str], controls: str, shows: str, about: str,

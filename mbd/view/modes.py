@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from mbd.analysis.linearization import Linearization, NaturalMode
 
-__all__ = ["modes"]
-
 IMAGINARY_RTOL = 0.02
 """Imaginary part of a shape below which all coordinates are drawn as moving in phase [-]."""
 

@@ -12,8 +12,6 @@ from typing import Any, NoReturn
 
 from mbd.bodies.values import printable
 
-__all__ = ["Parser", "writable"]
-
 
 class Parser(argparse.ArgumentParser):
     """`argparse.ArgumentParser` with suggestions; ``--unti`` is no ``--until``."""

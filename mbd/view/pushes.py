@@ -19,8 +19,6 @@ from mbd.view.scenery import Scenery, plane_of_motion
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Push", "pushes"]
-
 
 @dataclass(frozen=True, eq=False)
 class Push:

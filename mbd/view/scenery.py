@@ -20,9 +20,6 @@ from mbd.view.instants import Instants
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Ball", "Blade", "Deck", "Ground", "Sheet", "Scenery", "Wheel", "plane_of_motion", "scenery"]
-
-
 FINE, MOST, MOST_MOVING = 100, 4000, 400
 """Points of a curve over the size of the mechanism, and on a whole curve, at rest and moving."""
 

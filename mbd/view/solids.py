@@ -17,8 +17,6 @@ from mbd.view.instants import Instants
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Hinge", "Solid", "Stop", "hinges", "limbs", "quaternions", "rotations", "solids", "stops"]
-
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from mbd.analysis.numerical import Criteria
 
-__all__ = ["spectra"]
-
 HALF = float(np.pi)
 """ω dt of two steps a period, beyond which there is no period to speak of [rad]."""
 LONG = re.compile(r"\d+\.\d{5,}")

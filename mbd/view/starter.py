@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["STARTER"]
-
 STARTER = '''"""{title}: a leg that swings, bends its knee and meets the ground.
 
 Run it with   mbd run {file}   : numbers, plots and a page with the motion.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["CYCLE", "DARK", "FAINT", "INK", "NEUTRAL", "PALE", "PAPER", "SIDES", "as_label", "color", "rules", "tone"]
-
 CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#4D4D4D")
 """Colors that stay apart for color-blind readers (Okabe & Ito 2008), the yellow darkened for white paper."""
 

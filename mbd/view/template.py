@@ -12,8 +12,6 @@ from typing import Any
 from mbd.errors import TrajectoryError
 from mbd.results.archive import named_file, write_whole
 
-__all__ = ["filled", "part", "written"]
-
 PICTURE = "; pictures are those of run.plot(path=…) and run.final.plot('start.png')"
 OTHERS = {
     **dict.fromkeys((".png", ".svg", ".pdf", ".jpg", ".jpeg"), PICTURE),

@@ -7,8 +7,6 @@ from typing import Any
 
 from mbd.view.style import DARK
 
-__all__ = ["save"]
-
 
 def save(figure: Any, path: Path) -> None:
     """Write a figure without paper, in ink that is light where the reader's page is dark."""

@@ -7,8 +7,6 @@ from typing import Any
 from matplotlib import get_backend, pyplot
 from matplotlib.figure import Figure
 
-__all__ = ["OnceShown"]
-
 
 class OnceShown(Figure):
     """A figure that a notebook shows once.

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 from mbd.analysis.accuracy.points import Point
 
-__all__ = ["advice", "cheapest", "decades", "milliseconds"]
-
 ACCURACY_FACTOR = 10.0
 """Times more accuracy whose cost is reported."""
 MIN_ERROR_OVER_BOUND = 30.0

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from mbd.integrators import Integrator
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Known", "Published", "published", "table_of"]
-
 
 @dataclass(frozen=True)
 class Known:

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from mbd.analysis.accuracy.truth import Truth
 
-__all__ = ["HEADS", "Accuracy", "cells", "remark"]
-
 HEADS = (
     "scheme", "dt [s] or tol", "error", "order", "time [ms]", "steps", "Newton", "tangents", "residuals", "factored",
     "drift", "energy [J]", "event time [s]", "events",

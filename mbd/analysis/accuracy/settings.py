@@ -14,8 +14,6 @@ from mbd.integrators import Integrator
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Setting", "is_high", "long_steps", "rounded", "steps_for", "steps_of", "tolerances"]
-
 STEPS_PER_SHORTEST_TIME = 5
 """Largest step: this part of the shortest time in which accelerations change velocities by their range [-]."""
 STEP_COUNT = 6

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.results.trajectory import EventRecord, Trajectory
 
-__all__ = ["change", "common", "same_rows"]
-
 MATCHING_WINDOW = 4
 """Events among which the next one is looked for: those of about one instant may come in any order."""
 MAX_SHIFT_RATIO = 2.0

@@ -11,8 +11,6 @@ from mbd.dataclass import dataclass
 if TYPE_CHECKING:
     from mbd.analysis.effects.timing import Timing
 
-__all__ = ["Change", "Contribution", "Together"]
-
 
 @dataclass(frozen=True)
 class Change:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["HEADS", "Effects", "cells"]
-
 HEADS = ("effect", "kind", "operations", "ns/step", "energy [J]", "share", "change", "of", "until [s]")
 """Columns of the table."""
 

@@ -18,8 +18,6 @@ from mbd.state import Mode, State
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Element", "Scene", "elements", "reduced"]
-
 
 @dataclass(frozen=True)
 class Element:

@@ -11,8 +11,6 @@ from mbd.dataclass import dataclass
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Pair", "Timing", "timed"]
-
 MIN_ROUNDS, MAX_ROUNDS = 5, 15
 """Times that each run is made; beyond the least only while there is time left."""
 MAX_TIMING_SECONDS = 8.0

@@ -16,8 +16,6 @@ from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.errors import ModelError
 from mbd.results.units import unit_of
 
-__all__ = ["Data"]
-
 
 @dataclass(frozen=True)
 class Data:

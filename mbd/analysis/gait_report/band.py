@@ -16,8 +16,6 @@ from mbd.bodies.values import shown
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
-__all__ = ["Band", "NormativeBand", "read_band"]
-
 TITLE = re.compile(r"(?P<subject>.+?) (?P<quantity>angle|moment|power) (?P<part>low|high|mean|sd)$", re.IGNORECASE)
 """Head of a column of a table: 'knee angle low', 'hip moment mean'."""
 JOINTS = {"HipAngles": "hip", "KneeAngles": "knee", "AnkleAngles": "ankle"}

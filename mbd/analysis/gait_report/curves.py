@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
     from mbd.tape.node import Node
 
-__all__ = ["PERCENT", "Curve", "angles_of", "curves_of", "forces_at", "grips_of"]
-
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Share of the stride [%]."""
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from mbd.results.impulses import Impulse
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["NO_SIDE", "Measure", "Spent", "energy_of", "largest", "measures_of"]
-
 MIN_SAMPLES = 9
 """Samples of a part between two events at least, and of each refinement [-]."""
 

@@ -16,18 +16,6 @@ from mbd.errors import TrajectoryError
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = [
-    "SINGLE_SIDE",
-    "Interval",
-    "Side",
-    "Stride",
-    "base_name",
-    "of_side",
-    "sides_of",
-    "strides_between",
-    "words_of",
-]
-
 SHORT = {"left": "l", "right": "r"}
 """Letters that stand for the words of sides in names of other programs."""
 

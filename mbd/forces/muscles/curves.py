@@ -15,8 +15,6 @@ from mbd.arrays import Vector
 from mbd.forces.samples import Samples
 from mbd.tape.functions import cosh, exp, log, minimum, sign, sinh, sqrt
 
-__all__ = ["CURVES", "Curves", "DeGrooteFregly", "Millard"]
-
 EXTENSION_LENGTH = 1.0
 """Length of the straight pieces in the table before the first and after the last corner, which continue [-]."""
 

@@ -18,8 +18,6 @@ from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of,
 from mbd.tape.functions import sin, sqrt, tanh
 from mbd.tape.node import Scalar
 
-__all__ = ["Muscle"]
-
 TENDONS = ("elastic", "rigid")
 NUMBERS = (
     "max_force", "fiber_length", "tendon_length", "pennation", "max_velocity", "damping", "activation_time",

@@ -34,8 +34,6 @@ from mbd.joints.base import Joint
 from mbd.tape.functions import where
 from mbd.tape.node import Scalar
 
-__all__ = ["Path", "PointPath", "PolynomialPath", "ViaPoint", "path_of"]
-
 
 @dataclass(frozen=True)
 class ViaPoint:

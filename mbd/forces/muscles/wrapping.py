@@ -22,8 +22,6 @@ from mbd.forces.quantities import Mention
 from mbd.tape.functions import atan2, clip, cos, maximum, minimum, sign, sin, sqrt, where
 from mbd.tape.node import Scalar
 
-__all__ = ["InBody", "WrappingCylinder", "WrappingEllipsoid", "WrappingSphere", "WrappingSurface", "bends", "taut"]
-
 MIN_TANGENT = 1e-15
 """Square of the tangent to a surface, in radii, below which a point counts as lying on it: round-off of a² − r² [-]."""
 MAX_SWEEPS = 12

@@ -23,8 +23,6 @@ from mbd.gait.cycle import LimitCycle
 from mbd.gait.section import Chart
 from mbd.state import State
 
-__all__ = ["Ball", "ball_of"]
-
 MAX_RADIUS, MIN_RADIUS = 0.1, 1e-6
 """Radii that are tried, in the W-norm of coordinates of the section [m, rad, m/s, rad/s]."""
 INSIDE = (1.0, 0.5, 0.1)

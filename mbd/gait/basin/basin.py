@@ -26,8 +26,6 @@ from mbd.results.identity import identity, identity_of_model
 from mbd.results.study_file import StudyFile
 from mbd.simulation.batch.batch import worker_count
 
-__all__ = ["Store", "basin"]
-
 STATE = ("q", "v", "z", "anchors")
 """What a state of a gait is made of, which starts have where axes do not name it."""
 BLOCK_SIZE = 8192

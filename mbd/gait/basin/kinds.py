@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["KINDS", "LETTERS", "NUMBER"]
-
 KINDS: tuple[str, ...] = (
     "walks", "falls forward", "falls backward", "falls", "scuffs", "stands", "chatters", "numerical error",
     "other event", "wrong contacts", "misses", "not on the section", "not decided",

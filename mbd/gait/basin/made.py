@@ -24,8 +24,6 @@ from mbd.simulation.batch.starts import raise_for_turning
 from mbd.simulation.simulate import REST_SPEED
 from mbd.state import State
 
-__all__ = ["Made"]
-
 MAX_GAITS = 1000
 """Sets of parameters at most, at each of which the gait is looked for."""
 

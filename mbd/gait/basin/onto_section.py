@@ -19,8 +19,6 @@ from mbd.gait.section import Section
 from mbd.tape.derivatives import gradient
 from mbd.tape.node import Node
 
-__all__ = ["OntoSection"]
-
 REGULARIZATION = 1e-13
 """Share of the trace of G Gᵀ that is added to its diagonal, lest rows that depend on others divide by zero [-]."""
 

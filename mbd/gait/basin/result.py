@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from mbd.gait.basin.made import Made
 
-__all__ = ["Basin"]
-
 
 @dataclass(frozen=True, eq=False)
 class Basin(Titled):

@@ -19,8 +19,6 @@ from mbd.simulation.batch.changes import Changes
 from mbd.simulation.batch.runner import Runner
 from mbd.simulation.many_runs import Ends
 
-__all__ = ["STILL_WALKING", "Verdicts"]
-
 STILL_WALKING = -1
 """In place of a kind: the walk goes on."""
 REST_SPEED_RATIO = 1e-3

@@ -21,8 +21,6 @@ from mbd.simulation.batch.runner import Runner
 from mbd.simulation.many_runs import Ends, start_line
 from mbd.state import State
 
-__all__ = ["Decided", "Numbers", "Walks"]
-
 Numbers = NDArray[np.int64]
 
 

@@ -11,8 +11,6 @@ from mbd.joints.losses.base import Loss
 from mbd.tape.functions import maximum, sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["AffineFriction"]
-
 SMOOTHING = positive("is not positive; give the speed over which friction sets in")
 
 

@@ -16,8 +16,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["DissipationFunction", "Loss", "LossSum", "StateRates", "loss_of", "rates_of", "without_states"]
-
 DISSIPATES = at_least_zero("is negative, so it would feed energy in; give a value ≥ 0")
 """The domain of a coefficient of friction or damping."""
 

@@ -13,8 +13,6 @@ from mbd.joints.losses.base import DISSIPATES, Loss, StateRates
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["CompressibleDamper"]
-
 LEAKS = positive("is not positive, so that nothing flows at small forces; give the leakage beside the orifice")
 STIFF = positive("is not positive; give the stiffness of the oil, or mbd.Quadratic for oil that is not compressed")
 

@@ -11,8 +11,6 @@ from mbd.joints.losses.base import DissipationFunction, Loss
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["Coulomb"]
-
 SMOOTHING = positive("is not positive; try 0.01 rad/s, or None to truly stick")
 
 

@@ -12,8 +12,6 @@ from mbd.errors import ModelError
 from mbd.joints.losses.base import Loss, StateRates
 from mbd.tape.node import Scalar
 
-__all__ = ["Dahl"]
-
 YIELDS = positive("is not positive; give the friction of steady sliding, or leave the loss out")
 STIFF = positive("is not positive; give the stiffness before it slides, or mbd.Coulomb for none")
 

@@ -13,8 +13,6 @@ from mbd.joints.losses.base import DissipationFunction
 from mbd.tape.node import Scalar, Tape
 from mbd.tape.tracing import traced_scalar
 
-__all__ = ["Dissipation"]
-
 
 @dataclass(frozen=True)
 class Dissipation(DissipationFunction):

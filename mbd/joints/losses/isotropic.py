@@ -12,8 +12,6 @@ from mbd.joints.losses.viscous import Viscous
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Scalar
 
-__all__ = ["isotropic"]
-
 
 def isotropic(loss: Loss, velocity: Sequence[Scalar], scope: Scope, owner: str) -> list[Scalar]:
     """``F(‖v‖) v/‖v‖`` of the smooth part of a loss, for the components v along perpendicular axes.

@@ -13,8 +13,6 @@ from mbd.joints.losses.base import DISSIPATES, Loss, StateRates
 from mbd.tape.functions import exp
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["LuGre"]
-
 POSITIVE = positive()
 
 

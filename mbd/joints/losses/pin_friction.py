@@ -8,8 +8,6 @@ from mbd.dataclass import dataclass
 from mbd.joints.losses.base import Loss
 from mbd.tape.node import Scalar
 
-__all__ = ["PinFriction"]
-
 
 @dataclass(frozen=True)
 class PinFriction(Loss):

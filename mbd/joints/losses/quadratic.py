@@ -8,8 +8,6 @@ from mbd.dataclass import dataclass
 from mbd.joints.losses.base import DissipationFunction
 from mbd.tape.node import Scalar
 
-__all__ = ["Quadratic"]
-
 
 @dataclass(frozen=True)
 class Quadratic(DissipationFunction):

@@ -11,8 +11,6 @@ from mbd.joints.losses.base import Loss
 from mbd.tape.functions import exp
 from mbd.tape.node import Scalar
 
-__all__ = ["Stribeck"]
-
 SPEED = positive("is not positive; give the speed over which friction falls, or mbd.Coulomb for a constant one")
 
 

@@ -12,8 +12,6 @@ from mbd.joints.losses.base import Loss
 from mbd.tape.interpolation import Pieces, monotone
 from mbd.tape.node import Scalar
 
-__all__ = ["Tabulated"]
-
 
 @dataclass(frozen=True, init=False)
 class Tabulated(Loss):

@@ -13,8 +13,6 @@ from mbd.joints.losses.base import Loss, LossSum, StateRates, rates_of
 from mbd.tape.functions import maximum, minimum, where
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Valves"]
-
 
 @dataclass(frozen=True)
 class Valves(Loss):

@@ -11,8 +11,6 @@ from mbd.dataclass import dataclass
 from mbd.joints.losses.base import DissipationFunction
 from mbd.tape.node import Scalar
 
-__all__ = ["Viscous"]
-
 
 @dataclass(frozen=True)
 class Viscous(DissipationFunction):

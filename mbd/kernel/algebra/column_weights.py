@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from mbd.kernel.records import Model, Reals
 
-__all__ = ["MIN_INERTIA_SHARE", "counted_inertia", "least_inertia"]
-
 MIN_INERTIA_SHARE = 1e-8
 """Share of the largest inertia of its unit that a motion counts with at least, where rows are compared [-]."""
 

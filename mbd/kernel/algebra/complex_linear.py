@@ -8,8 +8,6 @@ from __future__ import annotations
 from mbd.kernel.records import Reals
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["factor_complex", "solve_complex"]
-
 
 def factor_complex(A: Reals, o: int, n: int, o_pivots: int) -> int:
     """LU factors in place of the matrix at A[o:], n² real parts and n² imaginary ones; 0, or 1 + the bad column.

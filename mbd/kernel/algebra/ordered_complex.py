@@ -6,8 +6,6 @@ from mbd.kernel.algebra.ordered import HEADER_SIZE, is_sound
 from mbd.kernel.records import Steps
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["factor_pair_ordered", "solve_pair_ordered"]
-
 
 def factor_pair_ordered(K: Steps, o_A: int, o: int, loss: float) -> bool:
     """Factors by the order at o of the matrix at K.stages[o_A:], in its place; false, and no change, if not sound.

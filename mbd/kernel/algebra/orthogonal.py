@@ -5,8 +5,6 @@ from __future__ import annotations
 from mbd.kernel.records import Reals
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["clear_row", "square"]
-
 
 def square(V: Reals, row: int, n: int) -> float:
     """w · w of the row that begins at `row`."""

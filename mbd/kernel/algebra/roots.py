@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["sqrt"]
-
 
 def sqrt(x: float) -> float:
     """√x; NaN of a negative number. Machine code has an instruction for it, where a power may be a call or not."""

@@ -13,8 +13,6 @@ from mbd.equations.equations import Contact, Equations, Guard
 from mbd.kernel.codes import ALWAYS, BY_MEASURE
 from mbd.state import Mode
 
-__all__ = ["ActiveSetManager", "ContactTables"]
-
 Integers = NDArray[np.int64]
 
 

@@ -9,8 +9,6 @@ from mbd.kernel.records import Balance, Complementarity, ContactForces, Friction
 from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, active_rows, evaluate_loaded, limit_of, load_accelerations
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["find_limits", "is_on", "load", "slides", "solve_directed", "whole"]
-
 
 def solve_directed(K: Balance, level: int) -> int:
     """Solve with the present branches and directions; friction that slides is put into K.impulse of its row."""

@@ -11,8 +11,6 @@ from mbd.equal import REST_SPEED
 from mbd.kernel.contact.cones import aim, follows, set_loose, set_sticking
 from mbd.kernel.records import DependentRows, Switching
 
-__all__ = ["is_carried", "prescribed_rate", "slides_as_carried"]
-
 
 def prescribed_rate(K: DependentRows, row: int) -> float:
     """What time alone makes of the rate of a row that was left out, B_d = C B: its own h_t less C h_t of the others.

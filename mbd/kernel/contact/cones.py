@@ -13,12 +13,6 @@ from mbd.equal import MIN_DIVISOR, MIN_SQUARED_SPEED
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, Frictions, Guards, Reals
 
-__all__ = [
-    "HOLD_AT_ONSET", "HOLD_DIRECTION", "MIN_DIRECTION_SPEED", "across", "aim", "aim_along", "aim_as_pulled", "along",
-    "away", "fill_slips", "follow_motion", "follows", "friction_size", "hold_directions", "leads_group",
-    "let_directions_go", "phase_of", "product_of", "set_hold", "set_loose", "set_sticking", "sliding_force", "speed_of",
-]  # fmt: skip
-
 HOLD_DIRECTION = 1e20
 """Of K.hold: λ_T keeps its direction whatever γ [-]."""
 HOLD_AT_ONSET = 1e-7

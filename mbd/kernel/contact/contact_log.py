@@ -6,8 +6,6 @@ from mbd.kernel.codes import LOG_CLOSED, LOG_EVENT, LOG_OPENED
 from mbd.kernel.contact.impact_solve import strikes
 from mbd.kernel.records import Sizes, Switching
 
-__all__ = ["ALL_IMPULSES", "NO_IMPULSE", "OWN_IMPULSE", "log_event", "room_to_log"]
-
 NO_IMPULSE, OWN_IMPULSE, ALL_IMPULSES = 0, 1, 2
 """Which impulses a line of the event log holds [-]."""
 

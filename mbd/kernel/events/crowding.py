@@ -12,8 +12,6 @@ from __future__ import annotations
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.records import Guards, Switching
 
-__all__ = ["count_impact", "crowd", "crowds"]
-
 MAX_EXCESS_IMPACTS = 64.0
 """Impacts through several contacts, less one for each dt, from which on steps are non-smooth [-]."""
 MIN_CONTACTS = 2

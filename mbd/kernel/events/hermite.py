@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from mbd.kernel.algebra.roots import sqrt
 
-__all__ = ["crossing", "first_guess", "hermite", "hermite_turn"]
-
 
 def hermite_turn(g0: float, g1: float, d0: float, d1: float, rising: bool) -> float:
     """Place in (0, 1) of the interior maximum (rising) or minimum of the cubic Hermite interpolant; −1 if none."""

@@ -6,8 +6,6 @@ from mbd.kernel.records.declare import Integers, Reals, formula, integers, place
 from mbd.kernel.records.settings import SchemeAbilities
 from mbd.kernel.records.state import Model, Motion
 
-__all__ = ["ContactRows", "Contacts", "Events", "Frictions", "Guards", "Mechanism"]
-
 
 class Contacts(SchemeAbilities):
     """Contacts: their rules and what is known of each."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from mbd.kernel.records.declare import Integers, Reals, formula, integers, place, reals
 from mbd.kernel.records.settings import SchemeAbilities
 
-__all__ = ["Runs"]
-
 
 class Runs(SchemeAbilities):
     """Starts and ends, one line of numbers each; arrays of no length in a run alone."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from mbd.kernel.records.declare import Reals, Record, formula, reals
 
-__all__ = ["SchemeAbilities", "Settings", "Sizes"]
-
 
 class Sizes(Record):
     """How many of everything, and where inputs begin in the block, which `mbd.compile.layout` explains."""

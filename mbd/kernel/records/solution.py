@@ -7,11 +7,6 @@ from mbd.kernel.records.declare import Integers, Reals, integers, place, reals
 from mbd.kernel.records.settings import SchemeAbilities
 from mbd.kernel.records.state import Memory, Motion
 
-__all__ = [
-    "Balance", "Complementarity", "ContactForces", "DependentRows", "Equations", "LinearAlgebra", "Report", "Results",
-    "Singular", "SingularSteps", "Steps", "Switching",
-]  # fmt: skip
-
 
 class Complementarity(SchemeAbilities):
     """Impacts and contact forces: velocities or accelerations, impulses or multipliers that go together."""

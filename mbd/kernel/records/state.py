@@ -8,8 +8,6 @@ from typing import Any
 from mbd.kernel.records.declare import Integers, Reals, formula, integers, place, reals
 from mbd.kernel.records.settings import SchemeAbilities
 
-__all__ = ["Memory", "Model", "Motion", "State"]
-
 PROGRAMS = 6
 """Programs of a mode: tangent, residual, correction and solution; 0 stands for the last two where there are none."""
 MODE_CAPACITY = 16

@@ -11,8 +11,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.kernel.algebra.roots import sqrt
 
-__all__ = ["RADAU", "Collocation", "radau_iia"]
-
 
 @dataclass(frozen=True, eq=False)
 class Collocation:

@@ -28,8 +28,6 @@ from mbd.kernel.records import Kernel, Sizes
 from mbd.kernel.stepping.restart import take_consistent
 from mbd.kernel.translation.hints import shown
 
-__all__ = ["MEMORY", "NO_SCHEME", "SCHEMES", "Abilities", "Scheme", "dispatch", "number_of", "scheme_named", "schemes"]
-
 SCHEMES: tuple[str, ...] = (
     "mbd.kernel.schemes.newmark",
     "mbd.kernel.schemes.runge_kutta",

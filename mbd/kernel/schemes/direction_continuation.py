@@ -13,8 +13,6 @@ from mbd.kernel.codes import NOT_CONVERGED, STAGNATED
 from mbd.kernel.contact.cones import HOLD_AT_ONSET, HOLD_DIRECTION, fill_slips
 from mbd.kernel.records import ContactRows, Frictions
 
-__all__ = ["NO_HOLD", "LAST_HOLD", "begin_continuation", "continue_directions", "wants_continuation"]
-
 NO_HOLD = -1.0
 """In place of a hold: the step is not continued, its directions do what K.hold says."""
 LAST_HOLD = 0.0

@@ -5,8 +5,6 @@ from __future__ import annotations
 from mbd.kernel.records import SingularSteps, State, Steps
 from mbd.kernel.stepping.restart import note_scales, raise_scales, retain_scales
 
-__all__ = ["accept_step", "forget_steps", "look_a_step_ahead", "start_step"]
-
 PEAK_KEPT = 0.9
 """Part of the largest rate so far that counts a step later: what was fast some tens of steps ago hides nothing [-]."""
 

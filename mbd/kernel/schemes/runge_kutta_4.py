@@ -10,7 +10,5 @@ from __future__ import annotations
 from mbd.kernel.schemes.runge_kutta import explicit_scheme
 from mbd.kernel.schemes.tableau import FOURTH_ORDER
 
-__all__ = ["SCHEME"]
-
 SCHEME = explicit_scheme("runge-kutta-4", FOURTH_ORDER, 0.75, 2.828, 1)
 """Its middle lies between the nodes at 1/2 and 1."""

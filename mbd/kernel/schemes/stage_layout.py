@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from mbd.kernel.records import Settings
 
-__all__ = ["stage_place"]
-
 # where the numbers of the method lie in K.stages (see `mbd.kernel.schemes.collocation`)
 C_, A_, A2_, MU_REAL, MU_RE, MU_IM, T_REAL, S_REAL, T_RE, T_IM, S_RE, S_IM, E_, INVERSE_, N_NUMBERS = (
     0, 3, 12, 21, 22, 23, 24, 27, 30, 33, 36, 39, 42, 45, 54,

@@ -35,8 +35,6 @@ from mbd.kernel.schemes.stage_layout import (
 )
 from mbd.kernel.stepping.restart import add_shares
 
-__all__ = ["factor_stages", "keep_held", "matrices", "solve_pair", "solve_real", "tangent_of_stage"]
-
 
 def matrices(K: SingularSteps, m: int, h: float) -> None:
     """The real and the complex matrix at the block, whose r, h and ḣ stay in K.out.

@@ -9,8 +9,6 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 
-__all__ = ["FOURTH_ORDER", "Tableau", "weights_at"]
-
 
 @dataclass(frozen=True, eq=False)
 class Tableau:

@@ -8,8 +8,6 @@ from mbd.kernel.records import Kernel
 from mbd.kernel.stepping.accept_restart import project_velocity
 from mbd.kernel.stepping.restart import consistent, stepping_rows
 
-__all__ = ["leave_singularity"]
-
 
 def leave_singularity(K: Kernel, h: float) -> int:
     """Just beyond a singularity: velocities on the rows again, rates and multipliers consistent.

@@ -11,8 +11,6 @@ from __future__ import annotations
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.records import State
 
-__all__ = ["ALONE", "FIRST", "LONG_PART", "SECOND", "SHORT_PART", "is_of_pair", "is_whole", "may_pair"]
-
 LONG_PART = 0.75 + 0.38188130791298669
 """3/4 + √(7/48), part of dt, of the second: what is predicted from it is stretched little [-]."""
 SHORT_PART = 0.75 - 0.38188130791298669

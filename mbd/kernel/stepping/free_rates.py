@@ -9,8 +9,6 @@ from mbd.kernel.records import Balance
 from mbd.kernel.stepping.restart import fill_block
 from mbd.kernel.tangent_rules import is_differentiated
 
-__all__ = ["NOT_CLEAR", "free_rates", "rates_in_block"]
-
 NOT_CLEAR = -1.0
 """Of rates that lost too many digits, are not finite or cannot be found."""
 

@@ -7,8 +7,6 @@ from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
 from mbd.kernel.records import ContactRows, Model, Reals
 
-__all__ = ["evaluate_loaded", "limit_of"]
-
 
 def evaluate_loaded(K: ContactRows, lam: Reals) -> float:
     """K.acc again with other multipliers, at the state already in the block; how far they differ from those before.

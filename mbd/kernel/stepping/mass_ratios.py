@@ -15,15 +15,6 @@ from mbd.kernel.algebra.ordered import order_at, solve_kkt
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Equations, Motion
 
-__all__ = [
-    "excuses_much",
-    "find_imbalance",
-    "has_settled",
-    "is_uneven",
-    "polish_rates",
-    "polish_with_rows",
-]
-
 MAX_FORCE_RATIO = 1e6
 """Terms of forces over inertia forces and multipliers above which corrections are looked at as well [-]."""
 

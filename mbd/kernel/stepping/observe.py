@@ -7,8 +7,6 @@ from mbd.kernel.contact.cones import phase_of
 from mbd.kernel.records import Reals, Switching
 from mbd.kernel.stepping.candidate import carry
 
-__all__ = ["is_awaited", "store_passed_row", "store_row", "store_state"]
-
 
 def store_row(K: Switching) -> None:
     """One row of results: the accepted state."""

@@ -11,8 +11,6 @@ from mbd.kernel.schemes.contract import Scheme
 from mbd.kernel.stepping.restart import take_consistent
 from mbd.kernel.translation.hints import shown
 
-__all__ = ["InterpretedScheme"]
-
 
 class InterpretedScheme:
     """Hooks of the interpreted kernel: the functions of a scheme, step by step what machine code does."""

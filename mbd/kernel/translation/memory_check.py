@@ -11,8 +11,6 @@ from mbd.kernel.records import TABLE, Kernel
 from mbd.kernel.schemes import contract
 from mbd.trees.tree import Call, Field, Function
 
-__all__ = ["check_memory"]
-
 
 def check_memory(found: Sequence[Function]) -> None:
     """Refuse a scheme whose functions use an array of `MEMORY` for which its entry gives no length."""

@@ -13,8 +13,6 @@ from mbd.errors import CapabilityError
 from mbd.kernel.records import TABLE
 from mbd.kernel.translation import hints
 
-__all__ = ["each", "formula_of"]
-
 ELEMENT = "_element"
 """Name that counts the elements of a slice."""
 

@@ -23,8 +23,6 @@ from mbd.kernel.translation import hints
 from mbd.kernel.translation.shorthand import each, formula_of
 from mbd.trees import tree
 
-__all__ = ["Misread", "Source", "functions_of", "source_of", "translate"]
-
 KINDS = {"int": "int", "float": "real", "bool": "bool", "None": "none", "Integers": "ints", "Reals": "reals"}
 FIELDS = (*TABLE.kinds, *TABLE.formulas)
 OPERATORS = {

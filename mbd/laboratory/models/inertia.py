@@ -11,8 +11,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError, quoted
 from mbd.laboratory.models.report import ImportReport
 
-__all__ = ["note_repairs", "possible_inertia"]
-
 
 def possible_inertia(tensor: Matrix) -> Matrix:
     """The nearest inertia that a body can have: second moments ``½ tr I − I_k`` that are negative become 0.

@@ -32,8 +32,6 @@ from mbd.laboratory.models.report import ImportedModel, ImportReport
 from mbd.model import Model
 from mbd.results.tables import library
 
-__all__ = ["read_mjcf"]
-
 FREE, BALL, SLIDE, HINGE = 0, 1, 2, 3
 """Kinds of joints, as ``mjtJoint`` counts them."""
 EQUAL_JOINTS = 2

@@ -31,8 +31,6 @@ from mbd.laboratory.models.report import ImportedModel
 from mbd.laboratory.models.xml import Element, read_xml
 from mbd.model import Model
 
-__all__ = ["read_osim"]
-
 READ = ("Ground", "BodySet", "JointSet", "ConstraintSet", "MarkerSet")
 """Elements of a model that are read; of others the report counts what is in them."""
 

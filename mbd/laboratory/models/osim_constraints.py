@@ -28,8 +28,6 @@ from mbd.laboratory.models.osim_functions import function_of, is_left_out
 from mbd.laboratory.models.osim_joints import end_at, turned
 from mbd.laboratory.models.xml import Element
 
-__all__ = ["Coupler", "couplers_of", "hold", "loops_closed"]
-
 CLOSING = {"WeldConstraint": Weld, "PointConstraint": Spherical}
 """Joints that hold what these constraints hold; they close loops."""
 ORIGIN = (0.0, 0.0, 0.0)

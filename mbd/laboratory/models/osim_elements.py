@@ -6,8 +6,6 @@ from typing import Any
 
 from mbd.laboratory.models.xml import Element
 
-__all__ = ["flag_of", "number_of", "numbers_of", "objects_in", "plain", "text_of", "unlike"]
-
 
 def objects_in(owner: Element, tag: str) -> list[Element]:
     """The elements of a set."""

@@ -19,10 +19,6 @@ from mbd.laboratory.models.report import ImportReport
 from mbd.laboratory.models.xml import Element
 from mbd.model import Model
 
-__all__ = [
-    "Motion", "OsimCoordinate", "OsimFile", "OsimJoint", "body_named", "body_of_socket", "coordinate_named", "framed",
-]  # fmt: skip
-
 
 @dataclass
 class OsimCoordinate:

@@ -13,8 +13,6 @@ from mbd.errors import ModelError
 from mbd.forces.samples import Samples
 from mbd.laboratory.models.xml import Element
 
-__all__ = ["Curve", "Linear", "Polynomial", "Powers", "function_of", "has_corners", "is_left_out", "simm_spline"]
-
 MAX_ORDER = 12
 """Order of a polynomial of several coordinates that is read."""
 FUNCTIONS = (

@@ -24,8 +24,6 @@ from mbd.laboratory.models.osim_surfaces import surfaces_of
 from mbd.laboratory.models.xml import Element
 from mbd.tape.functions import clip
 
-__all__ = ["is_muscle", "muscles_of"]
-
 CURVES = {
     "DeGrooteFregly2016Muscle": "de groote", "Millard2012EquilibriumMuscle": "millard",
     "Millard2012AccelerationMuscle": "millard", "Thelen2003Muscle": "de groote", "Schutte1993Muscle": "de groote",

@@ -23,8 +23,6 @@ from mbd.laboratory.models.osim_file import OsimFile, framed
 from mbd.laboratory.models.osim_joints import turned
 from mbd.laboratory.models.xml import Element
 
-__all__ = ["Surfaces", "surfaces_of"]
-
 SIDES = {
     "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
     "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),

@@ -12,8 +12,6 @@ from mbd.laboratory.models.report import ImportedModel
 from mbd.laboratory.models.urdf import read_urdf
 from mbd.results.archive import file_to_read
 
-__all__ = ["read_model"]
-
 
 def read_model(
     path: str | Path, base: str = "fixed", stops: bool | None = None, losses: bool = True, repair: bool = False

@@ -9,8 +9,6 @@ from mbd.bodies.base import Body
 from mbd.dataclass import dataclass
 from mbd.joints.base import Joint
 
-__all__ = ["ImportReport", "ImportedModel"]
-
 
 @dataclass
 class ImportReport:

@@ -31,8 +31,6 @@ from mbd.model import Model
 from mbd.notes import doubt
 from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE
 
-__all__ = ["read_urdf"]
-
 SHAPES = ("visual", "collision")
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating")
 

@@ -12,8 +12,6 @@ from mbd.laboratory.models.write_osim import osim_of
 from mbd.laboratory.models.write_urdf import urdf_of
 from mbd.results.archive import named_file, write_whole
 
-__all__ = ["write_model"]
-
 WRITERS = {".urdf": urdf_of, ".osim": osim_of}
 
 

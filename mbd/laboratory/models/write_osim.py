@@ -28,8 +28,6 @@ from mbd.joints.weld import Weld
 from mbd.laboratory.models.report import ImportReport
 from mbd.laboratory.models.written_tree import WrittenJoint, inertial_of, place_of, stops_of, tree_to_write, turned_to
 
-__all__ = ["osim_of"]
-
 KINDS = {"de groote": "DeGrooteFregly2016Muscle", "millard": "Millard2012EquilibriumMuscle"}
 """Names of muscles by their curves."""
 CYLINDER_LENGTH = 1.0

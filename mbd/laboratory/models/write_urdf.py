@@ -30,8 +30,6 @@ from mbd.laboratory.models.written_tree import (
     tree_to_write,
 )
 
-__all__ = ["urdf_of"]
-
 UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Axes of the file, whose z is up, in those of the ground, whose y is."""
 X, Y, Z = np.eye(3)

@@ -20,8 +20,6 @@ from mbd.joints.weld import Weld
 from mbd.laboratory.models.report import ImportReport
 from mbd.topology.plan import uncut
 
-__all__ = ["Inertial", "Place", "WrittenJoint", "inertial_of", "place_of", "stops_of", "tree_to_write", "turned_to"]
-
 Place = tuple[Vector, Matrix]
 """Origin and axes (columns) of a frame in those of its body."""
 

@@ -11,8 +11,6 @@ from xml.parsers import expat
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 
-__all__ = ["Element", "read_xml"]
-
 DEEPEST, MOST = 200, 500_000
 """Nested elements, and elements in all, of a file that is read."""
 MAX_BYTES = 200_000_000

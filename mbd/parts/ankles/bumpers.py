@@ -12,8 +12,6 @@ from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check, constrain_stop
 from mbd.topology.description import Description
 
-__all__ = ["bumper_ankle"]
-
 
 def bumper_ankle(
     model: Description, name: str, shank: Frame, foot: Frame, *, heel: Mapping[str, Any], toe: Mapping[str, Any],

@@ -13,8 +13,6 @@ from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import added, between, check
 from mbd.topology.description import Description
 
-__all__ = ["hydraulic_ankle"]
-
 
 def hydraulic_ankle(
     model: Description, name: str, shank: Frame, foot: Frame, *, plantarflexion: Any, dorsiflexion: Any,

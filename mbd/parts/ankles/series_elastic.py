@@ -13,8 +13,6 @@ from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check, sizes
 from mbd.topology.description import Description
 
-__all__ = ["series_elastic_ankle"]
-
 
 def series_elastic_ankle(
     model: Description, name: str, shank: Frame, foot: Frame, *, torque: Any, stiffness: float, inertia: float,

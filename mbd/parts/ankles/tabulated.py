@@ -11,8 +11,6 @@ from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check
 from mbd.topology.description import Description
 
-__all__ = ["tabulated_ankle"]
-
 
 def tabulated_ankle(
     model: Description,

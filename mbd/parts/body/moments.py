@@ -12,8 +12,6 @@ from mbd.parts.arguments import check
 from mbd.tape.functions import exp
 from mbd.topology.description import Description
 
-__all__ = ["PASSIVE_MOMENTS", "PassiveEnergy", "passive_moment"]
-
 PASSIVE_MOMENTS: dict[str, tuple[float, float, float, float, float, float]] = {
     "hip": (-2.44, 5.05, 1.81, 1.51, -21.88, -0.6981),
     "knee": (-6.09, 33.94, 0.13, 11.03, -11.33, -2.4),

@@ -10,8 +10,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError, nearest
 from mbd.parts.arguments import sizes
 
-__all__ = ["TABLES", "BodySegment", "Person", "person"]
-
 LENGTHS = {"thigh": 0.245, "shank": 0.246, "foot": 0.152}
 """Lengths over the body's height (R. Drillis & R. Contini, Body Segment Parameters, New York University, 1966; Winter
 2009, fig. 4.1): hip to knee, knee to ankle, heel to toe."""

@@ -13,8 +13,6 @@ from mbd.joints.planar import Planar
 from mbd.parts.arguments import between, check
 from mbd.topology.description import Description
 
-__all__ = ["elastic_socket"]
-
 
 def elastic_socket(
     model: Description, name: str, limb: Frame, socket: Frame, *, stiffness: Numbers, damping: Numbers

@@ -10,8 +10,6 @@ from mbd.constraints.unilateral import Unilateral
 from mbd.parts.arguments import check, released
 from mbd.topology.description import Description
 
-__all__ = ["arc_foot"]
-
 
 def arc_foot(
     model: Description, name: str, center: Frame, radius: float, *, release: Any = None,

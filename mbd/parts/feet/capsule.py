@@ -12,8 +12,6 @@ from mbd.joints.losses.base import Loss
 from mbd.parts.arguments import between, check, released, sizes
 from mbd.topology.description import Description
 
-__all__ = ["capsule_foot"]
-
 
 def capsule_foot(
     model: Description, name: str, first: Frame, second: Frame, radius: float, *, release: Any = None,

@@ -10,8 +10,6 @@ from mbd.parts.arguments import between, check
 from mbd.parts.feet.point import point_foot
 from mbd.topology.description import Description
 
-__all__ = ["heel_and_toe"]
-
 
 def heel_and_toe(
     model: Description, name: str, heel: Frame, toe: Frame, *, release: Any = None,

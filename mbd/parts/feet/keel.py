@@ -15,8 +15,6 @@ from mbd.parts.arguments import between, check, sizes
 from mbd.parts.feet.heel_and_toe import heel_and_toe
 from mbd.topology.description import Description
 
-__all__ = ["CHARACTERISTIC_RADIUS", "keel_foot"]
-
 CHARACTERISTIC_RADIUS = 0.85
 """γ, share of a blade's length that turns as a rigid link (Howell & Midha 1995, for loads across the blade) [-]."""
 

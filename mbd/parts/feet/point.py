@@ -11,8 +11,6 @@ from mbd.joints.losses.base import Loss
 from mbd.parts.arguments import check, released
 from mbd.topology.description import Description
 
-__all__ = ["point_foot"]
-
 
 def point_foot(
     model: Description,

@@ -14,8 +14,6 @@ from mbd.joints.losses.base import Loss
 from mbd.parts.arguments import check, released
 from mbd.topology.description import Description
 
-__all__ = ["polygon_foot"]
-
 
 def polygon_foot(
     model: Description, name: str, corners: Iterable[Frame], *, release: Any = None, only_while: Any = None,

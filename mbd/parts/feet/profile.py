@@ -10,8 +10,6 @@ from mbd.constraints.unilateral import Unilateral
 from mbd.parts.arguments import check, released
 from mbd.topology.description import Description
 
-__all__ = ["profile_foot"]
-
 
 def profile_foot(
     model: Description, name: str, frame: Frame, sole: Any, *, release: Any = None,

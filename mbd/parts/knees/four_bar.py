@@ -18,8 +18,6 @@ from mbd.joints.weld import Weld
 from mbd.parts.arguments import Stop, between, check, constrain_stop
 from mbd.topology.description import Description
 
-__all__ = ["HEIGHT_3R60", "PIVOTS_3R60", "STANCE_3R60", "SWING_3R60", "four_bar_knee"]
-
 PIVOTS_3R60: dict[str, tuple[float, float]] = {
     "shank": (0.0, 0.0),
     "front lower": (0.0273480, 0.0841685),

@@ -10,8 +10,6 @@ from mbd.parts.arguments import Stop, added, check
 from mbd.parts.knees.hinge import stop_knee
 from mbd.topology.description import Description
 
-__all__ = ["friction_brake_knee"]
-
 
 def friction_brake_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, mu: float, radius: float, stop: Stop = None,

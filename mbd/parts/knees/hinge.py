@@ -9,8 +9,6 @@ from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import Stop, between, check, constrain_stop
 from mbd.topology.description import Description
 
-__all__ = ["stop_knee"]
-
 
 def stop_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, stop: Stop = None, loss: Loss | None = None,

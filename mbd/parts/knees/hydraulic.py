@@ -14,8 +14,6 @@ from mbd.parts.arguments import Stop, added, check, sizes
 from mbd.parts.knees.hinge import stop_knee
 from mbd.topology.description import Description
 
-__all__ = ["hydraulic_knee", "orifice"]
-
 
 def orifice(*, piston: float, opening: float, arm: float, density: float = 870.0, discharge: float = 0.61) -> float:
     """``c = ρ A³ r³/(2 C_d² a²)`` of the torque ``c |ω| ω`` of a cylinder on an arm that presses oil through an

@@ -12,8 +12,6 @@ from mbd.joints.revolute import Revolute
 from mbd.parts.arguments import between, check, released
 from mbd.topology.description import Description
 
-__all__ = ["locking_knee"]
-
 
 def locking_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, release: Any = None, restitution: float = 0.0,

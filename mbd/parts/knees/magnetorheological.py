@@ -16,8 +16,6 @@ from mbd.parts.arguments import Stop, check
 from mbd.parts.knees.hinge import stop_knee
 from mbd.topology.description import Description
 
-__all__ = ["PHASES", "magnetorheological_knee", "phase"]
-
 PHASES = ("stance flexion", "stance extension", "swing flexion", "swing extension")
 """What a phase may be: whether the foot bears load, and whether the knee bends or stretches."""
 

@@ -15,8 +15,6 @@ from mbd.parts.knees.hinge import stop_knee
 from mbd.tape.functions import exp, log
 from mbd.topology.description import Description
 
-__all__ = ["gas_energy", "pneumatic_knee"]
-
 
 def gas_energy(angle: Any, pressure: Any, volume: Any, swept: Any, exponent: Any) -> Any:
     """``U = p₀ [V₀/(n − 1) ((V₀/V)^(n−1) − 1) + V − V₀]``, V = V₀ + s q: of a gas pV^n = const in an atmosphere of p₀

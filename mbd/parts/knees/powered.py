@@ -15,8 +15,6 @@ from mbd.parts.arguments import Stop, check, sizes
 from mbd.parts.knees.hinge import stop_knee
 from mbd.topology.description import Description
 
-__all__ = ["powered_knee"]
-
 
 def powered_knee(
     model: Description, name: str, thigh: Frame, shank: Frame, *, voltage: Any, resistance: float, constant: float,

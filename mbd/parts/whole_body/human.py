@@ -23,8 +23,6 @@ from mbd.parts.whole_body.poses import Position, center_of_mass, hips_over_groun
 from mbd.parts.whole_body.segments import SIDES, Segment, segments_of
 from mbd.parts.whole_body.table import SEXES
 
-__all__ = ["Human", "human"]
-
 SHORTEST, TALLEST = 0.4, 2.8
 """Heights outside of which a person is in doubt [m]."""
 LIGHTEST, HEAVIEST = 1.0, 700.0

@@ -16,8 +16,6 @@ from mbd.joints.universal import Universal
 from mbd.joints.weld import Weld
 from mbd.parts.whole_body.segments import SIDES
 
-__all__ = ["Articulation", "articulations"]
-
 Z = (0.0, 0.0, 1.0)
 
 

@@ -11,8 +11,6 @@ from mbd.joints.spherical import Spherical
 from mbd.joints.universal import Universal
 from mbd.parts.body.moments import PASSIVE_MOMENTS, PassiveEnergy
 
-__all__ = ["await_passive_moments", "passive_moments"]
-
 FLEXION: dict[type[Joint], str] = {Spherical: "euler.zxy.1", Revolute: "angle", Universal: "first"}
 """The angle about z, flexion of the sequence zxy where a joint has three (Wu et al. 2002)."""
 

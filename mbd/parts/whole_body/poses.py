@@ -12,8 +12,6 @@ from mbd.errors import ModelError
 from mbd.joints.base import Joint
 from mbd.parts.whole_body.segments import SIDES
 
-__all__ = ["Position", "center_of_mass", "hips_over_ground", "origins", "place_of", "standing"]
-
 Position = float | tuple[float, ...]
 """A coordinate, or a quaternion as a whole."""
 

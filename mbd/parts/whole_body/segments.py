@@ -11,8 +11,6 @@ from mbd.dataclass import dataclass
 from mbd.parts.arguments import sizes
 from mbd.parts.whole_body.table import DE_LEVA, HEIGHTS, SHOULDERS, Row
 
-__all__ = ["SIDES", "Segment", "segments_of"]
-
 SIDES = {"left": -1.0, "right": 1.0}
 """Sign of z: x is forward, y up, z to the right."""
 ANKLE = 0.039

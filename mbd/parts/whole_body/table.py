@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["DE_LEVA", "HEIGHTS", "SEXES", "SHOULDERS", "Row"]
-
 SEXES = ("male", "female")
 
 HEIGHTS = {"male": 1.741, "female": 1.735}

@@ -20,8 +20,6 @@ from mbd.sensitivity.tangent.printer import LANES, PIECES, ROOM, VECTOR, WIDTH
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = ["Answer", "Place", "answer_of"]
-
 SYMBOL = "mbd.answer"
 WORDS = {"add": "fadd contract", "sub": "fsub contract", "mul": "fmul contract", "neg": "fneg contract"}
 PLAIN = {"add": np.add, "sub": np.subtract, "mul": np.multiply, "neg": np.negative}

@@ -17,8 +17,6 @@ from mbd.sensitivity.programs import Programs, State
 from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.sensitivity.tangent.follow_impacts import EDGE, NO_REBOUND, TIE
 
-__all__ = ["refuse_edge", "refuse_turning_points"]
-
 AtRow = Callable[[int], tuple[Motion, Rates]]
 MIN_IMPULSE_RATIO = 1e-3
 """Impulse of a contact that comes to rest over that of the bounce before, at least: e/(1 + e) in free flight [-]."""

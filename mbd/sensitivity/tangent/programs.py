@@ -22,8 +22,6 @@ from mbd.simulation.run.shelves import CACHE_LINE_BYTES, NUMBER_BYTES
 from mbd.tape.derivatives import jvps, live, substitute
 from mbd.tape.node import Node
 
-__all__ = ["Derivative", "derivatives_of_modes", "derivatives_of_programs", "lanes", "no_values"]
-
 BALANCE, NO_VALUES = "tangent_balance", "tangent_without_values"
 WITHOUT = ("switch",)
 """Inputs that never have derivatives: whether penalties act."""

@@ -9,13 +9,6 @@ from __future__ import annotations
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.records import Integers, Kernel, Reals, Sizes
 
-__all__ = [
-    "MAX_CONTRACTION", "MAX_CORRECTIONS", "are_corrected", "at_root", "candidate_place", "derivative_of",
-    "derivative_program", "edge_place", "every_row_place", "is_differentiated", "largest_derivative", "metric_place",
-    "metric_program", "moved", "n_inputs", "seed_rate", "seeded", "solution_place", "solve_plain", "solved_program",
-    "step_place", "takes_part", "turned_program", "was_near_singular", "without_tangent",
-]  # fmt: skip
-
 MAX_CONTRACTION = 0.9
 """Part of the last correction of derivatives above which the next one is round-off [-]."""
 SAFETY = 0.1

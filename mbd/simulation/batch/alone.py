@@ -23,8 +23,6 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["NAMES", "Alone", "made_alone", "needs_judgement"]
-
 NAMES = {
     getattr(codes, name): name.lower().replace("_", " ")
     for name in (

@@ -23,8 +23,6 @@ from mbd.simulation.batch.workers import Interrupted, processors
 from mbd.simulation.run.begin import check_rank
 from mbd.simulation.simulate import REST_SPEED
 
-__all__ = ["batch", "worker_count"]
-
 
 def batch(
     model: Any,

@@ -12,8 +12,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.errors import ModelError
 
-__all__ = ["Changes", "telling_values"]
-
 
 def telling_values(columns: Mapping[str, Vector], own: Mapping[str, float]) -> dict[str, float]:
     """A value of each column by which a mechanism is made: one that differs from the model's, where there is one.

@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
     from mbd.simulation.batch.runner import Runner
 
-__all__ = ["Batch"]
-
-
 NOT_RUN = "not run"
 """The outcome of runs that an interrupted batch never came to."""
 

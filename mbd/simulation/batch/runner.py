@@ -24,8 +24,6 @@ from mbd.simulation.run.late_resets import reset_ends
 from mbd.simulation.simulate import laid_out
 from mbd.state import State
 
-__all__ = ["Runner"]
-
 
 class Runner:
     """Makes the runs of one model with one scheme: laid out once, used for many batches of starts.

@@ -21,8 +21,6 @@ from mbd.simulation.many_runs import start_line
 from mbd.simulation.marching import Run
 from mbd.state import State
 
-__all__ = ["Columns", "Starts", "columns_of", "given_starts", "places_of", "raise_for_turning", "starts_of"]
-
 Columns = Mapping[str, Vector]
 """Numbers of each run by name (N,)."""
 

@@ -15,8 +15,6 @@ from mbd.arrays import Matrix
 from mbd.simulation.many_runs import Ends, ManyRuns
 from mbd.simulation.marching import Run
 
-__all__ = ["Interrupted", "Workers", "processors"]
-
 
 def processors() -> int:
     """How many processors this process may use."""

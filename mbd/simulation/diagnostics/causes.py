@@ -27,8 +27,6 @@ from mbd.simulation.run.plain import PlainScheme
 from mbd.simulation.run.stepper import Stepper
 from mbd.tape.evaluate import evaluate
 
-__all__ = ["CAUSES", "Cause", "Words", "cause_of", "last_events"]
-
 MAX_RATE_CHANGE = 3.0
 """Change of a rate in a step over the largest so far, above which dt is reported not to resolve the motion [-]."""
 MIN_RATE = 1e-3

@@ -25,8 +25,6 @@ from mbd.tape.node import Node
 if TYPE_CHECKING:
     from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["SINGULAR_RTOL", "NEARLY_SINGULAR_RTOL", "circular_laws", "multipliers_in"]
-
 SINGULAR_RTOL = 0.01
 """Part of the determinant without the law, or the friction, below which it counts as zero [-]."""
 NEARLY_SINGULAR_RTOL = 0.6

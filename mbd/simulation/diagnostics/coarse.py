@@ -8,8 +8,6 @@ from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import resolving_dt
 from mbd.simulation.run.data import RunData
 
-__all__ = ["coarse_steps", "percent"]
-
 ADVISED_STEP_RATIO = 0.1
 """Step that is advised, over the present one, where forces do not show one [-]."""
 

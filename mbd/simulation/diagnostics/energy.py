@@ -40,8 +40,6 @@ from mbd.equal import EQUAL_RTOL
 from mbd.simulation.run.data import EnergyFindings, RunData
 from mbd.tape.derivatives import live
 
-__all__ = ["EnergyWatch", "Judgement", "judgement", "kinds_of"]
-
 SPREAD, EARLY = 30, tuple(2**k for k in range(10))
 """Rows of a look: so many from the last look to now, and the first rows of a run at these numbers."""
 REPORTED_SHARE = 0.1

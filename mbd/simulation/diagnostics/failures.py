@@ -13,8 +13,6 @@ from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stepper import Stepper
 from mbd.state import State
 
-__all__ = ["attempt", "crowded", "explanation"]
-
 MAX_EVENTS_PER_STEP = 5000
 """Events within one dt above which a run stops: they follow each other ever faster, or are located too roughly [-]."""
 

@@ -13,8 +13,6 @@ from mbd.integrators.base import Point
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
 
-__all__ = ["Matrices", "fastest", "free_motions", "matrices", "resolving_dt", "sane_rows", "stability"]
-
 MAX_UNKNOWNS = 40
 """Coordinates and states above which the tangents take too long to derive and compile for a sentence [-]."""
 MAX_SPEED_GROWTH = 1e6

@@ -16,8 +16,6 @@ from mbd.results.record import EventRecord
 if TYPE_CHECKING:
     from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["lost_grip"]
-
 
 def lost_grip(stepper: Stepper, events: Sequence[EventRecord]) -> str:
     """A sentence on the wheel among the last switches that needs grip without a normal force, '' if there is none."""

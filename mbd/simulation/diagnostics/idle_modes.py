@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Guard, Machine
     from mbd.simulation.run.data import RunData
 
-__all__ = ["idle_modes"]
-
 MAX_ROWS = 400
 """Rows at which what a transition waits for is evaluated, at most [-]."""
 

@@ -11,8 +11,6 @@ from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import free_motions, matrices
 from mbd.simulation.run.data import RunData
 
-__all__ = ["dt_of_impacts"]
-
 
 def dt_of_impacts(run: RunData, record: Record, number: int, rows: Iterable[int]) -> float:
     """A fifth of the time until the deepest point of the impacts of contact `number` that begin at some rows [s].

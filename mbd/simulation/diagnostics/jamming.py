@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from mbd.arrays import Vector
     from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["may_jam"]
-
 DIRECTIONS = 180
 """Directions of the force in a pin that are tried [-]."""
 

@@ -28,8 +28,6 @@ from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
 from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE, doubts
 
-__all__ = ["Note", "notes_of"]
-
 FIRST_ROWS = 16
 """Rows after the start whose multipliers are compared with the balance of forces."""
 MAX_SHARE = 0.02

@@ -11,8 +11,6 @@ from mbd.equal import EQUAL_RTOL
 if TYPE_CHECKING:
     from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["consistent_forces"]
-
 NONE, SEVERAL = "no consistent contact force", "more than one consistent contact force"
 
 

@@ -12,8 +12,6 @@ from mbd.equations.equations import Equations, Row
 from mbd.kernel.records import Kernel
 from mbd.simulation.diagnostics.circular import multipliers_in
 
-__all__ = ["clash", "readers_of", "redundancy"]
-
 MAX_SHOWN = 8
 """Redundant rows that a note tells one by one."""
 

@@ -9,8 +9,6 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["residual_names", "residuals_of"]
-
 
 def residuals_of(stepper: Stepper, block: Vector) -> dict[str, float]:
     """The balance by coordinate, and the rows that are closed with their rates, at the inputs in a block."""

@@ -8,8 +8,6 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["Remainder", "remainder"]
-
 
 @dataclass(frozen=True)
 class Remainder:

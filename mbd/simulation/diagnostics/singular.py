@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 from mbd.simulation.run.data import RunData
 
-__all__ = ["at_singular_configuration", "singular_start"]
-
 SINGULAR_RTOL = 1e-3
 """Smallest singular value of the rows there, over that a step away, below which they depend on each other [-]."""
 EVENT_WINDOW = 0.1

@@ -8,8 +8,6 @@ from mbd.arrays import Vector
 from mbd.results.record import Record
 from mbd.simulation.run.data import RunData
 
-__all__ = ["bounded_by_stability"]
-
 STABILITY_SHARE = 0.6
 """Step over the largest stable one from which stability bounds it: the control of steps stays below that [-]."""
 POWER_ITERATIONS = 24

@@ -17,8 +17,6 @@ from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import BLOCK
 from mbd.tape.derivatives import live
 
-__all__ = ["blocks", "first_reversed", "overturned", "unresolved_turns"]
-
 HALF_TURN = np.pi
 """Turn in a step above which forces that follow the angle are read at too few places of a turn [rad]."""
 MAX_LENGTH_RATIO = 1.7321

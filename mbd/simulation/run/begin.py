@@ -20,8 +20,6 @@ from mbd.simulation.run.memory import memory_of_end
 from mbd.simulation.run.parameters import residuals_now, violations_now
 from mbd.state import State
 
-__all__ = ["begin", "check_rank", "guard_values", "notify", "require_consistent", "set_side"]
-
 
 def notify(run: RunData) -> None:
     """Of which contacts and events Python must hear."""

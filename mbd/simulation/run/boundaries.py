@@ -13,8 +13,6 @@ from mbd.equations.switching_times import Jump
 from mbd.errors import ModelError
 from mbd.kernel import codes
 
-__all__ = ["RESTARTS", "WINDOW_STEPS", "Boundaries", "without_sharing"]
-
 INSTANT_RTOL = 8.0 * codes.EPS
 """Two instants are one where they differ by less, relative: round-off of a sum of steps [-]."""
 WINDOW_STEPS = 64.0

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from mbd.kernel.records import TABLE, Kernel
 
-__all__ = ["ARRAYS", "BOUND", "PLACES", "CallTable"]
-
 PLACES = {name: place for place, name in enumerate(TABLE.addresses)}
 ARRAYS = (*TABLE.real_arrays, *TABLE.integer_arrays)
 """Names of arrays, which stand side by side, as integers and reals do."""

@@ -27,8 +27,6 @@ from mbd.simulation.run.idle import stepper_of
 from mbd.simulation.run.stepper import Stepper, is_compiled
 from mbd.state import State
 
-__all__ = ["EnergyFindings", "RoomFindings", "RunData", "Savepoint"]
-
 STEPS_AT_ONCE = {True: 20000, False: 200}
 """Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
 USUAL_SIZE = 10

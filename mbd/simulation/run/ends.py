@@ -15,8 +15,6 @@ from mbd.simulation.run.savepoints import called, restore, save
 from mbd.simulation.run.strategy import may_go_on_unlocated
 from mbd.state import State
 
-__all__ = ["advance", "call", "close"]
-
 
 def advance(run: RunData, target: float, due: bool) -> int:
     """Call the kernel; a step that would pass the end of the run ends there, unless a longer run's would too.

@@ -8,8 +8,6 @@ from mbd.arrays import Matrix, Vector, read_only
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.results.record import EventRecord
 
-__all__ = ["EventLog", "Impulses"]
-
 KINDS = ("closed", "opened", "event", "stuck", "slipped", "pushed")
 """Kinds of events by their numbers in the log."""
 STUCK = KINDS.index("stuck")

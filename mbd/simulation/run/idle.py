@@ -13,8 +13,6 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["keep_idle", "stepper_of"]
-
 
 def stepper_of(
     kind: type[Stepper],

@@ -20,8 +20,6 @@ from mbd.constraints.expressions import function_of_expression, is_expression
 from mbd.equations.equations import Guard
 from mbd.simulation.run.data import RunData
 
-__all__ = ["may_reset_late", "reset_ends"]
-
 
 def may_reset_late(run: RunData, guard: Guard) -> bool:
     """Whether `reset_ends` can do what a run does after this event."""

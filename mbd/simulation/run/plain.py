@@ -25,8 +25,6 @@ from mbd.simulation.run.user_calls import call_user
 from mbd.state import Mode, State
 from mbd.tape.derivatives import live
 
-__all__ = ["MechanismSystem", "PlainScheme", "loads_act", "row_units", "shares", "unit_blocks"]
-
 
 def loads_act(equations: Equations) -> bool:
     """Whether forces follow multipliers: smooth friction of contacts by rows, and laws that read them."""

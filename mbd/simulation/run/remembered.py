@@ -19,8 +19,6 @@ from mbd.kernel.records import TABLE, Kernel
 from mbd.simulation.run.data import RunData
 from mbd.state import Memory, Mode, are_names
 
-__all__ = ["damage", "out_of_range", "sealed"]
-
 NO_LIMIT = 1 << 53
 """Most that is counted of anything [-]."""
 ENDLESS = ("sinking", "left")

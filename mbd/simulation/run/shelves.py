@@ -20,8 +20,6 @@ from mbd.kernel.records import TABLE, Kernel
 from mbd.kernel.schemes.contract import MEMORY
 from mbd.simulation.run.call_table import ARRAYS
 
-__all__ = ["Plan", "Shelves", "plan_of"]
-
 CACHE_LINE_BYTES = 64
 """Length of a cache line [bytes]."""
 NUMBER_BYTES = 8

@@ -15,8 +15,6 @@ from mbd.results.record import EventRecord, Record
 from mbd.results.stored_states import StoredStates
 from mbd.simulation.run.data import RunData
 
-__all__ = ["columns_of", "ended_record", "inputs_of", "record_of", "whole_record"]
-
 BLOCK = 4096
 """Rows that are read together."""
 

@@ -9,8 +9,6 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.events.crowding import MIN_CONTACTS, crowd
 from mbd.simulation.run.data import RunData
 
-__all__ = ["chosen", "go_on_unlocated", "may_go_on_unlocated"]
-
 ENDLESS = (codes.CHATTER, codes.NO_LOCATION, codes.NO_IMPACT)
 """Failures of locating itself: switches without end at one instant, no root, no set of branches that obeys all laws."""
 MAX_EXCESS_IMPACTS = 1.0

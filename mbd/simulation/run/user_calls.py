@@ -7,8 +7,6 @@ from typing import Any
 
 from mbd.errors import SimulationError
 
-__all__ = ["call_user"]
-
 
 def call_user(what: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """What a user's function answers; whatever it raises ends the run, which is kept."""

@@ -15,8 +15,6 @@ from mbd.simulation.tolerance.comparison import gap
 from mbd.simulation.tolerance.search import CHECK_ERROR_RATIO, LOOSEN_SHARE, MAX_CONDITION, PILOT_ERROR_RATIO, Search
 from mbd.simulation.tolerance.trials import Trial, is_rounding, rounding
 
-__all__ = ["Outcome", "calibrated", "first_allowed"]
-
 MANY_ROWS = 500_000
 """Rows that a pilot run is predicted from which looser runs are made first [-]."""
 REFINEMENT = 10.0

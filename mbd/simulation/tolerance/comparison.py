@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from mbd.results.record import Record
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Gap", "gap"]
-
 CHECKED_MIDDLES = 32
 """Middles between rows at which it is compared, about, if what it gives there is in doubt [-]."""
 LATE, MAX_PARTS = 0.9, 8

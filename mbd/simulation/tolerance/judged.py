@@ -13,8 +13,6 @@ from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
 from mbd.tape.derivatives import live
 
-__all__ = ["judged"]
-
 MOVING = frozenset({"q", "x", "v", "z", "a", "s", "lam"})
 """Inputs that the motion changes."""
 

@@ -26,8 +26,6 @@ from mbd.results.driving import own_share
 from mbd.simulation.tolerance.comparison import Gap, gap
 from mbd.simulation.tolerance.trials import Trial, is_rounding, least_error, rounding, same_steps
 
-__all__ = ["CHECK_ERROR_RATIO", "MAX_STEP_SHARE", "PILOT_ERROR_RATIO", "MAX_CONDITION", "LOOSEN_SHARE", "Search"]
-
 PILOT_ERROR_RATIO = 10.0
 """Allowed error of the pilot run over that of the first run [-]."""
 CHECK_ERROR_RATIO = 6.0

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from mbd.simulation.run.data import RunData
     from mbd.simulation.run.room import Room
 
-__all__ = ["Trial", "is_rounding", "least_error", "rounding", "same_steps"]
-
 EPS = float(np.finfo(float).eps)
 INSTANT_TOLERANCE = 0.1
 """How far apart instants of two runs may be, over their mean step, where their steps are the same [-]."""
