@@ -12,8 +12,6 @@ from mbd.equal import HALF_PRECISION_RTOL, NOMINAL_RTOL
 
 ROW_RTOL = 1e-10
 """Size of a row, relative to the largest, below which it acts on nothing [-]."""
-ORDER_PREFERENCE = 1e-6
-"""By how much an earlier coordinate is preferred to the next among equals [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +44,8 @@ def independent(M: Matrix, B: Matrix, turning: Matrix, velocity: Any, n_z: int =
     n_v = len(M)
     inertia = np.abs(np.diag(M))
     heaviness = np.sqrt(np.maximum(inertia, NOMINAL_RTOL * np.max(inertia, initial=0.0)) + 1e-300)
-    weights = heaviness * (1.0 + ORDER_PREFERENCE * np.arange(n_v)[::-1])
+    # among equals an earlier coordinate is preferred to the next
+    weights = heaviness * (1.0 + 1e-6 * np.arange(n_v)[::-1])
     size = row_sizes(B)[:, None]
     B, turning = B / size, turning / size
     negligible = HALF_PRECISION_RTOL * float(np.max(np.abs(B / weights), initial=1e-300))

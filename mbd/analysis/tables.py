@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 MAX_NAMED = 4
 """Coordinates that are named in a line at most."""
-ZERO_EIGENVALUE_RTOL = 3e-8
-"""Eigenvalue, relative to the largest, that is reported as zero: double ones are known to √ε only [-]."""
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -31,7 +29,7 @@ def linear_table(linear: Linearization) -> str:
     if not linear.states:
         return f"{linear.model} at t = {linear.time:g} s: {size}\n  no states: rows determine the motion"
     lines = [f"{linear.model} at t = {linear.time:g} s, {kind}: {size}", f"  states: {', '.join(linear.states)}"]
-    zero = ZERO_EIGENVALUE_RTOL * float(np.max(linear.frequencies, initial=0.0))
+    zero = 3e-8 * float(np.max(linear.frequencies, initial=0.0))  # double eigenvalues are known to √ε only
     still = int(np.count_nonzero(linear.frequencies <= zero))
     lines.append(f"  {'ω [rad/s]':>11} {'f [Hz]':>11} {'damping ζ':>10}  motion")
     for mode in linear.modes:

@@ -19,11 +19,6 @@ from mbd.assembly.conditions import Condition
 from mbd.assembly.posture import Posture, close_nearby, close_positions, move
 from mbd.equal import EQUAL_RTOL, RANK_RTOL
 
-CHANGE_ATOL = 1e-10
-"""Change [m, rad] below which it has arrived."""
-UNNAMED_WEIGHT = 1e-6
-"""Weight of changes that no named value asks for, relative to those that one does [-]."""
-
 
 def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, float]) -> bool:
     """Move `work` onto the rows, nearest to the named coordinates and places; False where the rows do not close.
@@ -48,7 +43,7 @@ def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, fl
             new, new_slopes = _off(work, places, named)
             if closed and new @ new < off @ off:
                 off, slopes, damping = new, new_slopes, max(0.2 * damping, 1e-12)
-                if np.max(np.abs(change), initial=0.0) < CHANGE_ATOL:
+                if np.max(np.abs(change), initial=0.0) < 1e-10:  # it has arrived
                     break
                 continue
             work.q, work.anchors[:] = q, anchors
@@ -102,7 +97,8 @@ def _step(B: Matrix, off: Vector, slopes: Matrix, damping: float) -> Vector:
     if not free.shape[1]:
         return np.zeros(B.shape[1])
     reduced = slopes @ free
-    weight = np.sqrt(damping + UNNAMED_WEIGHT**2) * np.eye(free.shape[1])
+    # changes that no named value asks for weigh that much, relative to those that one does
+    weight = np.sqrt(damping + 1e-6**2) * np.eye(free.shape[1])
     stacked = np.vstack([reduced, weight])
     return np.asarray(free @ np.linalg.lstsq(stacked, np.append(-off, np.zeros(free.shape[1])), rcond=None)[0])
 

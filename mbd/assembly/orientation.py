@@ -12,8 +12,6 @@ from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.tape.derivatives import gradient
 
-OPPOSITE_RTOL = 1e-3
-"""(1 + cos θ)/2 below which a direction counts as opposite: within 4° of half a turn."""
 REVERSED_JOINT = (
     "{joint!r} is put together the wrong way round: its frames are {angle:.4g} rad from where it holds them"
 )
@@ -74,7 +72,7 @@ def faced(work: Posture, rows: Sequence[int], h: Vector, B: Matrix) -> tuple[Vec
         half = 0.5 * (1.0 + float(cosine))
         if not picked or not np.isfinite(slope).all() or not np.isfinite(half):
             continue
-        if half < OPPOSITE_RTOL:
+        if half < 1e-3:  # within 4° of half a turn
             opposite = True
             h[picked] = np.where(h[picked] < 0.0, -1.0, 1.0) * np.maximum(np.abs(h[picked]), np.pi)
             continue

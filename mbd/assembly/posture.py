@@ -29,8 +29,6 @@ NUDGE, NUDGES = 0.01, 3
 """Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
 MAX_STARTS, MAX_DESCENT_STEPS = 4, 400
 """Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
-NEWTON_RANGE = 1e-3
-"""Row residual [m, rad] at the end of a descent from which Newton's method may go on."""
 
 
 def position_rows(work: Posture) -> list[int]:
@@ -111,7 +109,7 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     for q in descents(work, start, free) if np.max(np.abs(misfit)) > EQUAL_RTOL else ():
         work.q = q
         missing, _ = descend(work, rows, free, weights)
-        if np.max(np.abs(missing)) < NEWTON_RANGE:
+        if np.max(np.abs(missing)) < 1e-3:  # from such residuals [m, rad] on Newton's method may go on
             again = _newton(work, rows, free, work.q.copy())
             if np.max(np.abs(again)) <= EQUAL_RTOL:
                 return again

@@ -24,10 +24,6 @@ from mbd.notes import PROCESS, doubt
 
 MAX_BYTES = 256 * 2**20
 """Bytes above which the entries that were used longest ago are removed (a model takes 10 to 200 kB)."""
-MAX_NOTE_AGE = 60.0
-"""Age of the note of its last use below which an entry keeps it [s]."""
-MAX_DRAFT_AGE = 3600.0
-"""Age below which a draft may still be written [s]."""
 
 _DIGEST = 32
 _SUFFIX, _DRAFT, _LASTING = ".object", ".draft", "kernel-"
@@ -81,7 +77,7 @@ class ObjectCache:
             data = content[_DIGEST:]
             if not data or _sealed(key, data) != content[:_DIGEST]:
                 return None
-            if time.time() - path.stat().st_mtime > MAX_NOTE_AGE:
+            if time.time() - path.stat().st_mtime > 60.0:  # a note younger than a minute is kept
                 os.utime(path)  # it was used
         except OSError:
             return None
@@ -140,7 +136,7 @@ class ObjectCache:
         now = time.time()
         for path, status in self._entries(self.directory):
             if path.name.endswith(_DRAFT):
-                if now - status.st_mtime > MAX_DRAFT_AGE:
+                if now - status.st_mtime > 3600.0:  # before an hour it may still be written
                     with contextlib.suppress(OSError):
                         path.unlink()
                 continue

@@ -30,8 +30,6 @@ HEADER_SIZE = 3
 """Numbers before the lists of an order."""
 MIN_UNKNOWNS = 21
 """Unknowns from which on an order is looked for: below, loops over dense rows take no longer [-]."""
-MIN_SAVING = 4
-"""How many times fewer operations than dense elimination it must take [-]."""
 
 
 def may_pay(filled: Filled, n: int, rows: Sequence[int]) -> bool:
@@ -64,7 +62,8 @@ def elimination_order(
     if 4 * len(places) > size * size:
         return None
     found = order(places, numbers, n, size)
-    if found is None or MIN_SAVING * found.operations > size**3 / 3.0:
+    # it must take a quarter of the operations of dense elimination
+    if found is None or 4 * found.operations > size**3 / 3.0:
         return None
     return flat_order(found, places, n, n_rows, rows)
 

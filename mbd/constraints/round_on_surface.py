@@ -36,8 +36,6 @@ NO_CONTACT_POINT = (
 
 NEWTON_STEPS = 6
 """Of Newton's method for the place of contact: from 0.4 of the radius of curvature it takes four [-]."""
-MIN_CURVATURE_MARGIN = 0.02
-"""Least share of its curvature by which a ball or a disk is rounder than the valley [-]."""
 
 
 class Heights:
@@ -127,7 +125,8 @@ def edge_on(surface: Surface, center: Triple, axle: Triple, radius: Scalar, scop
 
 def _where_found(gap: Scalar, missed: Scalar, radius: Scalar, share: Scalar) -> Scalar:
     """The gap where Newton's method has come to a place, and to a minimum; else no number."""
-    single: Scalar = where(share > MIN_CURVATURE_MARGIN, gap, math.nan)
+    # by at least that share of its curvature a ball or a disk is rounder than the valley
+    single: Scalar = where(share > 0.02, gap, math.nan)
     bound = NOMINAL_RTOL * radius
     found: Scalar = where(missed < bound * bound, single, math.nan)
     return found

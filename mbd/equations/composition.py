@@ -16,8 +16,6 @@ from mbd.equations.equations import Equations
 from mbd.tape.derivatives import live, substitute
 from mbd.tape.node import Node, Tape
 
-MIN_COMPOSED_CONTACTS = 8
-"""Contacts from which on modes are composed [-]."""
 MATRIX, RIGHT, BOTTOM, RESIDUAL, VALUE, RATE, TURNING = range(7)
 """Blocks of the outputs of `programs.newton`: S, ∂r/∂λ, B̃, r, h, ḣ, ∂ḣ/∂x."""
 
@@ -31,7 +29,7 @@ def composes(equations: Equations) -> bool:
     Laws that read forces of contacts join contacts, so that there are none.
     """
     count, n = len(equations.contacts), equations.n_v + equations.n_z
-    if count < MIN_COMPOSED_CONTACTS or n <= programs.MAX_UNKNOWNS or equations.held_forces:
+    if count < 8 or n <= programs.MAX_UNKNOWNS or equations.held_forces:  # few contacts have few modes
         return False
     shared = 0  # entries of S that contacts may fill
     for contact in equations.contacts:

@@ -29,8 +29,6 @@ from mbd.topology.held_forces import OF_GAPS, REACTIONS, names_of_held_forces
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-FIRST_PLACEHOLDER = 1 << 30
-"""Number of the first placeholder, far above those of rows."""
 ADVICE = (
     "let the law read a sample of it (mbd.SampledLaw), or a first-order state that follows it (rates of an "
     "mbd.constraints.Law or a Loss)"
@@ -84,7 +82,7 @@ class HeldForces:
         if word is not None and (what in OF_GAPS or word.kind == "penalty"):
             return self._of_law(word, what)
         if self._first is None:
-            return self._scope.tape.input("lam", FIRST_PLACEHOLDER + len(self.asked))
+            return self._scope.tape.input("lam", (1 << 30) + len(self.asked))  # far above the numbers of rows
         if not self._known.offers(name):
             raise UnknownNameError(nearest(name, self._known.names(), "force that holds the mechanism", "There are"))
         return self._known(name)

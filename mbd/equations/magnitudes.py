@@ -12,8 +12,6 @@ from mbd.tape.node import Node, Scalar, Tape
 MAX_SUM_RATIO = 16.0
 """How far the sum of the terms of a force may lie above the root of their squares, and in iterations that above the
 largest of them: as far as those of 256 equal ones do."""
-ITERATION_RATIO = 2.0**36
-"""The sum of terms over the largest of them beyond which they are those of an iteration [-]."""
 MIN_SINE = 0.1
 """Share of its amplitude that a sine has at least: round-off of its argument when it vanishes."""
 
@@ -58,7 +56,8 @@ def magnitudes(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float] |
     sums, squares, largest = (each(tape, outputs, bounds) for each in (_sums, _squares, _largest))
     found = zip(sums, squares, largest, strict=True)
     bounded = [(minimum(s, MAX_SUM_RATIO * sqrt(q)), m) for s, q, m in found]
-    return [where(s > ITERATION_RATIO * m, MAX_SUM_RATIO * MAX_SUM_RATIO * m, s) for s, m in bounded]
+    # beyond that the terms are those of an iteration
+    return [where(s > 2.0**36 * m, MAX_SUM_RATIO * MAX_SUM_RATIO * m, s) for s, m in bounded]
 
 
 def _sums(tape: Tape, outputs: Sequence[Node], known: Mapping[int, float]) -> list[Node]:

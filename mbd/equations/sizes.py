@@ -19,8 +19,6 @@ BYTES, SECONDS = 800.0, 25e-6
 """Memory and time of an operation as it is derived and compiled; both measured, on chains of 30 to 1000 links."""
 BYTES_OF_TANGENT = 550.0
 """Memory for each of these operations beside that as the tangent of implicit steps is derived and compiled."""
-BYTES_OF_PAIR = 80.0
-"""Memory of the two entries of a pair in the arrays that a run has for matrices."""
 MIN_CHECKED_OPERATIONS = 1e6
 """Operations below which the free memory is not asked for [-]."""
 MIN_LOOP_ENTRIES = 2000
@@ -58,7 +56,8 @@ def require_room(plan: Plan) -> None:
     expected, pairs = operations(plan), pairs_on_paths(plan)
     if expected < MIN_CHECKED_OPERATIONS and OF_PAIR[plan.planar] * pairs < MIN_CHECKED_OPERATIONS:
         return
-    needed, free = BYTES * expected + BYTES_OF_PAIR * pairs, available()
+    # of the two entries of a pair in the arrays that a run has for matrices
+    needed, free = BYTES * expected + 80.0 * pairs, available()
     if needed <= free:
         return
     time = f"{SECONDS * expected / 60.0:.2g} minutes"

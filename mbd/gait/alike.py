@@ -39,8 +39,6 @@ The wide one reaches stops and branches of laws that small motions do not.
 WIDEST, GROWTH = 1e12, 30.0
 """Change of a parameter, over its value or 1, up to which an effect is looked for, and the factor of the next [-]."""
 
-MAX_KEPT = 8
-"""Values of the parameters for which a mirror image found once is kept."""
 EVENTS = slice(4, 7)
 """Those of events among the numbers that are watched."""
 
@@ -63,7 +61,7 @@ def require_alike(
     found = known.get(key)
     if found is None:
         found = _alike(mechanism, mirror, parameters, values, model)
-        if len(known) >= MAX_KEPT:
+        if len(known) >= 8:  # so many values of the parameters keep their mirror image
             known.clear()
         known[key] = found
     return found

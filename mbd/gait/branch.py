@@ -36,8 +36,6 @@ MIN_DISTANCE_RATIO = 1e-3
 """Part of the first distance from which a test function that jumps is no reason for a shorter one [-]."""
 MAX_TURN = 0.3
 """Largest angle between the tangents of two points [rad]."""
-EFFECT_RTOL = 1e-13
-"""Derivative of the map by a parameter over its range below which it changes nothing [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +274,7 @@ def _begun(
         return given, first
     zero = np.zeros(gait.chart.size)
     by = map_derivative(gait.map, gait.chart, zero, given.with_value(value), [parameter], levels=2, state=False)
-    if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= EFFECT_RTOL:
+    if not by.missing and np.nanmax(np.abs(width * by.matrix), initial=0.0) <= 1e-13:  # it changes nothing
         raise ModelError(f"parameter: {parameter!r} changes nothing of this gait")
     return given, first
 

@@ -27,8 +27,6 @@ from mbd.notebook import table
 from mbd.progress import share_bar
 from mbd.state import State
 
-MAX_PROJECTION = 1.0
-"""Distance [m, rad] over which a start is moved onto the section."""
 MAX_TRIES = 1_000_000
 """Tries of one search at most."""
 
@@ -139,7 +137,8 @@ class _Hunt:
         given, dt = self.given, self.dt
         states: tuple[State, ...] = ()
         if given is not None:
-            near, dt = on_section(given.section, start, self.map.vector(all_values), MAX_PROJECTION), given.map.dt
+            # so far [m, rad] a start is moved
+            near, dt = on_section(given.section, start, self.map.vector(all_values), 1.0), given.map.dt
             states = () if near is None else (near,)
         if not states:
             begun = first_return(self.map, start, all_values)

@@ -30,10 +30,6 @@ from mbd.state import State
 
 FIRST_STEP = 1e-2
 """Step of the first return where none is given [s]; later ones follow from its length."""
-DRIFT_RTOL = 1e-3
-"""Relative change of the energy from the start to a gait of a family above which it is not the one meant [-]."""
-MAX_PASSING_RETURNS = 3
-"""Returns after which states of modes repeat that begin in one that no gait comes back to [-]."""
 
 
 def limit_cycle(
@@ -175,7 +171,7 @@ def _found(map_: ReturnMap, start: State, dt: float | None, tol: float, member: 
         return _none(map_, begun)
     section, states = begun
     found = later = first_found(Search(map_, section, tol, member), states, map_.values, dt)
-    for _ in range(MAX_PASSING_RETURNS):
+    for _ in range(3):  # then states of modes repeat that begin in one that no gait comes back to
         if later.outcome.kind != "other states":
             break
         again = first_return(map_, states[-1], map_.values)
@@ -208,7 +204,7 @@ def _of_family(gait: LimitCycle, start: State) -> LimitCycle:
     )
     if not gait.success:
         return replace(gait, outcome=replace(gait.outcome, text=f"{gait.outcome.text}; {family}"))
-    if abs(found - begun) > DRIFT_RTOL * abs(begun):
+    if abs(found - begun) > 1e-3 * abs(begun):  # it is not the one meant
         doubt(f"{gait.name}: {family}; that which was found has {found:.6g} J")
     return gait
 

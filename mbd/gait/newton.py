@@ -28,12 +28,8 @@ WALKS, AGAIN = 6, 3
 """Plain applications of the map where no part of a Newton step helps, and how often that is done [-]."""
 MAX_CONTRACTION = 0.2
 """Factor by which a step with a derivative of before must shrink the residual, else it is made again [-]."""
-FINAL_RESIDUAL_RATIO = 0.01
-"""Residual over `tol` above which one more step is made at the end [-]."""
 SINGULAR_RTOL = 1e-3
 """Singular value of 1 − P relative to its largest below which gaits near may form a family [-]."""
-REST_SPEED_OVER_TOL = 1e3
-"""Speed over `tol` below which what repeats itself is rest [-]."""
 
 
 @dataclass
@@ -144,7 +140,7 @@ def _energies(map_: ReturnMap, point: FixedPoint, start: State, values: Values, 
 
 def _polish(map_: ReturnMap, point: FixedPoint, values: Values, tol: float) -> None:
     """One more step where the derivative is known and the residual not much below `tol`."""
-    if point.slope is None or point.found is None or point.residual <= FINAL_RESIDUAL_RATIO * tol:
+    if point.slope is None or point.found is None or point.residual <= 0.01 * tol:  # above it one more step is made
         return
     found = _damped(map_, point, point.gap, values, MAX_CONTRACTION, 1.0)
     if isinstance(found, Measured):
@@ -218,7 +214,7 @@ def _rest(map_: ReturnMap, point: FixedPoint, tol: float) -> Outcome | None:
     """
     if map_.mechanism.equations.machines or point.chart.section.speeds:
         return None
-    if float(np.max(np.abs(point.state.v), initial=0.0)) > REST_SPEED_OVER_TOL * tol:
+    if float(np.max(np.abs(point.state.v), initial=0.0)) > 1e3 * tol:  # what is slower and repeats itself is rest
         return None
     return Outcome("rests", f"comes to rest at {map_.section!r}: nothing moves where it repeats itself")
 

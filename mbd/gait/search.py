@@ -34,8 +34,6 @@ FIRST_STEPS, HALVINGS = 11.8, 9
 blur its instant; and how often they are halved until their error is below `tol`."""
 SECTION_DISTANCE = 1e-2
 """Distance [m, rad] within which the rows of the section hold a start that is taken as one on it."""
-MAX_STEP_ERROR_RATIO = 0.1
-"""Share of `tol` that the change with half the step may take [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +119,7 @@ def with_step(search: Search, start: State, values: Values, dt: float | None) ->
         now = np.append(chart.of(arrival.state), arrival.period) if arrival.outcome.good else None
         if now is not None and before is not None:
             error = float(np.max(np.abs(now - before)))
-            if error <= MAX_STEP_ERROR_RATIO * search.tol:
+            if error <= 0.1 * search.tol:  # half the step changes little
                 return replace(search, map=coarser), error
         before, step = now, step / 2.0
     return replace(search, map=map_), error

@@ -21,17 +21,8 @@ from mbd.equal import BRACKET_RTOL
 from mbd.errors import GaitError, MbdError
 from mbd.gait.continuation import BranchPoint, Continuation, Corrected
 
-MAX_EVALUATIONS = 40
-"""Evaluations of a test function or a margin between two points at most."""
-
 CLOSE, SECANTS = 1e-3, 8
 """Distance along the tangent from which on derivatives are found with least errors [-], and how often."""
-RESIDUAL_RATIO = 1e-3
-"""Residual of gaits at special points over that of others, where it is reached [-]."""
-ZERO_RTOL = 0.01
-"""Value of a test function at its zero, over the smaller one at the ends of the bracket, at most [-]."""
-IMAGINARY_ATOL = 1e-7
-"""Imaginary part from which on a pair of multipliers is complex [-]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +89,8 @@ def special_points(
             continue  # a direction was forgotten on the way, whose multiplier of 0 is a factor −1 of each pair
         if np.isfinite(ends).all() and ends[0] * ends[1] < 0.0:
             located = _located(given, one, other, ds, test)
-            if located is None or abs(test(located[0])) > ZERO_RTOL * min(map(abs, ends)):
+            # at a zero the test function is far below its values at both ends
+            if located is None or abs(test(located[0])) > 0.01 * min(map(abs, ends)):
                 complete = False
             elif _is_one(kind, located[0]):
                 found.append(SpecialPoint(kind, located[0].value, *located))
@@ -111,7 +103,7 @@ def _is_one(kind: str, point: BranchPoint) -> bool:
         return True
     values = point.multipliers.values
     at = int(np.argmin(np.abs(np.abs(values) - 1.0)))
-    return bool(abs(values[at].imag) > IMAGINARY_ATOL)
+    return bool(abs(values[at].imag) > 1e-7)  # the pair is complex
 
 
 def _located(
@@ -152,7 +144,7 @@ def zero_between(
             values[place] = function(place)
         return values[place]
 
-    place = float(brentq(value, 0.0, ds, xtol=xtol, maxiter=MAX_EVALUATIONS, disp=False))
+    place = float(brentq(value, 0.0, ds, xtol=xtol, maxiter=40, disp=False))
     (a, fa), (b, fb) = list(values.items())[-2:]
     return place, (fb - fa) / (b - a)
 
@@ -198,7 +190,7 @@ def _at(given: Continuation, one: BranchPoint, place: float, levels: int) -> tup
     best: Corrected | None = None
     guess: Vector | None = None
     try:
-        for tol in (given.tol, RESIDUAL_RATIO * given.tol):
+        for tol in (given.tol, 1e-3 * given.tol):  # the smaller one where it is reached
             corrected = replace(given, tol=tol).corrected(one, one.tangent, place, guess)
             if not isinstance(corrected, Corrected):
                 break

@@ -30,8 +30,6 @@ NEAR = (0.0, 2.0)
 """Bounds of the multiplier that is 1 at the doubling, within which a gait of two periods is taken as near to it [-]."""
 CORRECTIONS, FINE = 12, 1e-10
 """Newton corrections of a gait of two periods, and the residual at which they end [m, rad]."""
-MIN_SEPARATION = 0.2
-"""Least distance of two steps of the doubled gait from each other, over twice the amplitude [-]."""
 
 
 def doubled(given: Continuation, special: Any, base: Any) -> LimitCycle:
@@ -132,4 +130,4 @@ def _slope(
 def _is_doubled(given: Continuation, found: LimitCycle, amplitude: float) -> bool:
     """Whether the two halves of a gait of two periods differ."""
     once = measured(given.map, found.chart, np.zeros(found.chart.size), found.parameters)
-    return isinstance(once, Measured) and float(np.linalg.norm(once.c)) > MIN_SEPARATION * 2.0 * amplitude
+    return isinstance(once, Measured) and float(np.linalg.norm(once.c)) > 0.4 * amplitude

@@ -21,8 +21,6 @@ SEQUENCES = tuple("".join(s) for s in every("xyz", repeat=3) if s[0] != s[1] != 
 """The twelve sequences."""
 ANGLE_SUFFIXES = "123"
 """Endings of the names of three angles, in their order: 'hip.euler.zxy.1'."""
-SQUARED_COSINE_ATOL = 1e-14
-"""Square of the cosine (or sine) of the second angle at which the other two are taken for one [-]."""
 
 
 def sequence_of(value: Any) -> str | None:
@@ -53,7 +51,7 @@ def euler_angles(R: Rotation, sequence: str) -> list[Any]:
     else:  # R_ik = e sin b, R_jk = −e sin a cos b, R_kk = cos a cos b, R_ij = −e cos b sin c, R_ii = cos b cos c
         square = R[i][i] * R[i][i] + R[i][j] * R[i][j]
         first, third = (-e * R[j][k], R[k][k]), (-e * R[i][j], R[i][i])
-    regular = square > SQUARED_COSINE_ATOL
+    regular = square > 1e-14  # below, the other two angles are taken for one
     size = where(regular, sqrt(where(regular, square, 1.0)), 0.0)
     second = atan2(size, R[i][i]) if two else atan2(e * R[i][k], size)
     alone = atan2(e * R[k][j], R[j][j])  # of R_i(a) R_j(b)

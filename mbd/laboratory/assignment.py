@@ -15,12 +15,8 @@ from mbd.laboratory.force_plate import ForcePlate
 from mbd.laboratory.recording import MIN_PLATE_LOAD, PlateRecord, Recording
 from mbd.notes import doubt, note
 
-MAX_PRESSURE_DISTANCE = 0.35
-"""Farthest that a center of pressure lies from a point of the foot that stands there, along the ground [m]."""
 MIN_DISTANCE_RATIO = 1.25
 """Times as far as the nearest foot from the center of pressure that another foot is, to have no part in the load."""
-MIN_LOAD_TIME = 0.03
-"""Loads that last less are taken for noise [s]."""
 
 
 def assign_plates(
@@ -74,7 +70,7 @@ def assign_plates(
             mean = np.nanmean(distance, axis=1)
             best = int(np.argmin(mean))
             title = f"{plate.name} from {first:.3g} to {last:.3g} s"
-            if mean[best] > MAX_PRESSURE_DISTANCE:
+            if mean[best] > 0.35:  # farther [m] from a point of the foot no center of pressure lies, along the ground
                 doubt(f"{title}: no foot is nearer than {mean[best]:.2g} m to the center of pressure; left out")
                 continue
             near = np.where(np.isnan(distance), np.inf, distance)
@@ -101,7 +97,7 @@ def _loaded(plate: PlateRecord, threshold: float) -> list[tuple[float, float]]:
     acts = np.concatenate([[0], (plate.force[:, 1] > max(threshold, MIN_PLATE_LOAD * 0.1)).astype(int), [0]])
     edges = np.flatnonzero(np.diff(acts))
     spans = [(float(plate.time[a]), float(plate.time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [(a, b) for a, b in spans if b - a >= MIN_LOAD_TIME]
+    return [(a, b) for a, b in spans if b - a >= 0.03]  # shorter loads [s] are noise
 
 
 def _distances(

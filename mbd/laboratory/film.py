@@ -15,9 +15,6 @@ from mbd.laboratory.recording import PlateRecord, Recording
 from mbd.notes import doubt
 from mbd.results.trajectory import Trajectory
 
-MAX_MEAN_ERROR = 0.01
-"""Mean error of what plates carry, over its mean size, above which it is in doubt: schemes err by less [-]."""
-
 
 def film(
     run: Any, markers: Mapping[str, Any] | Sequence[Any], rate: float = 100.0, scatter: float = 0.0, seed: int = 0
@@ -92,7 +89,7 @@ def _doubt_other_forces(seen: Any, plates: Sequence[PlateRecord]) -> None:
     ):
         acts = np.asarray(seen[f"external {what}"])
         off = np.abs(carried - acts)
-        if np.mean(off) > MAX_MEAN_ERROR * np.mean(np.abs(acts)):
+        if np.mean(off) > 0.01 * np.mean(np.abs(acts)):  # schemes err by less
             k, axis = np.unravel_index(int(np.argmax(off)), off.shape)
             has, should = (round(float(each[k, axis]), 9) + 0.0 for each in (carried, acts))
             doubt(

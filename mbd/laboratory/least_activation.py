@@ -12,10 +12,6 @@ MAX_ITERATIONS = 200
 """Newton steps; 20 to 40 are usual."""
 CENTERING = (0.1, 0.8)
 """Part of the complementarity gap that a step aims at after a long step, and after one that a bound cut short [-]."""
-LONG_STEP = 0.5
-"""Step from which on it counts as long [-]."""
-BOUND_FRACTION = 0.995
-"""Part of the way to the nearest bound that a step may take [-]."""
 GAP, BALANCE = 1e-13, 1e-10
 """Complementarity a z, and largest residual beside its terms, of a solution [-]."""
 
@@ -67,7 +63,7 @@ def least_activation(
         if not going.any():
             return np.clip(a, 0.0, 1.0), wanted - np.einsum("kjm,km->kj", G, np.clip(a, 0.0, 1.0))
         # Newton's step for a, λ, z and y
-        aim = np.where(step < LONG_STEP, CENTERING[1], CENTERING[0])
+        aim = np.where(step < 0.5, CENTERING[1], CENTERING[0])  # a long step aims nearer
         mu = aim * (a * z + b * y).mean(axis=1, keepdims=True) / 2.0
         D = 6.0 * a + z / a + y / b
         right = -slope + (mu / a - z) - (mu / b - y)
@@ -91,4 +87,4 @@ def least_activation(
 def _reach(values: Matrix, change: Matrix) -> Vector:
     """The largest part of a step, up to 1, that leaves values positive (R,)."""
     room = np.where(change < 0.0, -values / np.where(change < 0.0, change, -1.0), np.inf)
-    return np.asarray(np.minimum(1.0, BOUND_FRACTION * room.min(axis=1)))
+    return np.asarray(np.minimum(1.0, 0.995 * room.min(axis=1)))  # not quite to the nearest bound

@@ -26,10 +26,6 @@ NAMED = (
     re.compile(r"^(?P<side>left|right)[ _](?P<joint>hip|knee|ankle)(\.angle|[ _]angle|[ _]flexion)?$"),
 )
 """Angles in the sagittal plane, as other programs and this one call them."""
-MIN_STANCE = 0.1
-"""Loads that last less are no stance [s]."""
-MIN_LOAD = 20.0
-"""Normal force of a plate of a recording from which on a foot stands on it [N]."""
 STRIDE_SAMPLES = 1000
 """Samples of a stride from which its impulse is taken."""
 
@@ -235,7 +231,7 @@ def gait_of_recording(recording: Any) -> MeasuredGait:
             return None
         total = np.zeros((2, len(times)))
         for plate in recording.plates:
-            for first, last in _spans(plate.time, plate.force[:, 1] > MIN_LOAD):
+            for first, last in _spans(plate.time, plate.force[:, 1] > 20.0):  # [N]
                 best = max(("left", "right"), key=lambda side: _overlap((first, last), stances(side)))
                 if best == word:
                     inside = (plate.time >= first) & (plate.time <= last)
@@ -279,7 +275,7 @@ def _spans(time: Vector, acts: Any) -> list[Interval]:
     """First and last times of where something acts, for long enough."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(acts, dtype=int), [0]])))
     spans = [(float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [(a, b) for a, b in spans if b - a >= MIN_STANCE]
+    return [(a, b) for a, b in spans if b - a >= 0.1]  # shorter loads [s] are no stance
 
 
 def _ends(time: Vector) -> Interval:

@@ -27,9 +27,6 @@ from mbd.results.trajectory import Trajectory
 
 __all__ = ["Motion", "motion_of"]
 
-MAX_FRAME_INTERVAL = 2.0
-"""Time between frames above which it may be in milliseconds [s]."""
-
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -229,7 +226,7 @@ def _in_degrees(equations: Equations, q: Matrix) -> list[str]:
 def _in_milliseconds(time: Vector) -> list[str]:
     """A sentence on frames that are seconds apart, as those of cameras are in milliseconds."""
     apart = float(np.median(np.diff(time))) if len(time) > 2 else 0.0
-    if not apart > MAX_FRAME_INTERVAL:
+    if not apart > 2.0:  # longer [s] they may be in milliseconds
         return []
     return [f"motion: frames are {apart:g} s apart; times are in seconds, and {apart:g} ms is {apart / 1e3:g} s"]
 

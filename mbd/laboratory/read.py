@@ -32,8 +32,6 @@ ANGLE = re.compile(
 """Channels that are angles by their names."""
 JOINT = re.compile("hip|knee|ankle|subtalar|shoulder|elbow|wrist|lumbar|trunk", re.IGNORECASE)
 """Joints of a body, none of which turns by more than a turn."""
-MAX_MARKER_DISTANCE = 50.0
-"""Distance of markers from each other that no laboratory has [m]."""
 
 
 def read(path: str | Path, up: str | None = None, forward: str | None = None) -> Recording:
@@ -104,7 +102,7 @@ def _doubt_units(recording: Recording) -> None:
             break
     for name, track in recording.markers.items():
         seen = track[np.isfinite(track).all(axis=1)]
-        if len(seen) and np.ptp(seen, axis=0).max() > MAX_MARKER_DISTANCE:
+        if len(seen) and np.ptp(seen, axis=0).max() > 50.0:  # no laboratory is so large [m]
             doubt(
                 f"{recording.name}: marker {name!r} moves over {np.ptp(seen, axis=0).max():.3g} m; the units of the "
                 "file are probably others than its header says"

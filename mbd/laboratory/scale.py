@@ -22,14 +22,10 @@ ENDS = {
     "left foot": ("heel", "toe"), "right foot": ("heel", "toe"),
 }  # fmt: skip
 """Points whose distance is the length of a segment that is no link."""
-MAX_STATIC_FLEXION = 12.0
-"""Angle between thigh and shank of a static trial from which a knee counts as bent [°]."""
 PLAUSIBLE = (0.7, 1.4)
 """Factors of length outside of which a measured length is in doubt [-]."""
 PLAUSIBLE_MASS = (0.1, 5.0)
 """Factors of the whole mass outside of which a mass is in doubt: children to adults [-]."""
-MAX_RIGID_SCATTER = 0.02
-"""Scatter of the distance of two markers beyond which they do not lie on one rigid body [m]."""
 
 
 def scale(
@@ -122,7 +118,7 @@ def _bent_knees(lengths: Mapping[str, Any], recording: Recording | None) -> list
         thigh, shank = np.nanmedian(b - a, axis=0), np.nanmedian(d - c, axis=0)
         cosine = thigh @ shank / (np.linalg.norm(thigh) * np.linalg.norm(shank))
         bend = np.degrees(np.arccos(min(float(cosine), 1.0)))
-        if bend > MAX_STATIC_FLEXION:
+        if bend > 12.0:  # a knee counts as bent from 12° on
             found.append(
                 f"scale: the {side} knee is bent by {bend:.0f}° in the static trial; lengths between markers hold all "
                 "the same, but marker places that are taken from this posture do not: let the patient stand straight"
@@ -156,7 +152,7 @@ def _measured(name: str, given: Any, recording: Recording | None) -> float:
         apart = apart[np.isfinite(apart)]
         if not len(apart):
             raise ModelError(f"lengths: {given[0]!r} and {given[1]!r} of {name!r} are never seen together")
-        if np.std(apart) > MAX_RIGID_SCATTER:
+        if np.std(apart) > 0.02:  # two markers of which that [m] is scatter do not lie on one rigid body
             doubt(
                 f"scale: the distance of {given[0]!r} and {given[1]!r} varies by {1e3 * np.std(apart):.0f} mm; do both "
                 f"lie on the {name}?"

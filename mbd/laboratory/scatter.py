@@ -15,8 +15,6 @@ from mbd.laboratory.motion import Motion
 
 FEWEST, MOST = 20, 600
 """Frames from which the scatter is estimated: of more, those in the middle."""
-SPACING_RTOL = 0.01
-"""How unevenly the frames may be spaced, relative [-]."""
 MIN_RATIO = 0.6
 """Scatter by fifth over that by fourth differences above which it is noise: 1 of noise, ω h of a smooth signal [-]."""
 MIN_SHARE = 0.05
@@ -48,7 +46,7 @@ def scatter_of(time: Vector, coordinates: Matrix, moments: Matrix) -> list[Scatt
     part = slice(middle, middle + MOST)
     time, coordinates, moments = time[part], coordinates[part], moments[part]
     widths = np.diff(time)
-    if len(time) < FEWEST or np.ptp(widths) > SPACING_RTOL * widths.mean():
+    if len(time) < FEWEST or np.ptp(widths) > 0.01 * widths.mean():  # unevenly spaced
         return [None] * count
     differences, ranges = np.diff(moments.T, 4), np.ptp(moments, axis=0)
     gain, noisy = SPLINE_NOISE_GAIN / DIFFERENCES[4], np.zeros(count, dtype=bool)

@@ -28,8 +28,6 @@ SMOOTH_DIFFERENCE_STEP = 1e-5
 """The same for a user's function of numbers alone."""
 CENTRAL = {2: (1.0,), 4: (4.0 / 3.0, -1.0 / 3.0), 6: (1.5, -0.6, 0.1)}
 """Weights of the slopes of central differences h, 2h, 3h, by their order [-]."""
-WIDER = 100.0
-"""Factor by which a difference grows that changes a number by its round-off alone [-]."""
 
 
 @dataclass(eq=False)
@@ -96,7 +94,7 @@ def slope_by_differences(
     most = share * max(abs(value), scale)
     h = share * abs(value) or most
     while h < most and abs(np.subtract(*ends(h))) <= HALF_PRECISION_RTOL * max(map(abs, ends(h))):
-        h = min(WIDER * h, most)
+        h = min(100.0 * h, most)  # it changes the number by its round-off alone
     slopes = [(ends(k * h)[0] - ends(k * h)[1]) / (2.0 * k * h) for k in range(1, order // 2 + 1)]
     return float(np.dot(CENTRAL[order], slopes))
 

@@ -36,14 +36,10 @@ RANK_RTOL = 1e-6
 The largest over some stored states counts: at one of them rows may depend on each other for an instant, and an error of
 1e-9 in positions leaves as much of a row that depends on others.
 """
-DIRECTION_RTOL = 1e-5
-"""What is left of a row, over its length elsewhere, below which its direction is too much that of round-off [-]."""
 MAX_SAMPLES = 16
 """Stored states at which the dependence of rows is judged, at most [-]."""
 SINGULAR_LOG_DETERMINANT = -1e6
 """Log |det| that stands for that of a singular matrix [-]."""
-MULTIPLIER_RTOL = 1e-13
-"""Relative change of multipliers at which that ends [-]."""
 
 Flags = NDArray[np.bool_]
 
@@ -131,7 +127,7 @@ class Balance:
             before, lam = lam, np.zeros_like(rows.lam)
             lam[:, held.every] = force if spread is None else (spread @ force[:, :, None])[:, :, 0]
             change = np.max(np.abs(lam - before), axis=1, initial=0.0)
-            if np.all((change <= MULTIPLIER_RTOL * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
+            if np.all((change <= 1e-13 * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
                 break
         if slides:
             anchors = rows.anchors.copy()  # friction turns with the surface under it, not with that where it was struck
@@ -304,7 +300,7 @@ def _independent(B: Any) -> list[int]:
         length = np.linalg.norm(left, axis=1)
         asked = telling if telling.any() else ~telling
         if np.any((length > RANK_RTOL * size)[asked]):
-            telling &= length > DIRECTION_RTOL * np.max(size)  # a row may vanish by itself there
+            telling &= length > 1e-5 * np.max(size)  # a row may vanish by itself there
             there = (length > RANK_RTOL**2 * size)[:, None]
             unit = np.divide(left, length[:, None], out=np.zeros_like(left), where=there)
             basis = np.concatenate([basis, unit[:, None]], axis=1)

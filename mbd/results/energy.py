@@ -36,11 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
 
-MAX_WORK_ERROR = 0.05
-"""Error of the work of an impact, over its largest, up to which rows tell it [-]."""
-MIN_GAIN_OVER_ERROR = 10.0
-"""Gain of a penalty contact of a user's own law over its error below which it is not told [-]."""
-
 
 def ledger(columns: ModelColumns) -> Ledger:
     """The energy ledger of a run.
@@ -171,7 +166,7 @@ def never_giving(work: Vector, power: Vector, trapezoid: Vector) -> Vector:
 def _withheld_if_unsure(part: Part, doubt: float, least: float) -> Part:
     """A penalty contact of a law of the user's, withheld where it seems to give energy that may be an error."""
     gain = float(np.max(part.energy - part.energy[:1], initial=0.0))
-    if not least < gain <= MIN_GAIN_OVER_ERROR * doubt:
+    if not least < gain <= 10.0 * doubt:  # up to ten times its error a gain is not told
         return part
     reason = (
         f"its power, added up over the rows, gives {gain:.3g} J, with an error of up to {doubt:.3g} J; impacts of so "
@@ -213,7 +208,7 @@ def _of_stop(
     allowed = ROUND_OFF_RTOL * size
     allowed += held[begins]
     np.add.at(allowed, episode[1:], np.maximum(put_in, 0.0))
-    is_known = (doubt <= MAX_WORK_ERROR * size) & (gain <= allowed)
+    is_known = (doubt <= 0.05 * size) & (gain <= allowed)  # up to a twentieth rows tell the work of an impact
     is_met = (given[:-1] == 0.0) & (given[1:] != 0.0) & (held[:-1] > 0.0)
     return np.concatenate([[0.0], np.cumsum(np.where(is_known[episode[1:]] & ~is_met, np.diff(direct), steps))])
 

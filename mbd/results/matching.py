@@ -11,8 +11,6 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.results.record import EventRecord
 
-UNMATCHED_COST = 0.01
-"""What an event without a match costs, as a shift relative to the length of the run [-]."""
 MAX_ASSIGNED = 400
 """Events of one name above which the k-th is matched with the k-th."""
 
@@ -36,7 +34,8 @@ def matched(first: Sequence[EventRecord], second: Sequence[EventRecord], begin: 
     pairs: list[tuple[float, float]] = []
     alone: list[float] = []
     for key in ours.keys() | theirs.keys():
-        found, left = aligned(ours.get(key, []), theirs.get(key, []), UNMATCHED_COST * (end - begin))
+        # an event without a match costs a shift by a hundredth of the run
+        found, left = aligned(ours.get(key, []), theirs.get(key, []), 0.01 * (end - begin))
         pairs += found
         alone += left
     shift = max((abs(a - b) for a, b in pairs), default=0.0)

@@ -37,12 +37,6 @@ __all__ = ["Asked", "EndState", "Table", "Wanted", "names_in", "request_of", "wi
 
 Wanted = str | Mapping[str, Mapping[str, Any]]
 
-MAX_VELOCITY_ERROR_SHARE = 0.01
-"""Estimated errors of velocities of a run, over the largest velocity, above which its derivatives are in doubt [-].
-
-Derivatives of random mechanisms were off by 2 to 30 times that share.
-"""
-
 
 @dataclass
 class Asked:
@@ -178,7 +172,8 @@ class Carried(Table):
 def _doubt_derivatives(run: Trajectory, made: Run) -> None:
     """Warn where steps of fixed size are long for the motion: derivatives lose their digits before the motion does."""
     spent, fastest = float(made.kernel.error_sum), float(np.max(np.abs(run.record.v), initial=0.0))
-    if made.kernel.estimates and not made.kernel.adaptive and spent > MAX_VELOCITY_ERROR_SHARE * fastest:
+    # derivatives of random mechanisms were off by 2 to 30 times that share
+    if made.kernel.estimates and not made.kernel.adaptive and spent > 0.01 * fastest:
         doubt(
             f"the derivatives are in doubt: estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all "
             f"steps, {100.0 * spent / fastest:.2g} % of the largest velocity, and derivatives err by several times "

@@ -23,12 +23,6 @@ MAX_PLAUSIBLE_ANGLE = 10.0
 
 MAX_LENGTH = 50.0
 """Length of a body of less than a ton above which it may be given in millimetres [m]."""
-MAX_LINK_MASS = 200.0
-"""Mass of a link above which it may be given in grams [kg]."""
-MAX_DENSITY = 22_600.0
-"""Density of osmium, which no body exceeds: that of a link in the cube of its length [kg/m³]."""
-MAX_FRICTION = 10.0
-"""Coefficient of friction above which it may be given in percent [-]."""
 
 
 MAX_SAMPLE_TIME = 2.0
@@ -103,7 +97,7 @@ def _masses(model: Any) -> list[str]:
         if not isinstance(link, Link) or not link.length > 0.0 or not link.mass > 0.0:
             continue
         name, mass, length, center = link.name, link.mass, link.length, link.center_distance
-        if mass > MAX_LINK_MASS and mass > MAX_DENSITY * length**3:
+        if mass > 200.0 and mass > 22_600.0 * length**3:  # heavier than osmium, it may be given in grams
             found.append(
                 f"'{name}' has {mass:g} kg in {length:g} m, more than any metal; masses are in kg, and {mass:g} g is "
                 f"{mass / 1e3:g} kg"
@@ -151,7 +145,8 @@ def _grips(model: Any) -> list[str]:
     return [
         f"friction of '{contact.name}' is {contact.friction:g}; a coefficient is a ratio of forces, rubber has about 1"
         for contact in getattr(model, "constraints", ())
-        if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > MAX_FRICTION
+        # it may be given in percent
+        if isinstance(friction := getattr(contact, "friction", None), float | int) and friction > 10.0
     ]
 
 

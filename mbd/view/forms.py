@@ -17,9 +17,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import NOMINAL_RTOL
 
-MIN_HALF_SIZE = 0.03
-"""Least half size, over the largest [-]: a disk or a rod is drawn with some thickness."""
-
 
 @dataclass(frozen=True, eq=False)
 class Form:
@@ -65,7 +62,7 @@ def equal_inertia(mass: float, moments: Sequence[float], kind: str = "") -> Form
 
 
 def _thick(half: Vector) -> Vector:
-    return np.maximum(half, MIN_HALF_SIZE * np.max(half))
+    return np.maximum(half, 0.03 * np.max(half))  # a disk or a rod is drawn with some thickness
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,6 @@ FIRST_PITCH = 0.3
 """Pitch of a walker's first view [rad]."""
 QUANTILE = 0.2
 """Part of the time in which the sides may be nearer to each other than what is compared."""
-DISTANCE_WEIGHT = 0.01
-"""Weight of the distance of a pair, over the largest one, beside how much it changes [-]."""
 MIN_DISTANCE_RATIO = 0.9
 """Part of the largest distance between the sides at which the least turned view is taken [-]."""
 
@@ -214,7 +212,8 @@ def first_view(picture: Scene) -> tuple[float, float]:
     apart = picture.positions[rows][:, pairs[:, 1]] - picture.positions[rows][:, pairs[:, 0]]  # from left to right
     length = np.linalg.norm(apart, axis=-1)
     usual = np.maximum(length.mean(axis=0), 1e-9)
-    steadiest = int(np.argmin(np.std(length, axis=0) / usual + DISTANCE_WEIGHT * usual / usual.max()))
+    # the distance counts little beside how much it changes
+    steadiest = int(np.argmin(np.std(length, axis=0) / usual + 0.01 * usual / usual.max()))
     level = apart[0, steadiest] * [1.0, 0.0, 1.0]
     size = float(np.linalg.norm(level))
     if size < 1e-9:

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
     from mbd.analysis.linearization import Linearization, NaturalMode
 
-IMAGINARY_RTOL = 0.02
-"""Imaginary part of a shape below which all coordinates are drawn as moving in phase [-]."""
-
 
 def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) -> Figure:
     """One panel a motion: how far each coordinate moves with the largest, at that instant and a quarter later."""
@@ -31,7 +28,8 @@ def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) 
         height, turned = np.arange(len(names)), False
         for number, (axes, mode) in enumerate(zip(panels, chosen, strict=True)):
             shape = np.array([mode.shape[name] for name in names])
-            shade, late = tone(CYCLE[number % len(CYCLE)]), bool(np.max(np.abs(shape.imag)) > IMAGINARY_RTOL)
+            # below, all coordinates are drawn as moving in phase
+            shade, late = tone(CYCLE[number % len(CYCLE)]), bool(np.max(np.abs(shape.imag)) > 0.02)
             turned = turned or late
             axes.barh(height - 0.18 * late, shape.real, 0.66 - 0.32 * late, color=shade)
             if late:

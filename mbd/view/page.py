@@ -44,12 +44,6 @@ SPATIAL = (
 MAX_CHARACTERS = 950_000
 """Characters of a spatial page, beyond which it leaves out pictures that others show by interpolation."""
 
-CURVE_ERROR_RATIO = 0.1
-"""What interpolation may miss of places over the size of the mechanism, over what it may of curves over their range."""
-
-MIN_INTERPOLATION_ERROR = 1e-4
-"""Least that interpolation between the pictures kept may miss, over the size of the mechanism [-]."""
-
 
 def write(run: Trajectory, path: str | Path) -> Path:
     """Write the page of a run; see `Trajectory.page`."""
@@ -62,8 +56,9 @@ def html(run: Trajectory) -> str:
     text = _html(run, picture)
     if not picture.spatial or len(text) <= MAX_CHARACTERS:
         return text
-    whole, tolerance = picture.instants, MIN_INTERPOLATION_ERROR
-    moving = np.hstack([_motion(picture), CURVE_ERROR_RATIO * _curves(run, whole)])
+    whole, tolerance = picture.instants, 1e-4  # over the size of the mechanism
+    # places may be missed by that much of what curves may
+    moving = np.hstack([_motion(picture), 0.1 * _curves(run, whole)])
     while len(text) > MAX_CHARACTERS and len(picture.instants.time) > LEAST:
         chosen = kept(whole.time, moving, tolerance)
         if len(chosen) < len(picture.instants.time):

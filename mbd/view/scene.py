@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Instants", "Push", "Scene", "Touch", "scene"]
 
-MIN_DENSITY = 1.2
-"""Density below which a solid is none that anyone builds [kg/m³]."""
-
 RADIUS_RTOL = 0.02
 """Radii that differ less, over the radius, are one [-]."""
 
@@ -221,7 +218,8 @@ def _solid_ones(solids: tuple[Solid, ...], points: Sequence[str], places: Matrix
     for solid in solids:
         others = [k for k, point in enumerate(points) if point.rpartition(".")[0] != solid.name]
         size = float(np.max(np.ptp(places[others], axis=0), initial=0.0)) if others else 0.0
-        if not (solid.density < MIN_DENSITY and 0.0 < size < 2.0 * float(np.max(solid.form.half))):
+        # nobody builds a lighter solid [kg/m³]
+        if not (solid.density < 1.2 and 0.0 < size < 2.0 * float(np.max(solid.form.half))):
             found.append(solid)
     return tuple(found)
 

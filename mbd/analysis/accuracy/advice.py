@@ -9,8 +9,6 @@ from mbd.analysis.accuracy.points import Point
 
 ACCURACY_FACTOR = 10.0
 """Times more accuracy whose cost is reported."""
-MIN_ERROR_OVER_BOUND = 30.0
-"""Times the bound of the reference below which an error is mostly that of the reference."""
 
 
 def cheapest(points: Sequence[Point], target: float) -> Point | None:
@@ -75,7 +73,8 @@ def _power(error: float) -> str:
 def _limits(points: Sequence[Point], bound: float) -> str:
     """Why no smaller error is shown."""
     best = _best(points)
-    if best.at_most is not None and best.at_most < MIN_ERROR_OVER_BOUND * bound:
+    # below that much of the bound of the reference an error is mostly that of the reference
+    if best.at_most is not None and best.at_most < 30.0 * bound:
         return f"Smaller errors cannot be told apart: the reference itself is known to {bound:.1g}."
     guess = _extrapolated(points, (best.at_most or 0.0) / ACCURACY_FACTOR)
     if guess is None:

@@ -14,12 +14,8 @@ from mbd.integrators import Integrator
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-STEPS_PER_SHORTEST_TIME = 5
-"""Largest step: this part of the shortest time in which accelerations change velocities by their range [-]."""
 STEP_COUNT = 6
 """Steps, each half the one before."""
-FINEST_ERROR_FACTOR = 10.0
-"""The finest step is for an error this many times less than that wanted [-]."""
 TOLERANCES = {False: (1e-3, 1e-4, 1e-5), True: (1e-3, 1e-5, 1e-7)}
 """Of schemes of low and of high order, over the middle range of the coordinates, where no error is wanted [-]."""
 PARTS = (1.0, 0.1, 0.01)
@@ -57,7 +53,8 @@ def steps_of(probe: Trajectory, span: float) -> tuple[float, ...]:
     swing = np.ptp(record.v, axis=0) if len(record.v) else np.zeros(0)
     rise = np.percentile(np.abs(record.a), 99, axis=0) if len(record.a) else np.zeros(0)
     times = [s / r for s, r in zip(swing, rise, strict=True) if r > 1e-9 * np.max(rise) and s > 0.0]
-    return _halved(rounded(min([*times, span / 4.0]) / STEPS_PER_SHORTEST_TIME))
+    # the largest step is a fifth of the shortest time in which accelerations change velocities by their range
+    return _halved(rounded(min([*times, span / 4.0]) / 5))
 
 
 def long_steps(probe: Trajectory, span: float) -> tuple[float, ...]:
@@ -71,9 +68,8 @@ def steps_for(target: float, error: float, dt: float, span: float) -> tuple[floa
     >>> steps_for(1e-4, error=1e-3, dt=1e-3, span=1.0)
     (0.00256, 0.00128, 0.00064, 0.00032, 0.00016, 8e-05)
     """
-    finest = max(
-        0.9 * dt * math.sqrt(target / FINEST_ERROR_FACTOR / error), span / 400000
-    )  # so many of the finest steps at most
+    # for a tenth of the error that is wanted, and of 400,000 steps at most
+    finest = max(0.9 * dt * math.sqrt(target / 10.0 / error), span / 400000)
     least = rounded(min(finest, span / 2**STEP_COUNT))
     return tuple(least * 2.0**k for k in reversed(range(STEP_COUNT)))
 

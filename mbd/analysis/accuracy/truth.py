@@ -32,12 +32,8 @@ MAX_INSTANTS = 400
 """Common instants at which runs are compared, at most: stored rows of the reference, which need no interpolation."""
 VELOCITY_PERTURBATION = 1e-9
 """Part of their range by which the velocities of the start are changed, to measure how errors grow [-]."""
-MAX_REFERENCE_BOUND = 0.01
-"""Bound of the reference above which it has not converged, and judges nobody [-]."""
 CHECKS = (2.0, 8.0, 32.0)
 """Steps between rows of the reference over those of the runs that check it, one after the other [-]."""
-MAX_DIFFERENCE_OVER_BOUND = 3.0
-"""Difference of such a run, over the bound of the reference, that is near enough [-]."""
 MIN_REPORTED_OVER_BOUND = 10.0
 """An error is reported where it is this many times the bound of what it was judged by [-]."""
 WORDS = {"DOP853": "Dormand–Prince 8(5,3)", "Radau": "Radau IIA of order 5"}
@@ -171,7 +167,7 @@ def truth(
     scales = ranges(tight, names, instants)
     apart = differences(loose, tight, scales, instants)
     bound = {name: max(apart.largest.get(name, 0.0), apart.at_end.get(name, 0.0)) for name in scales}
-    if max(bound.values(), default=0.0) > MAX_REFERENCE_BOUND:
+    if max(bound.values(), default=0.0) > 0.01:  # it has not converged, and judges nobody
         return _unconverged(bound, method, apart)
     growth = _growth(model, start, tight, options, lambda begin: run(method, TIGHT, step, begin, shares[2]))
     found = Truth(
@@ -202,7 +198,8 @@ def _by_another(found: Truth, run: Callable[[float], Trajectory], step: float) -
         checked = _checked(other, found, checked)
         known = max(checked.values(), default=0.0) if checked is not None else np.inf
         if (
-            known <= MAX_DIFFERENCE_OVER_BOUND * found.error or other.stats["wall_seconds"] > 3.0
+            # near enough is three times the bound of the reference
+            known <= 3.0 * found.error or other.stats["wall_seconds"] > 3.0
         ):  # no finer one is made after 3 s
             break
     return checked

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Fit", "bounds", "fit"]
 
-MAX_STEPS_OF_SPAN = 20
-"""Steps of a search over a part of the time: parameters that it does not tell of would wander on [-]."""
 SPANS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)
 """Parts of the measured time that are fitted before all of it where the order of events changes [-]."""
 
@@ -374,7 +372,8 @@ class _Search:
                 continue
             search = replace(self, data=known, until=_end(known, begin, None, self.dt, self.tol), runs=0, at=None)
             if np.all(np.isfinite(search.residuals(values))):
-                values = search.least(values, low, high, MAX_STEPS_OF_SPAN).x
+                # so many steps at most: parameters that a part of the time does not tell of would wander on
+                values = search.least(values, low, high, 20).x
             self.runs += search.runs
         return (
             self.least(values, low, high)

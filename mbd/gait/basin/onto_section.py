@@ -19,9 +19,6 @@ from mbd.gait.section import Section
 from mbd.tape.derivatives import gradient
 from mbd.tape.node import Node
 
-REGULARIZATION = 1e-13
-"""Share of the trace of G Gᵀ that is added to its diagonal, lest rows that depend on others divide by zero [-]."""
-
 
 class OntoSection:
     """The rows of a section as functions of many states.
@@ -107,5 +104,6 @@ def _shortest(rows: NDArray[np.float64], values: Matrix) -> Matrix:
     turned = rows.transpose(0, 2, 1)
     gram = rows @ turned
     size = np.trace(gram, axis1=1, axis2=2)
-    gram += (REGULARIZATION * size + 1e-300)[:, np.newaxis, np.newaxis] * np.eye(gram.shape[1])
+    # lest rows that depend on others divide by zero
+    gram += (1e-13 * size + 1e-300)[:, np.newaxis, np.newaxis] * np.eye(gram.shape[1])
     return np.asarray((turned @ np.linalg.solve(gram, values[:, :, np.newaxis]))[:, :, 0])

@@ -30,8 +30,6 @@ from mbd.laboratory.models.written_tree import WrittenJoint, inertial_of, place_
 
 KINDS = {"de groote": "DeGrooteFregly2016Muscle", "millard": "Millard2012EquilibriumMuscle"}
 """Names of muscles by their curves."""
-CYLINDER_LENGTH = 1.0
-"""Length of a cylinder, which has no ends here [m]."""
 PLAIN = {ord(mark): "_" for mark in ' ./\\:*?"<>|'}
 """What OpenSim does not allow in names becomes an underscore."""
 
@@ -217,7 +215,8 @@ def _surface(surface: WrappingSurface, name: str, owner: str, values: dict[str, 
     sizes = [values.get(f"{owner}.{size}", value) for size, value in surface.sizes.items()]
     tag, side, more = "WrapSphere", "all", f"<radius>{_text(sizes[0])}</radius>"
     if isinstance(surface, WrappingCylinder):
-        tag, more = "WrapCylinder", f"{more}<length>{_text([*sizes, CYLINDER_LENGTH][1])}</length>"
+        # a cylinder has no ends here, and is given 1 m
+        tag, more = "WrapCylinder", f"{more}<length>{_text([*sizes, 1.0][1])}</length>"
         if surface.side is not None:
             x, y, _ = surface.side
             side, R = "x", R @ np.array([[x, -y, 0.0], [y, x, 0.0], [0.0, 0.0, 1.0]])

@@ -15,9 +15,6 @@ from mbd.parts.arguments import between, check, sizes
 from mbd.parts.feet.heel_and_toe import heel_and_toe
 from mbd.topology.description import Description
 
-CHARACTERISTIC_RADIUS = 0.85
-"""γ, share of a blade's length that turns as a rigid link (Howell & Midha 1995, for loads across the blade) [-]."""
-
 
 def keel_foot(
     model: Description, name: str, heel: Frame, root: Frame, *, length: float, stiffness: float, mass: float,
@@ -58,7 +55,8 @@ def keel_foot(
     check(model, name, "keel_foot")
     between("keel_foot", name, heel=heel, root=root)
     span, k, m = sizes(f"keel_foot '{name}'", length=length, stiffness=stiffness, mass=mass)
-    reach = CHARACTERISTIC_RADIUS * span
+    # γ, the share of a blade's length that turns as a rigid link, for loads across it (Howell & Midha 1995)
+    reach = 0.85 * span
     solid = rod(m, reach)
     across, along, _ = solid.inertia
     blade = RigidBody(f"{name} blade", m, (along, across, across), center=(0.5 * reach, 0.0, 0.0))

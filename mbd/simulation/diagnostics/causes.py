@@ -29,8 +29,6 @@ from mbd.tape.evaluate import evaluate
 
 MAX_RATE_CHANGE = 3.0
 """Change of a rate in a step over the largest so far, above which dt is reported not to resolve the motion [-]."""
-MIN_RATE = 1e-3
-"""Largest rate so far [m/s, rad/s] below which that is not asked: a start from rest is no motion that runs away."""
 
 
 @dataclass(frozen=True)
@@ -291,7 +289,7 @@ class Words:
     def rushing(self) -> str:
         """What a fixed step makes of velocities, where that is far more than any has been so far; '' elsewhere."""
         values = self.v
-        if values.adaptive or self.swiftest < MIN_RATE:
+        if values.adaptive or self.swiftest < 1e-3:  # a start from rest is no motion that runs away
             return ""
         gains = np.abs(values.rate[: values.n_v]) * values.dt
         times = float(np.max(gains, initial=0.0)) / self.swiftest

@@ -8,9 +8,6 @@ from mbd.results.record import Record
 from mbd.simulation.diagnostics.fastest import resolving_dt
 from mbd.simulation.run.data import RunData
 
-ADVISED_STEP_RATIO = 0.1
-"""Step that is advised, over the present one, where forces do not show one [-]."""
-
 
 def percent(share: float) -> str:
     """A share in whole percent, or with one digit below; never as 0 where there is any."""
@@ -45,7 +42,7 @@ def _resolving_step(run: RunData, record: Record, row: int) -> float:
     kinetic energy reaches against the forces.
     """
     system, h = run.stepper.system, float(record.time[row] - record.time[row - 1])
-    blind = ADVISED_STEP_RATIO * run.dt
+    blind = 0.1 * run.dt  # where forces do not show one
     if not run.mechanism.vector or not h > 0.0:
         return blind
     mode = run.manager.mode(record.closed[row])

@@ -48,8 +48,6 @@ REPORTED_NONSMOOTH_GAIN = 0.02
 """The same of a gain in non-smooth steps, whose errors are of the size of dt [-]."""
 MAX_GAIN_RATIO = 1e6
 """Gain of energy over all that there was before, above which a single row is a verdict [-]."""
-MAX_DRIVEN_RISE = 100.0
-"""Rise of energy over all earlier swings that looks strange where something is driven [-]."""
 MIN_MOTION = 1e-6
 """Way of the fastest coordinate [m, rad] below which a mechanism is at rest, and its energy round-off."""
 UNDRIVEN = frozenset({"joint loss", "damper", "friction", "penalty"})
@@ -250,7 +248,7 @@ class EnergyWatch(EnergyFindings):
             sudden = bool(run.parameter_changes) or any(event.kind in ("closed", "event") for event in run.events)
             return bool(risen.any()) or not (kinds or sudden)
         swing = kinetic[0] + _swing(kinetic) + _swing(potential)
-        large_rise = rise[1:] > MAX_DRIVEN_RISE * swing[:-1]
+        large_rise = rise[1:] > 100.0 * swing[:-1]  # strange where something is driven
         return bool(np.any(large_rise[3:] & risen[4:]))
 
 

@@ -15,8 +15,6 @@ from mbd.simulation.run.data import RunData
 
 MAX_UNKNOWNS = 40
 """Coordinates and states above which the tangents take too long to derive and compile for a sentence [-]."""
-MAX_SPEED_GROWTH = 1e6
-"""Growth of speeds since the start above which a state is no longer one of the mechanism [-]."""
 
 
 def fastest(run: RunData, record: Record, rows: Iterable[int]) -> float:
@@ -96,7 +94,8 @@ def sane_rows(run: RunData) -> list[int]:
     n_q, n_v = run.kernel.n_q, run.kernel.n_v
     speeds: Vector = np.max(np.abs(run.table[: run.stored, 1 + n_q : 1 + n_q + n_v]), axis=1, initial=0.0)
     early = speeds[: max(2, len(speeds) // 100)]
-    wild = np.flatnonzero(~(speeds <= MAX_SPEED_GROWTH * max(1e-3, float(early[0]) if len(early) else 0.0)))
+    # states that grow so much are no longer ones of the mechanism
+    wild = np.flatnonzero(~(speeds <= 1e6 * max(1e-3, float(early[0]) if len(early) else 0.0)))
     last = int(wild[0]) if len(wild) else len(speeds)
     last = min(last, run.energy.row) if run.energy.row > 0 else last
     return sorted(set(np.linspace(0, last - 1, 6).astype(int).tolist())) if last > 0 else []

@@ -28,8 +28,6 @@ from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
 from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE, doubts
 
-FIRST_ROWS = 16
-"""Rows after the start whose multipliers are compared with the balance of forces."""
 MAX_SHARE = 0.02
 """Difference from the balance, over the largest multiplier of the run, above which a run says so [-]."""
 
@@ -41,18 +39,9 @@ RESOLVED_STEPS = 10.0
 HALVING_RATIO = 3.0
 """An impact over the time in which half of its speed is gone: half a sine has cos(π/3) = ½ [-]."""
 
-UNRESOLVED_STEPS = 2.0
-"""Steps of a penalty contact below which its impact is the scheme's, not the law's: the run's message says so [-]."""
-
 
 MAX_IMPACTS = 8
 """Impacts of a contact from which the step that resolves them is found."""
-
-MAX_PUSH_SHARE = 0.02
-"""Share of its largest force with which a muscle may push before a run tells so [-]."""
-
-REPORTED_VELOCITY_ERROR = 1e-4
-"""Sum of the local errors of velocities of an explicit scheme that a run tells [m/s, rad/s]."""
 
 RESTARTED = (
     "controllers restarted, with their first state and a sample at the start: they or the state are not those "
@@ -123,7 +112,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     doubts += unresolved if run.kernel.coarsest_change > MAX_RATE_ERROR else []
     notes += [run.room.note] if run.room.note else []
     spent = float(run.kernel.error_sum)
-    if spent > REPORTED_VELOCITY_ERROR and not run.kernel.adaptive:
+    if spent > 1e-4 and not run.kernel.adaptive:  # [m/s, rad/s]
         notes.append(
             f"estimated errors of velocities add up to {spent:.2g} m/s or rad/s over all steps: dt is large for the "
             "motion; use a smaller dt, or tol="
@@ -188,7 +177,7 @@ def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]
                 f"{tendons[row]:.3g} m; lengths are in metres, and fibers and tendon together are about as long as the "
                 "path"
             )
-        elif force < -MAX_PUSH_SHARE * most and muscle.is_elastic:
+        elif force < -0.02 * most and muscle.is_elastic:  # less is no push that anyone sees
             slack.append(
                 f"muscle {name!r} begins out of equilibrium and pushes with {-force:.3g} N until its fibers have taken "
                 f"up the slack; position={{'{name}.fiber_length': muscle.fiber_at(state['{name}.length'], "
@@ -300,7 +289,8 @@ def _short_touch(run: RunData, record: Record, number: int, contact: Contact) ->
         f"{contact.name!r} {text}, too few: its peak force and energy are not resolved; use dt below {safe:.2g} s, "
         "a softer stiffness, or mbd.Unilateral"
     )
-    return [note], [note] if shortest < UNRESOLVED_STEPS * run.dt else []
+    # an impact of fewer steps is the scheme's, not the law's: the run's message says so
+    return [note], [note] if shortest < 2.0 * run.dt else []
 
 
 def _closings(record: Record, events: Sequence[EventRecord]) -> list[int]:
@@ -372,7 +362,7 @@ def _position_level_multipliers(record: Record, columns: ModelColumns) -> list[s
     """
     if len(record.time) < 3:
         return []
-    rows = columns.rows.part(np.arange(1, min(FIRST_ROWS, len(record.time))))
+    rows = columns.rows.part(np.arange(1, min(16, len(record.time))))  # few rows after the start tell it
     solved = columns.balance.solve(rows)
     known = solved.sound & solved.unique
     off = np.max(np.abs(rows.lam - solved.lam)[known], axis=0, initial=0.0)

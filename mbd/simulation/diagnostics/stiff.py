@@ -12,8 +12,6 @@ STABILITY_SHARE = 0.6
 """Step over the largest stable one from which stability bounds it: the control of steps stays below that [-]."""
 POWER_ITERATIONS = 24
 """Of the power method, of which the second half tells the growth: of a pair of conjugates its mean [-]."""
-DIFFERENCE_RTOL = 1e-7
-"""Change of a state by which derivatives are taken, over its size [-]."""
 
 
 def bounded_by_stability(run: RunData, record: Record) -> list[str]:
@@ -56,9 +54,8 @@ def _rate(run: RunData, record: Record, row: int, step: float) -> float:
         return np.concatenate([moved[:n_v], rate])
 
     x = np.random.default_rng(0).standard_normal(len(weights)) / weights
-    size = DIFFERENCE_RTOL * max(
-        1.0, float(np.max(np.abs(q), initial=0.0)), step * float(np.max(np.abs(y), initial=0.0))
-    )
+    # by which the state is changed for differences
+    size = 1e-7 * max(1.0, float(np.max(np.abs(q), initial=0.0)), step * float(np.max(np.abs(y), initial=0.0)))
     growth = []
     try:
         here = slopes(np.zeros(len(weights)))

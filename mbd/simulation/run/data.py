@@ -29,8 +29,6 @@ from mbd.state import State
 
 STEPS_AT_ONCE = {True: 20000, False: 200}
 """Steps between two looks at the clock, compiled and interpreted: some 20 ms."""
-USUAL_SIZE = 10
-"""Unknowns above which there are fewer such steps, as the square: large mechanisms get better code at these looks."""
 FIRST_TABLE = 1 << 28
 """Largest table laid out at the start, of which only rows written take memory; it doubles as it fills [bytes]."""
 
@@ -282,7 +280,7 @@ def _settings_now(values: Kernel, manager: ActiveSetManager, asked: Mapping[str,
 def _steps_at_once(stepper: Stepper) -> int:
     """Steps of a call of the kernel; they follow from the size alone, as what is judged between calls must."""
     layout = stepper.mechanism.layout
-    size = max((layout.n + layout.n_rows) // USUAL_SIZE, 1)
+    size = max((layout.n + layout.n_rows) // 10, 1)  # large mechanisms get better code at these looks
     return max(STEPS_AT_ONCE[stepper.compiled] // (size * size), STEPS_AT_ONCE[False])
 
 

@@ -23,8 +23,6 @@ MIN_REFINEMENT = 100.0
 """The least that one allows, over what the pilot does: finer ones would take as long [-]."""
 SLOWER, FASTER = 0.7, 1.5
 """Observed orders over that of the scheme between which errors have its order [-]."""
-MAX_FORESEEN_RATIO = 2.0
-"""Steps that are foreseen over those for which there is room from which a run is refused [-]."""
 
 FIRST_RUN_SHARE = 0.5
 """Local errors of the first run, summed up, over the tolerance [-]."""
@@ -32,12 +30,8 @@ MAX_ERROR_RATIO = 3.0
 """Estimated error over the tolerance above which it counts as missed once repeats are used up [-]."""
 MAX_RUNS = 5
 """Runs in all, unless the last one came much nearer."""
-MAX_IMPROVED_RATIO = 0.5
-"""Error over that of the most accurate run before up to which a run has come nearer [-]."""
 HIGH_ORDER_RATIO = 1.5
 """Order of a scheme over that of its estimate from which runs are much better than their estimates say [-]."""
-ROUND_OFF_POWER = 0.5
-"""Power of a tolerance up to which the error of a run counts that round-off alone keeps from it [-]."""
 REPORTED_GROWTH = 1e3
 """Growth of errors above which a run says so [-]."""
 ADVICE = "ask for less accuracy or a shorter time, or take a scheme of higher order, RungeKutta853 or RadauIIA"
@@ -149,7 +143,7 @@ def _amplifies_round_off(trials: Sequence[Trial], best: Trial, tol: float) -> bo
     """
     own = rounding(best) * float(best.run.stats["steps"])
     stuck = any(is_rounding(trial) for trial in trials)
-    return bool(stuck and own <= tol and best.error <= tol**ROUND_OFF_POWER)
+    return bool(stuck and own <= tol and best.error <= tol**0.5)  # what round-off alone keeps from it
 
 
 def _sensitive(best: Trial, tol: float) -> str:
@@ -185,9 +179,7 @@ def _coming_nearer(trials: Sequence[Trial], tol: float) -> bool:
     """Whether no run is good yet, but the last and finest one is much better than the others."""
     *others, last = trials
     least = min((trial.error for trial in others), default=np.inf)
-    return (
-        last.error > tol and last.allowed <= min(t.allowed for t in others) and last.error < MAX_IMPROVED_RATIO * least
-    )
+    return last.error > tol and last.allowed <= min(t.allowed for t in others) and last.error < 0.5 * least
 
 
 def _outcome(trials: Sequence[Trial], best: Trial, search: Search, problem: str) -> Outcome:
@@ -275,7 +267,7 @@ def _foreseen(
             continue
         steps, settled = _steps(trials, tol, power, order, names)
         last = trials[-1]
-        if steps > MAX_FORESEEN_RATIO * last.room.most:
+        if steps > 2.0 * last.room.most:  # twice as many as there is room for
             stats = last.run.stats
             return trials, last.room.refused(steps, steps / stats["steps"] * stats["wall_seconds"])
         if settled:

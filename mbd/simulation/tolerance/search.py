@@ -42,8 +42,6 @@ SAME_STEPS_REFINEMENT = 1e3
 """How much finer the next run is where two runs took the same steps [-]."""
 ERROR_FLOOR = 1e-6
 """Errors over the tolerance below which they do not tell runs apart [-]."""
-MAX_REFINEMENT = 1e4
-"""Most by which the allowed error shrinks from one run to the next [-]."""
 MAX_STEP_SHARE = 0.25
 """Longest step of a run that is looser than the first ones, over the length of the run [-]."""
 LEAST_ORDER, MOST_ORDER = 0.5, 1.5
@@ -115,7 +113,7 @@ class Search:
         base = under[-1] if under else known[0]
         reach = (goal / base.error) ** (1.0 / self.power)
         # no risk in growing: looser runs are judged by a finer one
-        return float(base.allowed * min(max(reach, 1.0 / MAX_REFINEMENT), 1e10))
+        return float(base.allowed * min(max(reach, 1.0 / 1e4), 1e10))  # by that much at most
 
     # errors ----------------------------------------------------------------------------------------------------------
     def estimated(self, trials: Sequence[Trial]) -> list[Trial]:
