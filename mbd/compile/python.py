@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Matrix, Vector
 from mbd.compile.layout import Layout
 from mbd.errors import UnknownNameError, nearest
 from mbd.tape.derivatives import live
@@ -272,7 +272,7 @@ def array_source(outputs: Sequence[Node]) -> tuple[str, dict[str, int], dict[str
             name, made = f"v{made}", made + 1
         lines.append(f"    {name} = {text}")
         names[node.index] = name
-    lines += [f"    out[{k}][:] = {names[node.index]}" for k, node in enumerate(outputs)]
+    lines += [f"    out[{k}] = {names[node.index]}" for k, node in enumerate(outputs)]
     if len(lines) == 1:
         lines.append("    pass")
     return "\n".join(lines) + "\n", kinds, tables
@@ -294,16 +294,20 @@ class ArrayFunction:
         self._function = _execute(source, _UFUNCS | tables | {"lookup": _lookup}, "results")
 
     def __call__(self, inputs: Mapping[str, Any], parameters: Any) -> list[Vector]:
+        return list(self.lines(inputs, parameters))
+
+    def lines(self, inputs: Mapping[str, Any], parameters: Any) -> Matrix:
+        """The same in one array, (outputs, R)."""
         columns = {kind: self._columns(kind, inputs) for kind in self._kinds if kind != "p"}
         constants = np.asarray(parameters, dtype=float)
         rows = max((len(array) for array in inputs.values()), default=1)
-        results = [np.empty(rows) for _ in range(self.size)]
+        results = np.empty((self.size, rows))
         with np.errstate(all="ignore"):
             for first in range(0, rows, ROWS):
                 part = slice(first, first + ROWS)
                 state = {kind: np.ascontiguousarray(array[:, part]) for kind, array in columns.items()}
                 state["p"] = constants if constants.ndim == 1 else np.ascontiguousarray(constants[part].T)
-                self._function(state, [result[part] for result in results])
+                self._function(state, results[:, part])
         return results
 
     def _columns(self, kind: str, inputs: Mapping[str, Any]) -> Any:

@@ -25,6 +25,7 @@ from mbd.equations.equations import Equations
 from mbd.equations.magnitudes import magnitudes
 from mbd.kernel.algebra.redundancy import JOINT_SHARE, MIN_LIMIT_SHARE
 from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS
+from mbd.results.polynomials import Index
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
 from mbd.tape.derivatives import live
@@ -175,7 +176,7 @@ class Balance:
         The limits are those of frictions (k, n_frictions), the last what anchors would be here (k, n_anchors).
         """
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
-        flat = np.array(self.terms(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source))).T
+        flat = self.terms.lines(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source)).T
         cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
         M, f, R, B, h, rates, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
         last = rest.shape[1] - len(self.equations.frictions)
@@ -329,7 +330,7 @@ def _last_of_R(equations: Equations) -> int:
 _KNOWN: WeakKeyDictionary[Tape, tuple[ArrayFunction, bool]] = WeakKeyDictionary()
 
 
-def put(values: Matrix, where: Flags, new: Matrix | Vector) -> Matrix:
+def put(values: Matrix, where: Flags | Index, new: Matrix | Vector) -> Matrix:
     """The values with some replaced."""
     changed = values.copy()
     changed[where] = new

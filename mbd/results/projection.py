@@ -14,12 +14,15 @@ Newton Methods for Nonlinear Problems, 2.1), the state stays as it was.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.dataclass import dataclass
 from mbd.equal import DIRECT_PIVOT_RTOL, EQUAL_RTOL, ROUND_OFF_RTOL
-from mbd.results.balance import Balance, Flags, Held, saddle
+from mbd.results.balance import Balance, Flags, Held, put, saddle
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
 from mbd.results.record import Rows
@@ -30,6 +33,15 @@ MIN_SINGULAR_VALUE = 0.005
 From `DIRECT_PIVOT_RTOL` on where the rows before and after hold ḣ = 0: nothing but the interpolation is off there.
 Inertia is no part of it: in its metric the rows at the two ends of a light link depend on each other.
 """
+
+
+@dataclass(frozen=True, eq=False)
+class _Mode:
+    """States of one mode: their places among all, the rows that they are led onto, and sizes of these (kept, n)."""
+
+    mine: Index
+    kept: list[int]
+    sizes: Matrix
 
 
 class Projection:
@@ -50,38 +62,48 @@ class Projection:
     @np.errstate(all="ignore")
     def at(self, rows: Rows, places: Places, found: Rows) -> Rows:
         """The states `found` at places between `rows`, on the constraints as far as the rows are."""
-        modes = np.hstack([found.closed.astype(np.int8), found.phase])
-        q, v = found.q.copy(), found.v.copy()
-        inside = places.step > 0.0
-        patterns, group = np.unique(modes, axis=0, return_inverse=True)
-        for number, mode in enumerate(patterns):
-            held = self.balance.rows_in(mode)
-            mine = np.flatnonzero(inside & (group.ravel() == number))
-            if held.kept and len(mine):
-                q[mine], v[mine] = self._led(*self._basis(held), rows, places.part(mine), found.part(mine))
-        return replace(found, q=q, v=v)
+        asked = np.flatnonzero(places.step > 0.0)
+        if not len(asked):
+            return found
+        each = np.hstack([found.closed.astype(np.int8), found.phase])[asked]
+        patterns, group = np.unique(each, axis=0, return_inverse=True)
+        modes = [
+            _Mode(np.flatnonzero(group.ravel() == number), *self._basis(held))
+            for number, held in enumerate(map(self.balance.rows_in, patterns)) if held.kept
+        ]  # fmt: skip
+        if not modes:
+            return found
+        led = self._led(modes, rows, places.part(asked), found.part(asked))
+        return replace(found, q=put(found.q, asked, led.q), v=put(found.v, asked, led.v))
 
-    def _led(self, kept: list[int], sizes: Matrix, rows: Rows, places: Places, found: Rows) -> tuple[Matrix, Matrix]:
-        """q and v on the rows `kept` of one mode, where these are far from vanishing and from being dependent."""
+    def _led(self, modes: list[_Mode], rows: Rows, places: Places, found: Rows) -> Rows:
+        """The states on the rows of their modes, where these are far from vanishing and from being dependent."""
         theta = places.theta[:, None]
-        first, last = (self._missed(kept, rows, places.lower, ends) for ends in (places.lower, places.upper))
+        first, last = (self._missed(rows, places.lower, ends) for ends in (places.lower, places.upper))
         aim, aim_rate = ((1.0 - theta) * a + theta * b for a, b in zip(first, last, strict=True))
-        B = self._rows_at(kept, found)
-        least = np.linalg.svd(B / sizes, compute_uv=False)[:, -1]
-        terms = np.abs(B[:, :, : found.v.shape[1]]) @ np.abs(found.v)[:, :, None]
-        hold = np.all(np.abs(aim_rate) <= EQUAL_RTOL * terms[:, :, 0], axis=1)
-        good = least > np.where(hold, DIRECT_PIVOT_RTOL, MIN_SINGULAR_VALUE)
-        led, before = found, np.full(len(found), np.inf)
+        terms = self.balance.terms_at(found)
+        B, good = np.nan_to_num(terms[3]), np.zeros(len(found), dtype=bool)
+        for mode in modes:
+            mine, own = mode.mine, B[mode.mine][:, mode.kept]
+            least = np.linalg.svd(own / mode.sizes, compute_uv=False)[:, -1]
+            parts = np.abs(own[:, :, : found.v.shape[1]]) @ np.abs(found.v[mine])[:, :, None]
+            hold = np.all(np.abs(aim_rate[mine][:, mode.kept]) <= EQUAL_RTOL * parts[:, :, 0], axis=1)
+            good[mine] = least > np.where(hold, DIRECT_PIVOT_RTOL, MIN_SINGULAR_VALUE)
+        led, before, moving = found, np.full(len(found), np.inf), modes
         for _ in range(3):  # an error of 0.01 is round-off after the third
-            x, sound = self._correction(kept, led, aim)
+            x, sound = self._corrections(moving, terms, aim)
             size = np.max(np.abs(x), axis=1, initial=0.0)
-            good &= sound & ((size < 0.5 * before) | (size <= ROUND_OFF_RTOL))
-            led, before = replace(led, q=self._moved(led.q, x)), size
-            if np.all((size <= ROUND_OFF_RTOL) | ~good):
+            asked = np.concatenate([mode.mine for mode in moving])
+            good[asked] &= (sound & ((size < 0.5 * before) | (size <= ROUND_OFF_RTOL)))[asked]
+            led, before = replace(led, q=put(led.q, asked, self._moved(led.q, x)[asked])), size
+            terms = self.balance.terms_at(led)
+            moving = [mode for mode in moving if not np.all((size <= ROUND_OFF_RTOL)[mode.mine] | ~good[mode.mine])]
+            if not moving:
                 break
-        change, sound = self._correction(kept, led, aim_rate, rates=True)
+        change, sound = self._corrections(modes, terms, aim_rate, rates=True)
         good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)
-        return np.where(good[:, None], led.q, found.q), np.where(good[:, None], found.v + change, found.v)
+        q = np.where(good[:, None], led.q, found.q)
+        return replace(found, q=q, v=np.where(good[:, None], found.v + change, found.v))
 
     def _basis(self, held: Held) -> tuple[list[int], Matrix]:
         """Rows that are independent, and their lengths times the sizes of columns, the largest in the run (kept, n).
@@ -91,9 +113,8 @@ class Projection:
         """
         key = tuple(held.every)
         if key not in self._bases:
-            rows, count = self.balance.states.rows, len(held.kept)
-            chosen = held.every if held.depend else held.kept
-            B = self._rows_at(chosen, rows.part(np.unique(np.linspace(0, len(rows) - 1, 64).astype(np.intp))))
+            chosen, count = held.every if held.depend else held.kept, len(held.kept)
+            B = self._sampled[:, chosen]
             columns = _positive(np.max(np.abs(B / _positive(np.max(np.abs(B), axis=(0, 2)))[:, None]), axis=(0, 1)))
             lengths = _positive(np.max(np.linalg.norm(B / columns, axis=2), axis=0))
             left, picked = B / columns / lengths[:, None], list(range(count))
@@ -106,24 +127,33 @@ class Projection:
             self._bases[key] = [chosen[k] for k in picked], lengths[picked, None] * columns
         return self._bases[key]
 
-    def _rows_at(self, kept: list[int], rows: Rows) -> Matrix:
-        """B (k, kept, n)."""
-        return np.asarray(np.nan_to_num(self.balance.terms_at(rows)[3][:, kept]))
+    @cached_property
+    def _sampled(self) -> Matrix:
+        """B (k, m, n) at 64 rows all over the run, or all of them."""
+        rows = self.balance.states.rows
+        chosen = np.unique(np.linspace(0, len(rows) - 1, 64).astype(np.intp))
+        return np.asarray(np.nan_to_num(self.balance.terms_at(rows.part(chosen))[3]))
 
-    def _missed(self, kept: list[int], rows: Rows, lower: Index, ends: Index) -> tuple[Matrix, Matrix]:
+    def _missed(self, rows: Rows, lower: Index, ends: Index) -> tuple[Matrix, Matrix]:
         """h and ḣ at the ends of intervals, in the mode of the interval."""
         at = rows.part(ends)
         at = replace(at, **{name: getattr(rows, name)[lower] for name in ("closed", "phase", "anchors", "source")})
         _, _, _, _, h, rates, *_ = self.balance.terms_at(at)
-        return h[:, kept], rates[:, kept]
+        return h, rates
 
-    def _correction(self, kept: list[int], rows: Rows, aim: Matrix, rates: bool = False) -> tuple[Matrix, Flags]:
-        """x with B x = −(h − h*), or −(ḣ − ḣ*), and where it is determined."""
+    def _corrections(
+        self, modes: list[_Mode], terms: tuple[Any, ...], aim: Matrix, rates: bool = False
+    ) -> tuple[Matrix, Flags]:
+        """x (k, n_v) with B x = −(h − h*), or −(ḣ − ḣ*), of the rows of each mode, and where it is determined."""
         n_v = self.equations.n_v
-        M, _, _, B, h, speeds, *_ = self.balance.terms_at(rows)
-        B = B[:, kept, :n_v]
-        off = (speeds if rates else h)[:, kept] - aim
-        x, _, _, sound = saddle(M[:, :n_v, :n_v], np.zeros((len(rows), n_v)), np.swapaxes(B, 1, 2), B, off)
+        M, _, _, B, h, speeds, *_ = terms
+        off = (speeds if rates else h) - aim
+        x, sound = np.zeros((len(off), n_v)), np.zeros(len(off), dtype=bool)
+        for mode in modes:
+            mine = mode.mine
+            own, free = B[mine][:, mode.kept, :n_v], np.zeros((len(mine), n_v))
+            solved = saddle(M[mine, :n_v, :n_v], free, np.swapaxes(own, 1, 2), own, off[mine][:, mode.kept])
+            x[mine], _, _, sound[mine] = solved
         return x, sound
 
     def _moved(self, q: Matrix, x: Matrix) -> Matrix:
