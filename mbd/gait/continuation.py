@@ -175,7 +175,7 @@ class Continuation:
             tangent = tangent if float(tangent @ lifted) >= 0.0 else -tangent
         arrival = corrected.found.arrival
         return BranchPoint(
-            corrected.value, corrected.state, arrival.period, way_of(self.map, arrival), arrival.steps,
+            corrected.value, corrected.state, arrival.period, self.map.way_of(arrival), arrival.steps,
             floquet(self.map, chart, derivative, values), tangent, matrix, chart, arrival.events, derivative.how,
         )  # fmt: skip
 
@@ -265,11 +265,3 @@ class Continuation:
             return None
         matrix = self._matrix(derivative, chart.size) + self.member_part(chart, found, derivative, value)
         return matrix, derivative.how
-
-
-def way_of(map_: ReturnMap, arrival: Arrival) -> float:
-    """The way of one application [m]; the sum of its steps where no coordinate tells it, NaN without steps."""
-    if len(arrival.travel):
-        return float(np.linalg.norm(map_.forward * arrival.travel))
-    lengths = [length for _, _, length in arrival.steps]
-    return float(np.sum(lengths)) if lengths else float("nan")

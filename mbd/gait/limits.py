@@ -15,7 +15,7 @@ import numpy as np
 from mbd.dataclass import dataclass
 from mbd.equal import BRACKET_RTOL
 from mbd.errors import MbdError
-from mbd.gait.continuation import NOT_CONVERGED, BranchPoint, Continuation, Corrected, way_of
+from mbd.gait.continuation import NOT_CONVERGED, BranchPoint, Continuation, Corrected
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival
 from mbd.gait.special_points import SpecialPoint
@@ -231,5 +231,5 @@ def _point(given: Continuation, last: BranchPoint, corrected: Corrected | None) 
         )
         return replace(
             last, value=corrected.value, state=corrected.state, period=arrival.period, steps=arrival.steps,
-            distance=way_of(given.map, arrival), multipliers=nothing,
+            distance=given.map.way_of(arrival), multipliers=nothing,
         )  # fmt: skip

@@ -176,6 +176,13 @@ class ReturnMap:
         """For each of these 0 where an application and the next, mirrored, cancel: to the side; else 1."""
         return np.where((self.turned < 0.0) & (self.strides % 2 == 1), 0.0, 1.0)
 
+    def way_of(self, arrival: Arrival) -> float:
+        """The way of one application [m]; the sum of its steps where no coordinate tells it, NaN without steps."""
+        if len(arrival.travel):
+            return float(np.linalg.norm(self.forward * arrival.travel))
+        lengths = [length for _, _, length in arrival.steps]
+        return float(np.sum(lengths)) if lengths else float("nan")
+
     def ahead(self, way: Vector) -> Vector:
         """A vector (3,) without its part across the plane in which the walker is mirrored."""
         if self.mirror is None or self.mirror.reflection is None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
-from mbd.constraints.sampled_law import SampledLaw
 from mbd.dataclass import dataclass
 from mbd.errors import SimulationError
 from mbd.gait.cycle import LimitCycle, residual_by_unit
@@ -19,15 +17,11 @@ from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, mea
 from mbd.gait.newton import FixedPoint, fixed_point
 from mbd.gait.outcome import Outcome
 from mbd.gait.return_map import Arrival, ReturnMap, Values
+from mbd.gait.samples import explain_samples
 from mbd.gait.section import Chart, Section, section_of
 from mbd.state import State
 
 __all__ = ["Failed", "Search", "fallen_first", "first_found", "first_return", "gait_at", "search"]
-
-MAX_STRIDES, MAX_MISSING = 12, 0.03
-"""Strides up to which a whole number of samples is looked for, and the part of one that may be missing [-]."""
-COUNTED_RETURNS = 8
-"""Returns over which the samples of one are counted [-]."""
 
 FIRST_STEPS, HALVINGS = 11.8, 9
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
@@ -151,7 +145,7 @@ def fallen_first(found: LimitCycle, start: State, values: Values) -> LimitCycle:
         return found
     fall = found.map.fall(start, values)
     if fall is None:
-        return replace(found, outcome=_explain_samples(found.outcome, found.map, found.state, values))
+        return replace(found, outcome=explain_samples(found.outcome, found.map, found.state, values))
     return replace(found, outcome=fall, attempts=(fall, *found.attempts))
 
 
@@ -178,18 +172,10 @@ def gait_at(given: Search, point: FixedPoint, values: Values) -> LimitCycle:
     return LimitCycle(
         getattr(map_.model, "name", ""), map_.section, None if map_.mirror is None else map_.mirror.sides, map_.strides,
         state, point.outcome, tuple(point.attempts), arrival.period if arrival and good else float("nan"),
-        _distance(map_.forward * way, arrival) if good else float("nan"), arrival.steps if arrival and good else (),
+        map_.way_of(arrival) if arrival and good else float("nan"), arrival.steps if arrival and good else (),
         residual, tuple(point.residuals), multipliers, derivative, dict(values), map_.dt, map_.runs, chart, map_, way,
         given,
     )  # fmt: skip
-
-
-def _distance(way: Vector, arrival: Arrival | None) -> float:
-    """The way of one application; the sum of its steps where no coordinate tells it."""
-    if len(way):
-        return float(np.linalg.norm(way))
-    lengths = [length for _, _, length in arrival.steps] if arrival is not None else []
-    return float(np.sum(lengths)) if lengths else float("nan")
 
 
 def _multipliers(
@@ -198,40 +184,3 @@ def _multipliers(
     if derivative is None or derivative.missing:
         return Multipliers(np.zeros(0, complex), np.zeros((chart.size, 0), complex), {}, float("nan"))
     return floquet(map_, chart, derivative, values)
-
-
-# Gaits beside samples that come at instants of their own: period and samples must be commensurate.
-#
-# The time to the next sample is part of the state. It comes back where the period of the gait is a whole number of
-# sample periods: the walk falls in with its samples, as an oscillator is entrained by a clock of nearly its own
-# frequency.
-
-
-def _free_samples(model: Any) -> list[SampledLaw]:
-    """Sampled laws whose samples no event restarts."""
-    machines = getattr(model, "machines", ())
-    return [law for law in machines if isinstance(law, SampledLaw) and not law.restart_on]
-
-
-def _explain_samples(outcome: Outcome, map_: ReturnMap, state: State, values: Values) -> Outcome:
-    """The outcome of a search that found no gait, with what samples at instants of their own have to do with it."""
-    laws = _free_samples(map_.model)
-    if not laws or outcome.good:
-        return outcome
-    arrival = map_(state, values, strides=COUNTED_RETURNS)
-    if not arrival.outcome.good:
-        return outcome
-    lasts, texts = arrival.period / COUNTED_RETURNS, []
-    for law in laws:
-        name = f"{law.name}.period"
-        period = float({**getattr(map_.model, "parameters", {}), **map_.plain(values)}.get(name, law.period))
-        count = lasts / period
-        whole = [n for n in range(1, MAX_STRIDES + 1) if abs(n * count - round(n * count)) <= MAX_MISSING]
-        cures = [f"{name!r} = {lasts / max(round(count), 1):.6g} s"]
-        cures += [f"strides={whole[0]}"] if whole and whole[0] != map_.strides else []
-        texts.append(
-            f"samples of {law.name!r} come every {period:.6g} s, {count:.6g} of them in a return of "
-            f"{lasts:.6g} s, where a gait needs a whole number; try {' or '.join(cures)}, or restart_on=, the "
-            "event with which they begin again"
-        )
-    return replace(outcome, text="; ".join([outcome.text, *texts]))

@@ -26,7 +26,8 @@ from mbd.results.orientations import ReadOff, read_off
 from mbd.results.polynomials import Places
 from mbd.results.projection import Projection
 from mbd.results.record import Record, Rows
-from mbd.results.stored_states import StoredStates, is_smooth, turns_to
+from mbd.results.stored_states import StoredStates, is_smooth
+from mbd.results.turning import turns_to
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.compile.python import ArrayFunction, array_function
+from mbd.compile.python import array_function
 from mbd.results.interpolation import Grid
 from mbd.results.record import Record, Rows
+from mbd.results.turning import counted, doubtful, function_of
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations
@@ -24,9 +25,6 @@ ONSET, LEAST = 1e-7, 1e-200
 
 END_RTOL = 8.0 * float(np.finfo(float).eps)
 """How far from the time of the next row a step ends that is taken again up to it, over the time [-]."""
-
-MAX_TURN = 1.0
-"""Change beside that of the rate up to which turns are certain [rad]; it would be π in the middle of two."""
 
 
 class StoredStates:
@@ -68,8 +66,6 @@ class StoredStates:
         """Each expression at each row, (R,)."""
         if not nodes:
             return []
-        from mbd.compile.python import array_function
-
         unique = list({node.index: node for node in nodes}.values())
         values = array_function(unique)(self.all_inputs(rows), self.record.parameters_at(rows.source))
         found = {node.index: value for node, value in zip(unique, values, strict=True)}
@@ -216,7 +212,7 @@ class StoredStates:
         """(name, time) of angles of cut joints whose turns are a guess from some row on."""
         found = []
         for turn, (angle, rate) in zip(self.equations.wrapped, self._turning(self.rows), strict=True):
-            doubts = np.flatnonzero(_doubtful(self.record.time, angle, rate))
+            doubts = np.flatnonzero(doubtful(self.record.time, angle, rate))
             if len(doubts):
                 found.append((turn.name, float(self.record.time[doubts[0]])))
         return found
@@ -228,40 +224,3 @@ def is_smooth(record: Record, plain: bool) -> bool:
     plain : whether q̇ = v, or charts are known in which positions are interpolated
     """
     return plain and record.extension.uses_accelerations
-
-
-# Whole turns of angles of cut joints in space, counted along the stored rows.
-#
-# A rotation shows an angle modulo a turn. Where nothing but a result asks for it, its turns are counted afterwards:
-# from one row to the next it changes by the multiple of 2π that brings it nearest to what its rate says,
-#
-#     Δ ≈ h (r₀ + r₁)/2
-#
-# Where the two differ by more than `MAX_TURN`, the count is a guess, which a note of the run tells.
-
-
-def function_of(turns: Sequence[Any]) -> ArrayFunction:
-    """Angle and rate of each of the turns, one after the other."""
-    return array_function([node for turn in turns for node in (turn.angle, turn.rate)])
-
-
-def counted(time: Vector, angle: Vector, rate: Vector) -> Vector:
-    """Whole turns (R,) to add to an angle at rows so that it is continuous; none at the first."""
-    change, expected = _changes(time, angle, rate)
-    return np.concatenate([[0.0], np.cumsum(np.round((expected - change) / (2.0 * np.pi)))])[: len(time)]
-
-
-def _doubtful(time: Vector, angle: Vector, rate: Vector) -> NDArray[np.bool_]:
-    """Between which rows (R − 1,) the count of a counted angle is a guess."""
-    change, expected = _changes(time, angle, rate)
-    return np.asarray(~(np.abs(change - expected) <= MAX_TURN))
-
-
-def turns_to(angle: Vector, wanted: Vector) -> Vector:
-    """Whole turns to add to angles so that they are nearest to others."""
-    return np.asarray(np.round((wanted - angle) / (2.0 * np.pi)))
-
-
-def _changes(time: Vector, angle: Vector, rate: Vector) -> tuple[Vector, Vector]:
-    """Change of an angle from row to row, and what its rate says."""
-    return np.diff(angle), 0.5 * np.diff(time) * (rate[1:] + rate[:-1])

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.assembly.inertia import alike_islands, islands_of_rows
+from mbd.assembly.islands import alike_islands, islands_of_rows
 from mbd.kernel.algebra.islands import find_islands, gather_island
 from mbd.kernel.algebra.saddle import solve_rows
 from tests.kernel.test_complementarity import random_mass, scene

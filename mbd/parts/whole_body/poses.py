@@ -100,7 +100,8 @@ def place_of(point: Vector3, body: tuple[Rotation, Triple]) -> Triple:
 
 def center_of_mass(places: Mapping[str, tuple[Rotation, Triple]], bodies: Mapping[str, Body]) -> tuple[float, Vector3]:
     """Mass [kg] and center of mass [m] with every joint at zero."""
-    mass, moment = 0.0, ZERO
+    mass = 0.0
+    moment: Triple = ZERO
     for body in bodies.values():
         m = body.fields()["mass"]
         mass += m

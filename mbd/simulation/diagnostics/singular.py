@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbd.arrays import Matrix
-from mbd.assembly.inertia import islands_of_rows
+from mbd.assembly.islands import islands_of_rows
 from mbd.kernel import codes
 
 if TYPE_CHECKING:

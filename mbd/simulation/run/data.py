@@ -20,7 +20,7 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.records import Kernel
 from mbd.results.failure import Failure
 from mbd.results.record import EventRecord
-from mbd.results.stored_states import counted, function_of
+from mbd.results.turning import counted, function_of
 from mbd.simulation.run.boundaries import WINDOW_STEPS, Boundaries
 from mbd.simulation.run.event_log import EventLog
 from mbd.simulation.run.idle import stepper_of
