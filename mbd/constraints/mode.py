@@ -37,7 +37,7 @@ class Transition:
     after : time in the state after which it happens [s], > 0; a number is the parameter '<name of the mode>.<source>
         to <target>.after', a text the name of a parameter or quantity, whose value as time passes
         counts. A time that is not positive as the state is entered is due at once, also in the first state of a run;
-        so is one that has ended before a run begins, with other parameters.
+        so is one that has ended before a run begins, with another state or other parameters.
         Of timers of one state that end together the first is taken: two of equal length are an error
     only_while : it happens only while this holds at its instant: a contact is closed ('right foot'), another mode is
         in a state ('other: stance'), or a measure is positive. Where it does not hold, the instant has passed: a timer

@@ -346,6 +346,24 @@ def test_a_timer_that_has_ended_when_a_run_begins_is_due_at_once(condition: Any)
         assert max((run.time - run["law.u"])[run.time > time]) < 0.25 + 1e-9
 
 
+@pytest.mark.parametrize("backend", ["llvm", "python"])
+@pytest.mark.parametrize("height", [9.0, 0.6, 0.2])
+def test_a_timer_of_a_quantity_that_is_shorter_than_its_state_has_lasted_is_due_at_once(
+    height: float, backend: str
+) -> None:
+    """One that is longer ends as the quantity says, while the ball falls."""
+    model, _ = hopper()
+    ways = [mbd.Transition("a", "b", after="rail.displacement"), mbd.Transition("b", "a", after=9.0)]
+    model.apply(mbd.Mode("clock", ("a", "b"), transitions=ways))
+    start = replace(mbd.assemble(model, {"rail.displacement": 9.0}), time=0.3)
+    begun = replace(start, q=np.array([height]))
+    run = mbd.simulate(model, begun, mbd.RungeKutta853(), dt=0.01, until=0.6, backend=backend)
+    found = [event.time for event in run.events if event.name == "clock: a to b"]
+    left = max(height - 0.3, 0.0)  # of which the quantity loses g t²/2
+    ends = 0.3 + (np.sqrt(1.0 + 2.0 * 9.81 * left) - 1.0) / 9.81
+    assert found == pytest.approx([] if height > 8.0 else [ends], abs=1e-12)
+
+
 def test_transitions_without_end_are_named() -> None:
     model, start = hopper()
     model.constrain(

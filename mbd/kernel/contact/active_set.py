@@ -171,7 +171,7 @@ class ActiveSetManager:
             "guard_target": [-1 if each is None else each.target for _, each in own],
             "guard_fires": [int(each is not None and ("event", e) in each.causes) for e, each in own],
             "guard_timed": [
-                0 if each is None else each.timed + (2 + 4 * each.is_unconditional) * self.guards[e].is_timer
+                0 if each is None else each.timed * (1 + 2 * each.is_unconditional + 4 * self.guards[e].is_timer)
                 for e, each in own
             ],
             "guard_kink": [int(guard.is_kink) for guard in self.guards],

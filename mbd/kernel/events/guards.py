@@ -86,7 +86,7 @@ def is_waiting(K: Guards, e: int) -> bool:
     if m < 0:
         return True
     return bool(
-        K.guard_fires[e] == 1 and K.guard_timed[e] < 2 and int(K.anchors[K.machine_start[m]]) == K.guard_source[e]
+        K.guard_fires[e] == 1 and K.guard_timed[e] < 4 and int(K.anchors[K.machine_start[m]]) == K.guard_source[e]
     )
 
 

@@ -114,7 +114,7 @@ def handle_event(K: Kernel) -> int:
     at_start = K.event_after <= 0.0 and K.stabilized == 0 and (kind == OPEN_FORCE or kind == OPEN_PULL)
     if at_start:  # the accepted row, which does not pull, is the one before
         store_row(K)
-    timed = K.n_machines > 0 and kind == CROSS and K.guard_timed[index] >= 2
+    timed = K.n_machines > 0 and kind == CROSS and K.guard_timed[index] >= 4
     accept_for_restart(K, K.due_time if timed else K.time + K.event_after)
     if same_instant(K):
         return CHATTER

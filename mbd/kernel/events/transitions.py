@@ -37,8 +37,9 @@ def find_due(K: Guards) -> None:
         if K.side[e] > 0.0:  # it has passed while its condition did not hold
             continue
         due = K.time - min(K.guards0[K.at_user + e], 0.0)
-        if K.guard_timed[e] == 1 and (not begins_now(K, e) or due - K.time > 8.0 * EPS * max(abs(K.time), K.step)):
-            continue  # its instant moves, and is located as that of any guard
+        if K.guard_timed[e] < 4 and not (K.side[e] < 0.0 and K.guards0[K.at_user + e] > 0.0):
+            if not begins_now(K, e) or due - K.time > 8.0 * EPS * max(abs(K.time), K.step):
+                continue  # its instant moves, and is located as that of any guard
         if K.due_guard < 0 or due < K.due_time:
             K.due_time = due
             K.due_guard = e

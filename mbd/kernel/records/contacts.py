@@ -75,7 +75,7 @@ class Events(SchemeAbilities):
     guard_source: Integers = integers()  # the state that it leaves
     guard_target: Integers = integers()  # and enters
     guard_fires: Integers = integers()  # 1: it happens as its guard crosses zero, 0: as something else happens
-    guard_timed: Integers = integers()  # 1: by after=, + 2: a step ends at its instant, + 4: without condition
+    guard_timed: Integers = integers()  # 1: by after=, + 2: without condition, + 4: a step ends at its instant
     guard_kink: Integers = integers()  # 1: a step ends at it, and nothing tells of it
     guard_contact: Integers = integers()  # that must be closed for it, −1 for none
     causes: Integers = integers()  # of each transition, a list of marks that make it happen

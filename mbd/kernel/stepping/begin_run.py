@@ -124,8 +124,8 @@ def set_side(K: Switching, e: int) -> None:
     refresh_scales(K)
     doubt = guard_round_off(K, e, K.time, K.q, K.y)
     timed = K.guard_timed[e] if K.n_machines > 0 else 0
-    late = timed >= 4 and value > 0.0 and int(K.anchors[K.machine_start[K.guard_machine[e]]]) == K.guard_source[e]
-    if late or (abs(value) <= doubt and timed >= 2) or (timed % 2 == 1 and begins_now(K, e)):
+    late = timed % 4 == 3 and value > 0.0 and int(K.anchors[K.machine_start[K.guard_machine[e]]]) == K.guard_source[e]
+    if late or (abs(value) <= doubt and timed >= 4) or (timed % 2 == 1 and begins_now(K, e)):
         value = -1.0  # a timer that is due, or was before a parameter or the time was changed
     elif abs(value) <= doubt:
         value = rate if abs(rate) * K.step > doubt else 0.0

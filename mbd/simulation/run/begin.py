@@ -154,9 +154,9 @@ def set_side(run: RunData, e: int, guards: Vector) -> None:
     value, rate = guards[4 * n_contacts + e], guards[4 * n_contacts + n_guards + e]
     doubt = run.stepper.guard_round_off(e)
     v, timed = run.kernel, int(run.kernel.guard_timed[e]) if run.manager.machines else 0
-    late = timed >= 4 and value > 0.0 and int(v.anchors[v.machine_start[v.guard_machine[e]]]) == v.guard_source[e]
+    late = timed % 4 == 3 and value > 0.0 and int(v.anchors[v.machine_start[v.guard_machine[e]]]) == v.guard_source[e]
     begins = timed % 2 == 1 and v.anchors[v.machine_start[v.guard_machine[e]] + 1] == v.time  # with this state
-    if late or (abs(value) <= doubt and timed >= 2) or begins:
+    if late or (abs(value) <= doubt and timed >= 4) or begins:
         value = -1.0  # a timer that is due, or was before a parameter or the time was changed
     elif abs(value) <= doubt:
         value = rate if abs(rate) * run.kernel.step > doubt else 0.0
