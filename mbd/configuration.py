@@ -174,20 +174,22 @@ class Configuration:
 
     def misplaced(self, q: Vector, tolerance: float) -> list[str]:
         """What is wrong with coordinates (n_q,) that no placement has, one phrase for each joint."""
-        found, values = list[str](), np.asarray(q, dtype=float).tolist()
+        found: list[str] = []
+        values = np.asarray(q, dtype=float).tolist() if self.charts else []
         for joint, first, _ in self.charts:
             own = values[first : first + len(joint.labels)]
-            names = ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
             try:
                 near = [float(each) for each in joint.normalise(own)]
             except ZeroDivisionError:  # all parts of a quaternion are zero, or so small that their squares are
                 given = ", ".join(f"{x:.9g}" for x in own[joint.adding :])
+                names = ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
                 found.append(
                     f"{names} = {given}, which is no orientation: a quaternion has length 1, such as (1, 0, 0, 0)"
                 )
                 continue
             if not all(abs(a - b) <= tolerance for a, b in zip(near, own, strict=True)):
                 given, shown = (", ".join(f"{x:.9g}" for x in each[joint.adding :]) for each in (own, near))
+                names = ", ".join(map(repr, joint.coordinate_names[joint.adding :]))
                 found.append(f"{names} = {given}, which no placement of {joint.known_as} has; the nearest are {shown}")
         return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -252,7 +252,7 @@ def malformed(state: State) -> list[str]:
     """
     faults = [
         f"the {name} of the start must be an array of numbers (n,), not {_shown(value)}"
-        for name, value in ((name, getattr(state, name)) for name in ("q", "v", "z", "anchors"))
+        for name, value in (("q", state.q), ("v", state.v), ("z", state.z), ("anchors", state.anchors))
         if not _is_vector(value)
     ]
     closed = state.mode.closed if isinstance(state.mode, Mode) else None
@@ -262,7 +262,7 @@ def malformed(state: State) -> list[str]:
         faults.append(f"armed of the start must be None or a frozenset of names of contacts, not {_shown(state.armed)}")
     for name in ("names", "velocity_names"):
         value = getattr(state, name)
-        if not isinstance(value, tuple) or not all(isinstance(one, str) for one in value):
+        if not isinstance(value, tuple) or not _are_words(value):
             faults.append(f"{name} of the start must be a tuple of names, not {_shown(value)}")
     if not isinstance(state.parameters, Mapping):
         faults.append(f"parameters of the start must map names to numbers, not {_shown(state.parameters)}")
@@ -288,7 +288,12 @@ def _is_vector(value: Any) -> bool:
 
 def are_names(value: Any) -> bool:
     """Whether a value is a set of names."""
-    return isinstance(value, set | frozenset) and all(isinstance(one, str) for one in value)
+    return isinstance(value, set | frozenset) and _are_words(value)
+
+
+def _are_words(values: Iterable[Any]) -> bool:
+    """Whether all values are strings."""
+    return {str}.issuperset(map(type, values)) or all(isinstance(one, str) for one in values)
 
 
 def _shown(value: Any) -> str:

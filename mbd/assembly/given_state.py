@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -92,7 +93,7 @@ def _bad_values(start: State, equations: Equations) -> list[str]:
     """Numbers of a state that are not finite, or that no posture has."""
     bad = (
         []
-        if np.isfinite(np.concatenate([start.q, start.v, start.z, start.anchors])).all()
+        if all(map(math.isfinite, np.concatenate([start.q, start.v, start.z, start.anchors]).tolist()))
         else _not_finite(start, equations)
     )
     bad += [f"the start has {fault}; take whole turns away" for fault in beyond_angles(equations, start.q)]
@@ -113,7 +114,7 @@ def _not_finite(start: State, equations: Equations) -> list[str]:
 
 def beyond_angles(equations: Equations, q: Vector) -> list[str]:
     """Which angles of a position (n_q,) are too large, one phrase each."""
-    if not np.abs(q).max(initial=0.0) > MAX_ANGLE:
+    if not np.maximum.reduce(np.abs(q), initial=0.0) > MAX_ANGLE:
         return []
     return [
         f"{coordinate.name!r} = {value:.6g} rad, where neighbouring numbers are {np.spacing(abs(value)):.2g} rad apart"

@@ -57,6 +57,5 @@ class Energies:
         rows = len(inputs["t"])
         if self._machine is None or self.calls <= MIN_CALLS or rows > MIN_STATES:
             return self._arrays(inputs, parameters)
-        given = {kind: inputs[kind] for kind in (self.kinds | {"t"}) & inputs.keys()}
-        out = at_inputs(self._function, self._layout, given, parameters)
+        out = at_inputs(self._function, self._layout, inputs, parameters)
         return [out[:, 0].copy(), out[:, 1].copy()]

@@ -38,7 +38,7 @@ import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 
-from mbd.arrays import Vector
+from mbd.arrays import Vector, address_of
 from mbd.compile.background import submit, wake
 from mbd.compile.cache import ObjectCache, default_cache, key_of
 from mbd.compile.forking import COMPILING
@@ -134,16 +134,13 @@ _FLOAT = np.dtype(np.float64)
 
 
 def _pointer(array: Any) -> int:
-    """Where the numbers of an array begin (faster than ``array.ctypes.data``)."""
+    """Where the numbers of an array begin."""
     if array.dtype != _FLOAT or not array.flags.c_contiguous:
         raise TypeError(
             f"compiled code takes contiguous arrays of float64; this one has dtype {array.dtype} and "
             f"strides {array.strides}: use numpy.ascontiguousarray(array, dtype=float)"
         )
-    if array.size and array.flags.writeable:
-        return ctypes.addressof(ctypes.c_double.from_buffer(array))
-    address: int = array.ctypes.data
-    return address
+    return address_of(array)
 
 
 def call(address: int) -> Callable[[Vector, Vector, Vector], None]:

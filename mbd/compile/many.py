@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mbd.arrays import Matrix, Vector
+from mbd.arrays import Matrix, Vector, address_of
 from mbd.compile.backend import Function
 from mbd.compile.layout import Layout
 
@@ -75,10 +75,12 @@ def at_blocks(function: Function, blocks: Matrix, parameters: Vector | Matrix, o
             function(blocks[k], parameters[k] if several else parameters, out[k])
         return out
     if rows:
-        function(blocks[0].copy(), (parameters[0] if several else parameters).copy(), out[0])  # which checks sizes
+        # what is made at its first call is called, as nothing may be raised through machine code
+        check = getattr(function, "require_room", function)
+        check(blocks[0], parameters[0] if several else parameters, out[0])
         _loop()(
-            function.address, rows, blocks.ctypes.data, blocks.shape[1], parameters.ctypes.data,
-            parameters.shape[1] if several else 0, out.ctypes.data, out.shape[1],
+            function.address, rows, address_of(blocks), blocks.shape[1], address_of(parameters),
+            parameters.shape[1] if several else 0, address_of(out), out.shape[1],
         )  # fmt: skip
     return out
 

@@ -28,6 +28,7 @@ class Postponed:
         self._made: Any = None
         self._lock = threading.Lock()
         self._entry = _ENTRY(self._called)
+        self._entry_address = ctypes.cast(self._entry, ctypes.c_void_p).value or 0
         self.raised: BaseException | None = None
 
     @property
@@ -45,7 +46,7 @@ class Postponed:
         """Where a call goes: to the code, or to what makes it."""
         if self._made is not None:
             return int(self._made.address)
-        return ctypes.cast(self._entry, ctypes.c_void_p).value or 0
+        return self._entry_address
 
     def __call__(self, block: Vector, parameters: Vector, out: Vector) -> None:
         self._function()(block, parameters, out)

@@ -39,16 +39,37 @@ def test_a_run_after_others_is_the_same(seed, scheme, contact):
     base = mbd.assemble(model)
     starts = [mbd.assemble(model, velocity={n: rng.uniform(-1, 1) for n in base.velocity_names}) for _ in range(2)]
 
-    def run(start):
-        return mbd.simulate(model, start, scheme, dt=0.01, until=0.4, contact=contact, on_failure="return")
+    def run(start, parameters=None):
+        return mbd.simulate(
+            model, start, scheme, dt=0.01, until=0.4, contact=contact, on_failure="return", parameters=parameters
+        )
 
+    inputs = [each for each in mechanism_of(model).equations.parameters if each.value]
     new = run(starts[0])
-    other = run(starts[1])
+    other = run(starts[1], {each.name: 1.01 * each.value for each in inputs[:1]})
     again = run(starts[0])  # in the arrays of the last one
     if new.success and other.success:
         compared()
     if new.success:
         assert_same(new, again)
+
+
+def test_a_mechanism_with_one_mode_is_not_asked_for_it(monkeypatch):
+    """Its start is judged, then come the steps, and the last one: nothing else enters the kernel."""
+    model = mbd.Model("pendulum")
+    rod = mbd.Link("rod", 1.0, 1.0, 0.5, 0.1)
+    model.connect(mbd.Revolute("hinge", model.ground.origin, rod.start))
+    start, enter, calls = mbd.assemble(model, position={"hinge.angle": 0.3}), stepper.Stepper._enter, []
+
+    def counted(self, address):
+        calls.append(address)
+        return enter(self, address)
+
+    monkeypatch.setattr(stepper.Stepper, "_enter", counted)
+    for _ in range(2):
+        calls.clear()
+        run = mbd.simulate(model, start, dt=1e-3, until=0.1)
+        assert (len(calls), run.stats["modes"], run.stats["steps"]) == (3, 1, 100)
 
 
 def test_arrays_are_taken_and_given_back():

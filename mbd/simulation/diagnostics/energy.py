@@ -139,12 +139,13 @@ class EnergyWatch(EnergyFindings):
         if self.problem or run.stored < 2 or run.kernel.n_v == 0:
             return self.problem
         self._look(run)
-        if np.isinf(self._seen[:, 0]).any():
-            self._overflow(run)
-            return self.problem
-        if np.isnan(self._seen[:, 1]).any():
-            self._undefined(run)
-            return self.problem
+        if not np.isfinite(self._seen).all():
+            if np.isinf(self._seen[:, 0]).any():
+                self._overflow(run)
+                return self.problem
+            if np.isnan(self._seen[:, 1]).any():
+                self._undefined(run)
+                return self.problem
         if not self._is_suspicious(run):
             return ""
         from mbd.results.energy import doubted_ledger  # few runs come here
@@ -167,14 +168,16 @@ class EnergyWatch(EnergyFindings):
         last = run.stored - 1
         first, early = min(self._upto, last), EARLY if self._judgements == 0 else ()
         if last - first < SPREAD:  # all of them
-            chosen = np.arange(first, last + 1, dtype=np.intp)
+            chosen: slice | NDArray[np.intp] = slice(first, last + 1)
         else:
             spread = {first + k * (last - first) // (SPREAD - 1) for k in range(SPREAD)}
             chosen = np.array(sorted(spread.union(row for row in early if row <= last)), dtype=np.intp)
         kinetic, potential = self._energies(run, chosen)
         places = run.table[chosen, 1 : 1 + run.kernel.n_q]
-        way = _way(places, run.table[0, 1 : 1 + run.kernel.n_q])
-        self._seen = np.concatenate([self._seen, np.array([kinetic, potential, way]).T])
+        seen = np.empty((len(places), 3))
+        seen[:, 0], seen[:, 1] = kinetic, potential
+        seen[:, 2] = _way(places, run.table[0, 1 : 1 + run.kernel.n_q])
+        self._seen = np.concatenate([self._seen, seen]) if len(self._seen) else seen
         self._upto, self._due, self._judgements = run.stored, 4 * max(self._due, run.stored // 4), self._judgements + 1
 
     def _lifted(self, run: RunData) -> float:
@@ -187,12 +190,12 @@ class EnergyWatch(EnergyFindings):
         before, until = np.split(kinetic + potential, 2)
         return float(np.sum(np.maximum(until - before, 0.0)))
 
-    def _energies(self, run: RunData, chosen: NDArray[np.intp]) -> tuple[Vector, Vector]:
-        """T and V at stored rows [J]."""
+    def _energies(self, run: RunData, chosen: slice | NDArray[np.intp]) -> tuple[Vector, Vector]:
+        """T and V at stored rows [J], a slice or an array of their numbers."""
         table, parameters = run.table[chosen], run.first_parameters
         if run.parameter_changes:
-            parameters = record_of(run, table).parameters_at(chosen)
-        self.rows += len(chosen)
+            parameters = record_of(run, table).parameters_at(np.arange(len(run.table))[chosen])
+        self.rows += len(table)
         energies = run.mechanism.energies
         kinetic, potential = energies(inputs_of(run, table, energies.kinds), parameters)
         return kinetic, potential
@@ -230,18 +233,18 @@ class EnergyWatch(EnergyFindings):
     def _is_suspicious(self, run: RunData) -> bool:
         """Whether only the ledger can tell that the energies seen are right."""
         kinetic, potential, way = self._seen.T
-        if way.max() <= MIN_MOTION:
+        if np.maximum.reduce(way) <= MIN_MOTION:
             return False
         total = kinetic + potential
         fallen = np.maximum.accumulate(potential[0] - potential)
-        noise = EQUAL_RTOL * np.abs(self._seen[:, :2]).max()
+        noise = EQUAL_RTOL * np.maximum.reduce(np.abs(self._seen[:, :2]), axis=None)
         owned = kinetic[0] + fallen
         rise = total - total[0]
         risen = ~(rise <= np.maximum(_telling_gain(run) * owned + noise, 2.0 * self._cleared))  # NaN is strange too
         sunk = rise < -REPORTED_SHARE * owned[-1] - noise
         if run.kernel.strategy == 1 and self._lifted(run) > REPORTED_NONSMOOTH_GAIN * float(np.max(owned)) + noise:
             return True
-        if not (risen.any() or sunk.any()):
+        if not (risen | sunk).any():
             return False
         kinds = kinds_of(run.mechanism)
         if kinds <= UNDRIVEN:
@@ -259,7 +262,7 @@ def _telling_gain(run: RunData) -> float:
 
 def _way(q: Vector, start: Vector) -> Vector:
     """The largest way of a coordinate from the start, at each row (R,) [m, rad]."""
-    return np.asarray(np.abs(q - start).max(axis=1, initial=0.0))
+    return np.asarray(np.maximum.reduce(np.abs(q - start), axis=1, initial=0.0))
 
 
 def _swing(values: Vector) -> Vector:

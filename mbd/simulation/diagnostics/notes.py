@@ -92,7 +92,7 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     """The notes of a run that is over, and those of them that put its result in doubt."""
     equations = run.mechanism.equations
     notes: list[Note] = [*_doubts(run)]
-    if np.abs(run.start.q).max(initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
+    if np.maximum.reduce(np.abs(run.start.q), initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
         notes = [*degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))), *notes]
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
     notes.append(_redundancy(run, record) if run.stepper.dependent else singular_start(run))
@@ -156,9 +156,10 @@ def _doubts(run: RunData) -> list[str]:
 
 def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]:
     """Muscles that push: out of equilibrium as the run begins, or on a path shorter than their tendon alone."""
-    slack, short, forces = list[str](), list[str](), getattr(run.model, "forces", ())
+    forces = getattr(run.model, "forces", ())
     if not forces:
         return [], []
+    slack, short = list[str](), list[str]()
     from mbd.forces.muscles import Muscle
 
     muscles = [force for force in forces if isinstance(force, Muscle)]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbd.arrays import address_of
 from mbd.kernel.records import TABLE, Kernel
 
 PLACES = {name: place for place, name in enumerate(TABLE.addresses)}
@@ -64,11 +65,11 @@ class CallTable:
             self._words[WHOLE] = _whole(values)
         REALS.pack_into(self._bytes, INTEGERS.size, *_real(values))
         for name in kernel.renewed:
-            self._words[PLACES[name]] = values[name].ctypes.data
+            self._words[PLACES[name]] = address_of(values[name])
         self.renewed |= kernel.renewed
         kernel.renewed.clear()
         if len(functions) != len(self._code):
             self._code = np.array(
                 [0 if function is None else function.address for function in functions], dtype=np.int64
             )
-            self._words[PLACES["code"]] = self._code.ctypes.data
+            self._words[PLACES["code"]] = address_of(self._code)

@@ -203,8 +203,8 @@ class RunData:
                 rows[0, 0] = self.start.time
             self.table[self.stored : self.stored + count] = rows
             if self.stored:  # the kernel compares with rows of the same call
-                change = np.abs(rows[0] - self.table[self.stored - 1])[1 : 1 + v.n_q]
-                v.row_bounds[0] = np.max(change, initial=v.row_bounds[0])
+                change = np.abs(rows[0, 1 : 1 + v.n_q] - self.table[self.stored - 1, 1 : 1 + v.n_q])
+                v.row_bounds[0] = np.maximum.reduce(change, initial=v.row_bounds[0])
         self.stored += count
         v.n_stored = v.n_logged = 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -20,6 +21,7 @@ __all__ = ["carry_on", "memory_of", "memory_of_end", "take_up", "without_memory"
 
 OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "rest_speed", "backend")
 """Settings that a memory depends on."""
+_options = itemgetter(*OPTIONS)
 
 
 class Unseen:
@@ -66,11 +68,11 @@ def belongs(run: RunData, contact: str = "") -> tuple[str, ...]:
     """
     integrator, equations = run.stepper.integrator, run.mechanism.equations
     kind, settings = type(integrator), run.settings if not contact else {**run.settings, "contact": contact}
-    asked = tuple(f"{name} {settings[name]!r}" for name in OPTIONS)
+    asked = tuple(map(repr, _options(settings)))
     known = run.stepper.words  # the rest follows from the stepper
     if asked not in known:
         words = [f"{kind.__module__}.{kind.__qualname__}", repr(integrator), f"compiled {run.stepper.compiled}"]
-        words += [*asked, f"mbd {settings['versions']['mbd']}"]
+        words += [*map(" ".join, zip(OPTIONS, asked, strict=True)), f"mbd {settings['versions']['mbd']}"]
         words += [f"{name} {len(getattr(run.kernel, name))}" for name in (*TABLE.kept_reals, *TABLE.kept_integers)]
         words += [row.title for row in equations.rows] + run.manager.names
         known[asked] = (*words, *(guard.name for guard in run.manager.guards))

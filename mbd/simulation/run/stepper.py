@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -70,9 +70,10 @@ class InitialArrays:
             self._places = [np.flatnonzero(room) for room in rooms]
             self._numbers = [room[places] for room, places in zip(rooms, self._places, strict=True)]
 
-    def let_go(self, kernel: Kernel) -> None:
-        """Put the record back, without whatever arrays a run has put into it."""
+    def let_go(self, kernel: Kernel, renewed: Iterable[str] = ()) -> None:
+        """Put the record back, without whatever arrays a run has put into it, some of those with names in `renewed`."""
         values = vars(kernel)
+        kernel.renewed.update(name for name in renewed if values[name] is not self._values[name])
         values.clear()
         values.update(self._values)
 
@@ -155,17 +156,19 @@ class Stepper:
     def let_go(self) -> None:
         """Keep no arrays but those of its own while nobody runs."""
         assert self._fresh is not None
-        self._fresh.let_go(self.kernel)
+        self._fresh.let_go(self.kernel, () if self._table is None else self._table.renewed)
 
     def begin_again(self, parameters: Vector, end: float) -> None:
         """Make everything as it was before the run that is over, but for parameters and the end of the next one."""
         assert self._fresh is not None
         v = self.kernel
         self._fresh.restore(v, self.shelves.rooms)
-        v.renewed |= set() if self._table is None else self._table.renewed
         del self.functions[len(self.functions) - self._n_of_modes :]
         self._n_of_modes, self.modes, self.dependent, v.n_modes = 0, [], {}, 0
-        v.params = np.ascontiguousarray(parameters, dtype=float) if len(parameters) else np.zeros(1)
+        if len(parameters) == len(v.params):
+            v.params[:] = parameters
+        elif len(parameters):
+            v.params = np.ascontiguousarray(parameters, dtype=float)
         self.system.parameters, v.end, self.resumed_at = v.params, end, float("nan")
         if self._table is not None:
             self._table.forget_code()
@@ -341,6 +344,8 @@ class Stepper:
         if v.n_kkt >= MIN_UNKNOWNS and v.n_modes == 0 and v.orders[0] == 0:
             order = self.mechanism.order(self.manager.active_rows(v.closed[: v.n_contacts]))
             v.orders = v.orders if order is None else np.concatenate([[1], order])
+        if v.n_modes == 0 and not (v.n_rows or v.n_contacts or v.n_frictions):
+            self.add_mode()  # the only one there is, which the kernel need not ask for
         if v.auto:
             v.strategy = int(v.fallback > 0)
         # parts in which a step of a scheme of order 3 or more is looked at for guards

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbd.arrays import Matrix
+from mbd.arrays import Matrix, read_only
 from mbd.results.balance import Balance
 from mbd.results.record import EventRecord, Record
 from mbd.results.stored_states import StoredStates
@@ -32,13 +32,15 @@ def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -
 
 def inputs_of(run: RunData, table: Matrix, kinds: Collection[str]) -> dict[str, Any]:
     """Rows of the kernel as inputs of some kinds, time among them, of energies, with the anchors of now."""
-    parts = columns_of(run, table)
-    named = {"t": parts["time"], "switch": parts["closed"]} | parts
+    columns = {"switch": "closed"}
+    places = run.stepper.columns
+    named = {kind: table[:, places[columns.get(kind, kind)]] for kind in kinds if columns.get(kind, kind) in places}
     if "anchor" in kinds:
         named["anchor"] = run.kernel.anchors[: run.kernel.n_anchors].reshape(1, -1).repeat(len(table), axis=0)
     if "slip" in kinds:
-        named["slip"] = parts["phase"] * (np.abs(parts["phase"]) == 1.0)
-    return {kind: named[kind] for kind in ("t", *kinds) if kind in named}
+        phase = table[:, places["phase"]]
+        named["slip"] = phase * (np.abs(phase) == 1.0)
+    return {"t": table[:, 0], **named}
 
 
 def columns_of(run: RunData, table: Matrix) -> dict[str, Any]:
@@ -61,7 +63,7 @@ def whole_record(run: RunData) -> Record:
     """All rows and events until now, without a verdict."""
     last = run.stored - 1  # a run that failed right at an event has no row after it
     events = [event if event.row <= last else replace(event, row=last) for event in run.events]
-    return record_of(run, run.table[: run.stored], events)
+    return record_of(run, read_only(run.table[: run.stored]), events)
 
 
 def ended_record(run: RunData) -> Record:
