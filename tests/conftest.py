@@ -111,10 +111,23 @@ def older_objects_left_alone():
     gc.freeze()
 
 
+MECHANISMS_KEPT = 32
+"""How many mechanisms of a file wait for its next test; most are small."""
+LAST_FILE = [None]
+"""Whose test came last."""
+
+
 @pytest.fixture(autouse=True)
-def _no_mechanisms_of_other_tests():
-    """Tests replace parts of the library itself, which a mechanism that another test has derived would not show."""
-    if known := sys.modules.get("mbd.compile.mechanisms"):
+def _no_mechanisms_of_other_files(request):
+    """Tests of a file share what they derive, but those that replace parts of the library itself derive their own."""
+    replaces = "monkeypatch" in request.fixturenames
+    known = sys.modules.get("mbd.compile.mechanisms")
+    if known and (replaces or request.node.path != LAST_FILE[0]):
+        known._BY_WORDS.clear()
+        known.MAX_KEPT_BY_WORDS = MECHANISMS_KEPT
+    LAST_FILE[0] = request.node.path
+    yield
+    if replaces and (known := sys.modules.get("mbd.compile.mechanisms")):
         known._BY_WORDS.clear()
 
 

@@ -99,7 +99,7 @@ def listed(monkeypatch):
             without_step,
             r"'wrong': expected a function step\(K, h, t1\) of a module as its 'step', got without_step\(K",
         ),
-        (with_swapped_arguments, r"got with_swapped_arguments\(K: 'Kernel', t1: 'float', h: 'float'\), tests/kernel"),
+        (with_swapped_arguments, r"got with_swapped_arguments\(K: .*Kernel, t1: float, h: float\), tests/kernel"),
         (with_an_int, "one whose 'h' is 'int' in place of 'float', tests/kernel/test_wrong_schemes.py:"),
         (without_status, "one whose 'return' is 'None' in place of 'int'"),
         (lambda K, h, t1: 0, "got <function <lambda>"),

@@ -61,7 +61,7 @@ def complaints(run: mbd.Trajectory) -> list[str]:
     floor = 1e-8 * size + (_located_roughly(run) if run.settings["locate"] == "linear" else 0.0)
     if max(held.length, held.angle) > floor:
         found.append(f"rows do not hold: {held}")
-    return found + _ledger(run) + _penetration(run, floor) + _friction(run)
+    return found + _ledger(run) + _gifts(run) + _penetration(run, floor) + _friction(run)
 
 
 def _extent(run: mbd.Trajectory) -> float:
@@ -86,6 +86,25 @@ def _ledger(run: mbd.Trajectory) -> list[str]:
     if run.settings["contact"] == "events" and gained > 1e-9 * largest:  # non-smooth steps lift bodies too
         return [f"an impact gives {gained:.3g} J, the largest kinetic energy is {largest:.3g} J"]
     return []
+
+
+PASSIVE = ("joint loss", "damper", "friction", "impact")
+
+
+def _gifts(run: mbd.Trajectory) -> list[str]:
+    """Passive parts that give more energy than they take, unless the run failed or doubts its own energy.
+
+    In non-smooth steps frictions of joints lag by a step.
+    """
+    if not run.success or run.settings["contact"] == "nonsmooth" or "numerical energy" in run.message:
+        return []
+    size = 1.0 + float(np.max(run.energy.kinetic))
+    gains = {
+        part.name: float(np.max(part.energy - part.energy[0]))
+        for part in run.energy.parts
+        if part.kind in PASSIVE and not part.withheld
+    }
+    return [f"{name!r} gives {gain:.3g} J" for name, gain in gains.items() if gain > 1e-9 * size]
 
 
 def _penetration(run: mbd.Trajectory, floor: float) -> list[str]:

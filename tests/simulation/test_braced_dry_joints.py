@@ -35,11 +35,12 @@ def braced(seed: int, cut: str, speed: float) -> tuple[mbd.Model, mbd.State]:
     return model, mbd.assemble(model, dict(zip(("hip.angle", "pin.angle"), angles, strict=True)), closed="foot")
 
 
+@pytest.mark.parametrize("seeds", [range(17, 36, 3), pytest.param(range(17, 36), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("cut", ["", "all"])
-def test_a_steady_carriage_changes_no_force_and_no_friction(cut):
+def test_a_steady_carriage_changes_no_force_and_no_friction(cut, seeds):
     """Galileo: what is braced in a carriage at steady speed bears the forces that it bears at rest, without events."""
     compared = 0
-    for seed in range(17, 36):
+    for seed in seeds:
         scheme = SCHEMES[seed % len(SCHEMES)]
         still = mbd.simulate(*braced(seed, cut, 0.0), scheme, dt=1e-2, until=1.0)
         if still.events:  # the foot leaves the deck
@@ -51,4 +52,4 @@ def test_a_steady_carriage_changes_no_force_and_no_friction(cut):
             expected, found = (run.at([0.1, 0.55, 1.0])[name] for run in (still, moving))
             np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-7 * np.max(np.abs(expected)))
             compared += found.size
-    assert compared > 150
+    assert compared > 8 * len(seeds)
