@@ -9,7 +9,7 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.references import quantity
+from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "double_pendulum"]
@@ -57,7 +57,7 @@ def judge_absent(integrator: Any) -> Outcome:
         ]
         bare, full = (run.record for run in runs)
         for one, other in zip((bare.time, bare.q, bare.v, bare.a), (full.time, full.q, full.v, full.a), strict=True):
-            worst = max(worst, float(np.max(np.abs(one - other))) if one.shape == other.shape else np.inf)
+            worst = max(worst, size(one - other) if one.shape == other.shape else np.inf)
             differing += int(one.tobytes() != other.tobytes())
         events += len(runs[1].events)
     (plain, _), (loaded, _) = double_pendulum(False), double_pendulum(True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -13,7 +13,7 @@ import mbd
 from mbd.dataclass import dataclass
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
-from mbd.hardcases.convergence import error_curve, halved, second_order
+from mbd.hardcases.convergence import study
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
@@ -73,8 +73,8 @@ def model_of(block: Block, turned: bool = False) -> mbd.Model:
 
 
 ROCKING_LIMITS = {
-    "the first impact time [s]": 2e-5, "the speed before it [rad/s]": 1e-5,
-    "the next impact times [s]": 2e-4, "the amplitudes [rad]": 1e-5,
+    "error of the first impact time [s]": 2e-5, "error of the speed before it [rad/s]": 1e-5,
+    "error of the next impact times [s]": 2e-4, "error of the amplitudes [rad]": 1e-5,
 }  # fmt: skip
 """The most that is off at the finest step, over the first impact time, the speed before it, the first tilt."""
 
@@ -103,19 +103,18 @@ def amplitudes(run: Any, instants: Any) -> Any:
 
 
 def rocking_errors(id: str, run: Any) -> dict[str, Any]:
-    """Errors of the half cycles of one run, by what they are of."""
+    """Errors of the half cycles of one run, by what they are of; none where there are fewer."""
     cycles = published(id, "(amplitude, impact time)")
     times = np.array([event.time for event in strikes(run)])[: len(cycles) + 1]
     rates = run["place.angle.rate"]
     first = strikes(run)[0].row
     if len(times) != len(cycles) + 1:
-        return dict.fromkeys(ROCKING_LIMITS, np.array([math.nan]))
-    return {
-        "the first impact time [s]": times[0] - published(id, "first impact time"),
-        "the speed before it [rad/s]": abs(rates[first - 1]) - published(id, "speed before"),
-        "the next impact times [s]": times[1:] - cycles[:, 1],
-        "the amplitudes [rad]": amplitudes(run, times) - cycles[:, 0],
-    }
+        return {}
+    errors = (
+        times[0] - published(id, "first impact time"), abs(rates[first - 1]) - published(id, "speed before"),
+        times[1:] - cycles[:, 1], amplitudes(run, times) - cycles[:, 0],
+    )  # fmt: skip
+    return dict(zip(ROCKING_LIMITS, errors, strict=True))
 
 
 def rocking(id: str, scheme: Any) -> Outcome:
@@ -126,26 +125,28 @@ def rocking(id: str, scheme: Any) -> Outcome:
     angle, rate = float(given["theta0"]), float(given["thetadot0"])
     first, end = published(id, "first impact time"), published(id, "(amplitude, impact time)")[-1, 1]
     # amplitudes with HHT have a third-order error too: halving from first / 100.3, orders are 1.85, 1.93, 1.97, 1.98
-    steps = halved(first / 150.3)
-    runs = [rock(block, angle, rate, scheme, dt, 1.02 * end) for dt in steps]
-    errors = [rocking_errors(id, run) for run in runs]
+    found = study(
+        lambda dt: rock(block, angle, rate, scheme, dt, 1.02 * end),
+        partial(rocking_errors, id),
+        first / 150.3,
+        scheme,
+        2,
+    )
+    steps, runs = found.steps, found.runs
     ratio = published(id, "Housner velocity ratio")
     rates = runs[-1]["place.angle.rate"]
     ratios = np.array([rates[event.row] / rates[event.row - 1] for event in strikes(runs[-1])])
-    figures = [Figure("error of Housner's velocity ratio at every impact [-]", size(ratios - ratio), 1e-11)]
-    sizes = {"[s]": first, "[rad/s]": published(id, "speed before"), "[rad]": abs(angle)}
-    for what, limit in ROCKING_LIMITS.items():
-        unit = what[what.index("[") :]
-        figures += second_order(
-            f"error of {what}",
-            steps,
-            [each[what] for each in errors],
-            limit * sizes[unit],
-            1e-9 * sizes[unit],
-            order=scheme.order(),
-        )
+    by_unit = {"[s]": first, "[rad/s]": published(id, "speed before"), "[rad]": abs(angle)}
+    sizes = {what: by_unit[what[what.index("[") :]] for what in ROCKING_LIMITS}
+    figures = [
+        Figure("error of Housner's velocity ratio at every impact [-]", size(ratios - ratio), 1e-11),
+        *found.figures(
+            {what: limit * sizes[what] for what, limit in ROCKING_LIMITS.items()},
+            {what: 1e-9 * each for what, each in sizes.items()},
+        ),
+    ]
     # a half cycle takes nearly the share `ratio` of the one before; after these many the rest speed is reached
-    count = math.ceil(math.log(sizes["[rad/s]"] / 1e-6) / -math.log(ratio))
+    count = math.ceil(math.log(by_unit["[rad/s]"] / 1e-6) / -math.log(ratio))
     rest = end + (end - first) * ratio**6 / (1.0 - ratio)
     long, other = (rock(block, angle, rate, scheme, steps[0], rest, turned) for turned in (False, True))
     figures += rest_figures(long, block, count)
@@ -161,10 +162,9 @@ def rocking(id: str, scheme: Any) -> Outcome:
         figures,
         [
             Curve("tilt", long.time, long["place.angle"], y_label="angle [rad]"),
-            error_curve("error of the next impact times", steps,
-                        [each["the next impact times [s]"] for each in errors], "error [s]"),
+            found.curve("error of the next impact times [s]"),
         ],
-    )  # fmt: skip
+    )
 
 
 def stepped_rocking(block: Block, angle: float, rate: float, scheme: Any, steps: Any, expected: Any) -> list[Figure]:

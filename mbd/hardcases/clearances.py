@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,9 @@ import numpy as np
 import mbd
 from mbd.arrays import Vector
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
-from mbd.hardcases.convergence import error_curve, halved, second_order
+from mbd.hardcases.convergence import study
 from mbd.hardcases.impacts import deepest, difference, impact_figures
-from mbd.hardcases.references import accuracy, numbers, published, size
+from mbd.hardcases.references import limits_of, numbers, published, size
 
 __all__ = ["CASES"]
 
@@ -21,9 +21,9 @@ CORNERS = ("front-top", "front-bottom", "rear-top", "rear-bottom")
 """As the reference counts them."""
 
 LIMITS = {
-    "the impact times [s]": ("impact times", 1e-5),
-    "the impulses [N s]": ("impulses", 2e-4),
-    "the crank speed after each impact [rad/s]": ("crank speed after each", 1e-5),
+    "error of the impact times [s]": ("impact times", 1e-5),
+    "error of the impulses [N s]": ("impulses", 2e-4),
+    "error of the crank speed after each impact [rad/s]": ("crank speed after each", 1e-5),
 }
 """The reference of each error, and the most it may be at the finest step over the largest value."""
 
@@ -51,13 +51,15 @@ def slider_crank(sizes: tuple[float, ...], turned: bool = False) -> mbd.Model:
     return model
 
 
-def turning(
-    id: str, scheme: Any, dt: float, turned: bool = False, beyond: float | None = None
-) -> tuple[mbd.Model, Any]:
-    """The run until shortly after the last published impact, or until `beyond` times its time."""
-    given = numbers(id)
+def model_of(id: str, turned: bool = False) -> mbd.Model:
+    """That of a case."""
     names = ("l1", "l2", "a", "b", "c", "m1", "m2", "m3", "J1", "J2", "J3", "g", "eN")
-    model = slider_crank(tuple(float(given[name]) for name in names), turned)
+    return slider_crank(tuple(float(numbers(id)[name]) for name in names), turned)
+
+
+def turning(id: str, scheme: Any, dt: float, turned: bool = False, beyond: float | None = None) -> Any:
+    """The run until shortly after the last published impact, or until `beyond` times its time."""
+    given, model = numbers(id), model_of(id, turned)
     (q1, q2, q3), (w1, w2, w3) = given["angles"], given["rates"]
     start = mbd.assemble(
         model,
@@ -66,16 +68,16 @@ def turning(
     )
     times = published(id, "impact times")
     until = times[-1] + 0.1 * (times[-1] - times[-2]) if beyond is None else beyond * times[-1]
-    return model, mbd.simulate(model, start, scheme, dt=dt, until=until, on_failure="return")
+    return mbd.simulate(model, start, scheme, dt=dt, until=until, on_failure="return")
 
 
 def turning_errors(id: str, run: Any) -> dict[str, Vector]:
-    """Errors at the impacts of one run, by what they are of."""
+    """Errors at the impacts of one run, by what they are of; none where the corners strike in another order."""
     count = len(published(id, "impact times"))
     events = [event for event in run.events if event.impulse.any()][:count]
     order = [CORNERS.index(event.name) for event in events]
     if order != list(published(id, "corner index sequence")):
-        return dict.fromkeys(LIMITS, np.array([np.nan]))
+        return {}
     values = (
         np.array([event.time for event in events]),
         np.array([event.impulse[0] for event in events]),
@@ -99,33 +101,23 @@ def steady_figures(run: Any) -> list[Figure]:
 
 def rattling(id: str, scheme: Any) -> Outcome:
     """The corners strike in their order, at their instants, with their impulses, to second order."""
-    steps = halved(published(id, "impact times")[0] / 100.3)
-    runs = []
-    for dt in steps:
-        model, run = turning(id, scheme, float(dt))
-        runs.append(run)
-    errors = [turning_errors(id, each) for each in runs]
-    figures: list[Figure] = []
-    for what, (name, limit) in LIMITS.items():
-        largest, floor = size(published(id, name)), 10.0 * accuracy(id, name)
-        figures += second_order(
-            f"error of {what}",
-            steps,
-            [each[what] for each in errors],
-            limit * largest,
-            min(floor, 1e-9 * largest),
-            order=scheme.order(),
-        )
-    wrong = [float(np.isnan(each["the impulses [N s]"]).any()) for each in errors]
-    _, other = turning(id, scheme, float(steps[-1]), turned=True)
-    figures += [
-        Figure("runs in which the corners strike in another order [-]", sum(wrong), 0.0),
+    found = study(
+        lambda dt: turning(id, scheme, dt), partial(turning_errors, id), published(id, "impact times")[0] / 100.3,
+        scheme, 2,
+    )  # fmt: skip
+    limits, floors = limits_of(id, LIMITS)
+    floors = {what: min(floor, 1e-9 * size(published(id, LIMITS[what][0]))) for what, floor in floors.items()}
+    run, other = found.finest, turning(id, scheme, found.dt, turned=True)
+    figures = [
+        *found.figures(limits, floors),
+        Figure("runs in which the corners strike in another order [-]",
+               sum(not turning_errors(id, each) for each in found.runs), 0.0),
         Figure("change with the order of the corners, relative [-]", difference(run, other), 1e-9),
         Figure("penetration [m]", deepest(run), 1e-10),
-        *impact_figures(model, run),
+        *impact_figures(model_of(id), run),
         # past the instant at which the impacts pile up
-        *steady_figures(turning(id, scheme, float(steps[0]), beyond=1.5)[1]),
-    ]
+        *steady_figures(turning(id, scheme, float(found.steps[0]), beyond=1.5)),
+    ]  # fmt: skip
     late = run.time > 0.8 * run.time[-1]
     return Outcome(
         figures,
@@ -133,9 +125,7 @@ def rattling(id: str, scheme: Any) -> Outcome:
             Curve(
                 "gap of the corner front-top, last fifth", run.time[late], run["front-top.gap"][late], y_label="gap [m]"
             ),
-            error_curve(
-                "error of the impact times", steps, [each["the impact times [s]"] for each in errors], "error [s]"
-            ),
+            found.curve("error of the impact times [s]"),
         ],
     )
 

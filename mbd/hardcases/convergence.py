@@ -105,40 +105,68 @@ def _norms(errors: Sequence[Any]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Study:
-    """Errors by what they are of, at steps that get smaller, of a scheme of that order."""
+    """Runs of a scheme of that order at steps that get smaller, and their errors, by what they are of.
+
+    errors : at each step a number, or several, whose Euclidean norm is taken; NaN of a run that stops early
+    """
 
     steps: NDArray[np.float64]
-    errors: Mapping[str, NDArray[np.float64]]
+    runs: Sequence[Any]
+    errors: Mapping[str, Sequence[Any]]
     order: int = 2
 
+    @property
+    def finest(self) -> Any:
+        """The run with the smallest step."""
+        return self.runs[-1]
+
+    @property
+    def dt(self) -> float:
+        """The smallest step [s]."""
+        return float(self.steps[-1])
+
+    @property
+    def stopped(self) -> Figure:
+        """How many of the runs stop early."""
+        return Figure("runs that stop early", sum(not run.success for run in self.runs), 0)
+
     def figures(
-        self, limits: Mapping[str, float], floors: Mapping[str, float] | None = None, better: bool = False,
+        self, limits: Mapping[str, float], floors: Mapping[str, float] | float = 1e-11, better: bool = False,
         erratic: bool = False,
     ) -> list[Figure]:  # fmt: skip
         """For each error its order and its size at the finest step; see `second_order`.
 
         limits : the most each error may be at the finest step, by what it is of
-        floors : sizes at which an error counts as round-off or as the error of the reference; 1e-11 if not given
+        floors : sizes at which an error counts as round-off or as the error of the reference
         """
         found = []
         for what, limit in limits.items():
-            floor = (floors or {}).get(what, 1e-11)
-            found += second_order(what, self.steps, list(self.errors[what]), limit, floor, better, self.order, erratic)
+            floor = floors[what] if isinstance(floors, Mapping) else floors
+            errors = self.errors.get(what, [math.nan] * len(self.steps))
+            found += second_order(what, self.steps, errors, limit, floor, better, self.order, erratic)
         return found
+
+    def curve(self, what: str) -> Curve:
+        """One of the errors over steps, by its name without its unit."""
+        name, _, unit = what.partition(" [")
+        return error_curve(name, self.steps, self.errors.get(what, []), f"error [{unit}")
 
     def curves(self) -> list[Curve]:
         """Errors over steps."""
-        return [error_curve(what, self.steps, list(errors)) for what, errors in self.errors.items()]
+        return [error_curve(what, self.steps, errors) for what, errors in self.errors.items()]
 
 
 def study(
-    errors: Callable[[float], Mapping[str, float]], dt: float | Sequence[float], integrator: Any, halvings: int = 3
-) -> Study:
-    """The errors of runs of a scheme with dt, dt/2, dt/4, …, or with the steps given, from large to small."""
-    steps = list(halved(dt, halvings + 1)) if isinstance(dt, float) else list(dt)
-    found = [errors(float(step)) for step in steps]
-    by_name = {what: np.array([each[what] for each in found]) for what in found[0]}
-    return Study(np.array(steps), by_name, integrator.order())
+    run: Callable[[float], Any], errors: Callable[[Any], Mapping[str, Any]], dt: float | Sequence[float],
+    integrator: Any, halvings: int = 3,
+) -> Study:  # fmt: skip
+    """Runs of a scheme with dt, dt/2, dt/4, …, or with the steps given, from large to small, and the errors of each."""
+    steps = halved(dt, halvings + 1) if isinstance(dt, float) else np.array(dt)
+    runs = [run(float(step)) for step in steps]
+    found = [errors(each) if each.success else {} for each in runs]
+    names = dict.fromkeys(name for each in found for name in each)
+    by_name = {name: [each.get(name, math.nan) for each in found] for name in names}
+    return Study(steps, runs, by_name, integrator.order())
 
 
 def allowance(factor: float, rate: float, dt: float, size: float = 1.0) -> float:

@@ -13,7 +13,7 @@ import mbd
 from mbd.hardcases.case import CLOSURE_ATOL, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.crossings import crossing
-from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import DAMPED, EVERY, holds_positions_only
 
 __all__ = ["CASES", "four_bars"]
@@ -55,14 +55,12 @@ def judge_four_bars(case: str, dts: tuple[float, float], integrator: Any) -> Out
     passes, energy = quantity(case, "number of singular"), quantity(case, "total energy")
     first, rate, period = (quantity(case, name) for name in ("first passage", "thetadot at", "period of one"))
     turn = math.pi - definition(case)["initial_conditions"]["theta0_from_upright"]
-    runs = []
 
-    def errors(step: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=step, until=float(angle.times[-1]), store=_stride(step),
-                           on_failure="return")  # fmt: skip
-        runs.append(run)
-        if not run.success:
-            return dict.fromkeys(("error of the crank angle [rad]", "error of the corner [m]"), math.nan)
+    def turned(step: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=step, until=float(angle.times[-1]), store=_stride(step),
+                            on_failure="return")  # fmt: skip
+
+    def errors(run: Any) -> Mapping[str, float]:
         at = run.at(angle.times)
         corner = np.column_stack([at["crank 0.end.x"], at["crank 0.end.y"]])
         return {
@@ -70,18 +68,17 @@ def judge_four_bars(case: str, dts: tuple[float, float], integrator: Any) -> Out
             "error of the corner [m]": distance_to(corner, place),
         }
 
-    found = study(errors, dts[holds_positions_only(integrator)], integrator, 2)
-    finest = runs[-1]
-    turning, fine = rate.size, float(found.steps[-1])
-    limit = allowance(ERROR_FACTOR, turning, fine)
+    found = study(turned, errors, dts[holds_positions_only(integrator)], integrator, 2)
+    runs, finest, limit = found.runs, found.finest, allowance(ERROR_FACTOR, rate.size, found.dt)
+    limits = {"error of the crank angle [rad]": limit, "error of the corner [m]": limit * place.size}
     flat, round_ = _when(finest, turn, 0.5 * math.pi), _when(finest, turn, 2.0 * math.pi)
     speed = abs(float(finest.at(flat)["base 0.angle.rate"])) if flat == flat else math.nan
     total = finest.energy.total
     change = float(np.max(np.abs(total - energy.value)) / abs(energy.value))
     return Outcome(
         [
-            Figure("runs that stop early", sum(not run.success for run in runs), 0),
-            *found.figures(dict(zip(found.errors, (limit, limit * place.size), strict=True)), erratic=True),
+            found.stopped,
+            *found.figures(limits, erratic=True),
             Figure("change of energy, relative [-]", change, min(ENERGY_RTOL, limit)),
             Figure("error of the energy at the start [J]", abs(total[0] - energy.value), energy.accuracy),
             Figure("wrong number of flat poses", max(abs(_passes(run, turn) - float(passes.value)) for run in runs), 0),
@@ -118,7 +115,7 @@ def _when(run: Any, turn: float, level: float) -> float:
 def _skew(model: mbd.Model, run: Any) -> float:
     """Largest difference of the angles of two cranks."""
     bases = [joint.name for joint in model.joints if joint.name.startswith("base")]
-    return max(float(np.max(np.abs(run[f"{base}.angle"] - run["base 0.angle"]))) for base in bases)
+    return max(size(run[f"{base}.angle"] - run["base 0.angle"]) for base in bases)
 
 
 REQUIREMENT = (

@@ -10,14 +10,11 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
-from mbd.hardcases.convergence import halved, second_order
+from mbd.hardcases.convergence import study
 from mbd.hardcases.references import numbers, published, size
 from mbd.joints.losses import Loss
 
 __all__ = ["CASES"]
-
-STEPS = halved(0.01)
-"""Steps over which the errors of turning angles and times are halved [s]."""
 
 
 # pendulums ----------------------------------------------------------------------------------------------------------
@@ -30,13 +27,16 @@ def pendulum(mass: float, length: float, g: float, loss: Loss) -> mbd.Model:
     return model
 
 
-def swing(model: mbd.Model, angle: float, scheme: Any, dt: float, until: float) -> tuple[Any, Any, Any]:
-    """The run of a pendulum let go, and the times and angles at which it turns, with those of its start."""
-    run = mbd.simulate(model, mbd.assemble(model, position={"hinge.angle": angle}), scheme, dt=dt, until=until)
+def swing(model: mbd.Model, angle: float, scheme: Any, dt: float, until: float) -> Any:
+    """The run of a pendulum let go."""
+    return mbd.simulate(model, mbd.assemble(model, position={"hinge.angle": angle}), scheme, dt=dt, until=until)
+
+
+def turning_points(run: Any) -> tuple[Any, Any]:
+    """The times and angles at which a pendulum turns, with those of its start."""
     turns = [event for event in run.events if event.kind in ("slipped", "stuck")]
     times = np.array([run.time[0], *(event.time for event in turns)])
-    angles = run["hinge.angle"][[0, *(event.row for event in turns)]]
-    return run, times, angles
+    return times, run["hinge.angle"][[0, *(event.row for event in turns)]]
 
 
 def turning_figures(
@@ -44,22 +44,23 @@ def turning_figures(
 ) -> tuple[list[Figure], Any]:
     """Number, times and angles of turning, over halved steps; the run at the finest."""
     times, angles = wanted
-    errors: list[tuple[float, float]] = []
-    count = 0
-    run: Any = None
-    for dt in STEPS:
-        run, found, turned = swing(model, angle, scheme, float(dt), until)
-        count = max(count, abs(len(found) - len(times)))
-        same = len(found) == len(times)
-        errors.append((size(found - times), size(turned - angles)) if same else (math.nan, math.nan))
-    times_off, angles_off = ([each[k] for each in errors] for k in (0, 1))
-    order = scheme.order()
+
+    def errors(run: Any) -> dict[str, float]:
+        found, turned = turning_points(run)
+        if len(found) != len(times):
+            return {}
+        return {
+            "error of the turning times [s]": size(found - times),
+            "error of the turning angles [rad]": size(turned - angles),
+        }
+
+    found = study(lambda dt: swing(model, angle, scheme, dt, until), errors, 0.01, scheme, 2)
+    count = max(abs(len(turning_points(run)[0]) - len(times)) for run in found.runs)
     figures = [
         Figure("turning points more or fewer than there are [-]", float(count), 0.0),
-        *second_order("error of the turning times [s]", STEPS, times_off, 5e-4, 1e-11, order=order),
-        *second_order("error of the turning angles [rad]", STEPS, angles_off, 5e-5, 1e-11, order=order),
+        *found.figures({"error of the turning times [s]": 5e-4, "error of the turning angles [rad]": 5e-5}),
     ]
-    return figures, run
+    return figures, found.finest
 
 
 def friction_figures(run: Any, limit: Any) -> list[Figure]:

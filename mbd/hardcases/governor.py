@@ -12,7 +12,7 @@ import numpy as np
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
-from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import is_explicit
 
 __all__ = ["CASES", "governor"]
@@ -79,30 +79,30 @@ def judge_governor(integrator: Any) -> Outcome:
     model, start = governor()
     slider, rod, turn = (quantity(B5, name) for name in ("slider height", "rod angle", "shaft angle"))
     skew = quantity(B5, "asymmetry")
-    uneven = []
+    compared = {
+        "error of the slider [m]": ("sleeve.displacement", slider, slider.size),
+        "error of the rods [rad]": ("right.angle", rod, rod.size),
+        "error of the shaft [rad]": ("shaft.angle", turn, 1.0),
+    }
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=dt, until=float(slider.times[-1]), on_failure="return")
-        names = ("error of the slider [m]", "error of the rods [rad]", "error of the shaft [rad]")
-        if not run.success:
-            return dict.fromkeys(names, math.nan)
-        uneven.append(float(np.max(np.abs(run["right.angle"] - run["left.angle"] - skew.value))))
+    def turning(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=float(slider.times[-1]), on_failure="return")
+
+    def errors(run: Any) -> Mapping[str, float]:
         at = run.at(slider.times)
-        found = (distance_to(at["sleeve.displacement"], slider), distance_to(at["right.angle"], rod),
-                 distance_to(at["shaft.angle"], turn))  # fmt: skip
-        return dict(zip(names, found, strict=True))
+        return {what: distance_to(at[name], reference) for what, (name, reference, _) in compared.items()}
 
-    large = mbd.simulate(model, start, integrator, dt=LARGE, until=float(slider.times[-1]), on_failure="return")
-    bounded = is_explicit(integrator)
+    large, bounded = turning(LARGE), is_explicit(integrator)
     figures = _names_stable_steps(large) if bounded and not large.success else _taken(large)
-    found = study(errors, BOUNDED if bounded else FIRST, integrator, 1 if bounded else 3)
-    rate, fine = definition(B5)["initial_conditions"]["shaft_rate"], float(found.steps[-1])
-    floors = {what: 2.0 * each.accuracy for what, each in zip(found.errors, (slider, rod, turn), strict=True)}
-    sizes = dict(zip(found.errors, (slider.size, rod.size, 1.0), strict=True))
+    found = study(turning, errors, BOUNDED if bounded else FIRST, integrator, 1 if bounded else 3)
+    rate = definition(B5)["initial_conditions"]["shaft_rate"]
+    limits = {what: allowance(ERROR_FACTOR, rate, found.dt, size) for what, (_, _, size) in compared.items()}
+    floors = {what: 2.0 * reference.accuracy for what, (_, reference, _) in compared.items()}
+    uneven = [size(run["right.angle"] - run["left.angle"] - skew.value) for run in found.runs if run.success]
     return Outcome(
         [
             *figures,
-            *found.figures({what: allowance(ERROR_FACTOR, rate, fine, size) for what, size in sizes.items()}, floors),
+            *found.figures(limits, floors),
             Figure("difference of the two rods [rad]", max(uneven, default=math.nan), skew.accuracy),
         ],
         [Curve("height of the slider [m]", large.time, large["sleeve.displacement"]), *found.curves()],

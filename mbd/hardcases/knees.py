@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -11,20 +11,21 @@ import numpy as np
 import mbd
 from mbd.arrays import Vector
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
-from mbd.hardcases.convergence import error_curve, halved, second_order
-from mbd.hardcases.references import accuracy, numbers, published, size
+from mbd.hardcases.convergence import second_order, study
+from mbd.hardcases.references import limits_of, numbers, published, size
 
 __all__ = ["CASES"]
 
 RELEASES = {"unilateral": "pull"}
 """What the definition calls a law, by the word of `Penalty`; any other is that of the gap."""
 
+TIMES = "error of the switching times [s]"
 LIMITS = {
-    "the switching times [s]": ("event times", 1e-4),
-    "the knee's rate at the switches [rad/s]": ("d' = w2 - w1", 1e-3),
-    "the hip's rate at the switches [rad/s]": ("w1 at the events", 2e-3),
-    "the largest hyperextensions [rad]": ("max hyperextension", 1e-3),
-    "the times of largest hyperextension [s]": ("time of max", 1e-4),
+    TIMES: ("event times", 1e-4),
+    "error of the knee's rate at the switches [rad/s]": ("d' = w2 - w1", 1e-3),
+    "error of the hip's rate at the switches [rad/s]": ("w1 at the events", 2e-3),
+    "error of the largest hyperextensions [rad]": ("max hyperextension", 1e-3),
+    "error of the times of largest hyperextension [s]": ("time of max", 1e-4),
 }
 """The reference of each error, and the most it may be at the finest step over the largest value."""
 
@@ -62,23 +63,17 @@ def swing(id: str, scheme: Any, dt: float, locate: Any = "root") -> Any:
 
 
 def errors_of(id: str, run: Any) -> dict[str, Vector]:
-    """Errors of one run, by what they are of; NaN where the switches are not those of the reference."""
+    """Errors of one run, by what they are of; none where the switches are not those of the reference."""
     times = published(id, "event times")
     events = [event for event in run.events if event.name == "knee stop"]
     kinds = [("closed", "opened")[k % 2] for k in range(len(times))]
     tops = np.array([event.time for event in run.events if event.name == "deepest"])
     if [event.kind for event in events[: len(times)]] != kinds or not len(tops):
-        return dict.fromkeys(LIMITS, np.array([math.nan]))
+        return {}
     rows = [event.row for event in events[: len(times)]]
     wanted = published(id, "time of max")
     deepest = tops[[int(np.argmin(np.abs(tops - time))) for time in wanted]]
-    values = (
-        run.time[rows],
-        run["knee.rate"][rows],
-        run["hip.rate"][rows],
-        run.at(deepest)["knee.angle"],
-        deepest,
-    )
+    values = run.time[rows], run["knee.rate"][rows], run["hip.rate"][rows], run.at(deepest)["knee.angle"], deepest
     return {what: value - published(id, name) for (what, (name, _)), value in zip(LIMITS.items(), values, strict=True)}
 
 
@@ -87,37 +82,25 @@ def linear_figures(id: str, scheme: Any, steps: Any, rooted: float) -> list[Figu
 
     rooted : the error with roots at the finest step [s]
     """
-    what = "the switching times [s]"
+    used = steps if scheme.order() > 2 else steps[-1:]
+    linears = [errors_of(id, swing(id, scheme, float(dt), "linear")).get(TIMES, math.nan) for dt in used]
     title = "error of the switching times with one linear step back"
     if scheme.order() <= 2:
-        linear = errors_of(id, swing(id, scheme, float(steps[-1]), "linear"))[what]
-        return [Figure(f"{title}, over that with roots [-]", size(linear) / max(rooted, 1e-300), 1.5)]
-    linears = [errors_of(id, swing(id, scheme, float(dt), "linear"))[what] for dt in steps]
-    name, limit = LIMITS[what]
-    most, floor = limit * size(published(id, name)), 10.0 * accuracy(id, name)
-    return second_order(f"{title} [s]", steps, linears, most, floor, order=scheme.order(), erratic=True)
+        return [Figure(f"{title}, over that with roots [-]", size(linears) / max(rooted, 1e-300), 1.5)]
+    limits, floors = limits_of(id, LIMITS)
+    return second_order(
+        f"{title} [s]", steps, linears, limits[TIMES], floors[TIMES], order=scheme.order(), erratic=True
+    )
 
 
 def stopped(id: str, scheme: Any) -> Outcome:
     """Switches at the reference instants to second order, never deeper than the reference but for the error."""
     times = published(id, "event times")
-    steps = halved((times[1] - times[0]) / 60.0)
-    runs = [swing(id, scheme, float(dt)) for dt in steps]
-    errors = [errors_of(id, run) for run in runs]
-    figures: list[Figure] = []
-    for what, (name, limit) in LIMITS.items():
-        most = limit * size(published(id, name))
-        figures += second_order(
-            f"error of {what}",
-            steps,
-            [each[what] for each in errors],
-            most,
-            10.0 * accuracy(id, name),
-            order=scheme.order(),
-        )
-    run, depths = runs[-1], published(id, "max hyperextension")
+    found = study(lambda dt: swing(id, scheme, dt), partial(errors_of, id), (times[1] - times[0]) / 60.0, scheme, 2)
+    figures = found.figures(*limits_of(id, LIMITS))
+    run, depths = found.finest, published(id, "max hyperextension")
     beyond = float(np.max(run["knee.angle"])) - max(depths)
-    allowed = 2.0 * size(errors[-1]["the largest hyperextensions [rad]"])
+    allowed = 2.0 * size(found.errors["error of the largest hyperextensions [rad]"][-1])
     between = np.ones(len(run), dtype=bool)
     moments = [event.time for event in run.events if event.name == "knee stop"]
     for closes, opens in zip(moments[::2], moments[1::2], strict=False):
@@ -127,10 +110,10 @@ def stopped(id: str, scheme: Any) -> Outcome:
     force = run["knee stop.force"]
     figures += [
         Figure("hyperextension beyond the largest of the reference [rad]", beyond, allowed),
-        *linear_figures(id, scheme, steps, size(errors[-1]["the switching times [s]"])),
+        *linear_figures(id, scheme, found.steps, size(found.errors[TIMES][-1])),
         Figure("torque of the stop while it is open [N m]", size(force[between]), 0.0),
-        *second_order("error of the energy, over what the stop took [-]", steps,
-                      [_lost(each) for each in runs], 2e-3, 1e-9, order=scheme.order()),
+        *second_order("error of the energy, over what the stop took [-]", found.steps,
+                      [_lost(each) for each in found.runs], 2e-3, 1e-9, order=scheme.order()),
     ]  # fmt: skip
     if RELEASES.get(numbers(id)["law"]) == "pull":
         figures.append(Figure("torque that pulls, over the largest [-]", float(np.max(-force)) / size(force), 1e-8))
@@ -138,7 +121,7 @@ def stopped(id: str, scheme: Any) -> Outcome:
         figures,
         [
             Curve("hyperextension of the knee", run.time, run["knee.angle"], y_label="angle [rad]"),
-            error_curve("error of the switching times", steps, [each[what] for each in errors], "error [s]"),
+            found.curve(TIMES),
         ],
     )
 

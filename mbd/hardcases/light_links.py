@@ -8,6 +8,7 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.references import size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "dumbbell"]
@@ -45,14 +46,14 @@ def judge_dumbbell(integrator: Any) -> Outcome:
     M, L, omega, until, dt = (numbers[name] for name in ("M", "L", "omega", "until", "dt"))
     run = mbd.simulate(*dumbbell(), integrator, dt=dt, until=until, store=10)
     circle = 0.5 * L * np.stack([np.cos(omega * run.t), np.sin(omega * run.t), 0.0 * run.t], -1)
-    off = float(np.max(np.abs(run["other.center"] - circle)))
+    off = size(run["other.center"] - circle)
     length = np.linalg.norm(run["other.center"] - run["one.center"], axis=1) - L
     tension = np.linalg.norm(run["second.reaction_force"], axis=1) / (0.5 * M * omega**2 * L) - 1.0
     phase = PHASE_FACTOR * (omega * dt) ** 2 * omega * until if integrator.order() == 2 else ROUND_OFF
     figures = [
         Figure("error of the place [m]", off, 0.5 * L * phase),
-        Figure("change of the length [m]", float(np.max(np.abs(length))), 1e-12),
-        Figure("error of the tension, relative [-]", float(np.max(np.abs(tension))), max(phase, 1e-8)),
+        Figure("change of the length [m]", size(length), 1e-12),
+        Figure("error of the tension, relative [-]", size(tension), max(phase, 1e-8)),
         Figure("change of the energy, relative [-]", float(np.ptp(run.energy.total) / run.energy.total[0]), phase),
     ]
     if getattr(integrator, "formulation", "ggl") != "index3":

@@ -13,7 +13,7 @@ from mbd.analysis.spectrum import spectrum
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import EPS
 from mbd.hardcases.crossings import falls
-from mbd.hardcases.references import quantity
+from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import is_undamped
 
 __all__ = ["CASES", "long_pendulum"]
@@ -63,7 +63,7 @@ def judge_long_run(case: str, integrator: Any) -> Outcome:
     higher = integrator.order() > 2
     if is_undamped(integrator):
         run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=STEPS_PER_PERIOD)
-        figures += _kept(run, bottom, float(np.max(np.abs(total / total[0] - 1.0))))
+        figures += _kept(run, bottom, size(total / total[0] - 1.0))
         figures += _phase(case, run, begin, count)
     else:
         run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=_stride(count))

@@ -53,12 +53,11 @@ def judge_mass_ratio(integrator: Any) -> Outcome:
     reference = quantity(J4, "[theta1, theta2")
     model, start = heavy_below_light()
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = _swing(model, start, integrator, dt, reference.times)
-        return _differences(run, reference, "auto")
+    def swing(dt: float) -> Any:
+        return _swing(model, start, integrator, dt, reference.times)
 
     fine, middle = RESOLVING[max(order for order in RESOLVING if order <= max(integrator.order(), 2))]
-    found = study(errors, fine, integrator)
+    found = study(swing, lambda run: _differences(run, reference, "auto"), fine, integrator)
     absolute, begun = heavy_below_light("all")
     wide = _swing(absolute, begun, integrator, middle, reference.times)
     apart = _differences(wide, reference, "all")
@@ -71,7 +70,7 @@ def judge_mass_ratio(integrator: Any) -> Outcome:
             silent.append(_gain(total) if run.success else 0.0)
             curves.append(Curve(f"energy, {mechanism.cut}, dt = {dt:g} s", run.time, total, y_label="energy [J]"))
     limits = {"error of the angles [rad]": ANGLE_LIMIT, "error of the rates [rad/s]": RATE_LIMIT}
-    figures = found.figures(limits, dict.fromkeys(limits, reference.accuracy), better=True)
+    figures = found.figures(limits, reference.accuracy, better=True)
     for what, limit in limits.items():
         figures.append(Figure(f"{what} at dt = {middle:g} s, absolute coordinates", apart[what], ABSOLUTE * limit))
     figures.append(Figure("gap of the joints at any step [m]", gap, ROUND_OFF))
@@ -132,31 +131,27 @@ def judge_massless_link(integrator: Any) -> Outcome:
     period, pull = quantity(J5, "period"), quantity(J5, "tension at the start")
     full = float(period.value)
     ways = [(numbers["link_mass"], "weld"), (0.0, "weld"), (numbers["link_mass"], "hinge"), (0.0, "hinge")]
-    off = []
+    figures, off, curves = list[Figure](), list[float](), list[Curve]()
+    for mass, held in ways:
+        model, start = bob_on_link(mass, held)
+        what = f"error of the period, {mass:g} kg, {held} [s]"
 
-    scenes = {way: bob_on_link(*way) for way in ways}
+        def swing(dt: float, model: mbd.Model = model, start: mbd.State = start) -> Any:
+            return mbd.simulate(model, start, integrator, dt=dt, until=1.3 * full)
 
-    def errors(dt: float) -> Mapping[str, float]:
-        found = {}
-        for mass, held in ways:
-            model, start = scenes[mass, held]
-            run = mbd.simulate(model, start, integrator, dt=dt, until=1.3 * full)
-            name = f"error of the period, {mass:g} kg, {held} [s]"
-            found[name] = abs(_period(run) - full)
-            off.append(abs(float(np.linalg.norm(run["pivot.reaction_force"][0])) - float(pull.value)))
-        return found
+        def errors(run: Any, what: str = what) -> Mapping[str, float]:
+            return {what: abs(_period(run) - full)}
 
-    found = study(errors, full / 100, integrator)
-    rate, fine = 2.0 * math.pi / full, float(found.steps[-1])
-    limits = {what: allowance(WELDED if "weld" in what else HINGED, rate, fine, full) for what in found.errors}
-    return Outcome(
-        [
-            *found.figures(limits),
-            Figure("error of the pull at the start [N]", max(off), pull.accuracy),
-            Figure("links that nothing moves and that are not refused by name", _unnamed(), 0),
-        ],
-        found.curves(),
-    )
+        found = study(swing, errors, full / 100, integrator)
+        most = allowance(WELDED if held == "weld" else HINGED, 2.0 * math.pi / full, found.dt, full)
+        figures += found.figures({what: most})
+        off += [abs(float(np.linalg.norm(run["pivot.reaction_force"][0])) - float(pull.value)) for run in found.runs]
+        curves += found.curves()
+    figures += [
+        Figure("error of the pull at the start [N]", max(off), pull.accuracy),
+        Figure("links that nothing moves and that are not refused by name", _unnamed(), 0),
+    ]
+    return Outcome(figures, curves)
 
 
 def _period(run: Any) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
-from mbd.hardcases.convergence import error_curve, halved, second_order
+from mbd.hardcases.convergence import error_curve, study
 from mbd.hardcases.references import accuracy, numbers, published
 
 __all__ = ["CASES"]
@@ -89,28 +89,27 @@ def impact_errors(given: dict[str, float], wanted: dict[str, float], run: Any) -
 def resolved(given: dict[str, float], scheme: Any) -> tuple[list[Figure], list[Curve]]:
     """Steps that resolve the impact: depth, duration, rebound and work to second order; nothing gained, no note."""
     wanted = exact_impact(**given)
-    steps = halved(wanted["contact duration"] / 40.0)
-    runs = [dropped(given, scheme, float(dt)) for dt in steps]
-    errors = [impact_errors(given, wanted, run) for run in runs]
-    title = f"k = {given['k']:g}"
-    figures: list[Figure] = []
-    for name, limit in LIMITS.items():
-        found = [each[name] for each in errors]
-        figures += second_order(f"{title}: relative error of the {name} [-]", steps, found, limit, 1e-7, True,
-                                scheme.order())  # fmt: skip
-    gains = []
-    for run in runs:
+    title, gains = f"k = {given['k']:g}", []
+
+    def errors(run: Any) -> dict[str, float]:
+        found = impact_errors(given, wanted, run)
+        return {f"{title}: relative error of the {name} [-]": found[name] for name in LIMITS}
+
+    found = study(lambda dt: dropped(given, scheme, dt), errors, wanted["contact duration"] / 40.0, scheme, 2)
+    limits = {f"{title}: relative error of the {name} [-]": limit for name, limit in LIMITS.items()}
+    for run in found.runs:
         closed, opened = (event.row for event in run.events[:2])
         gains.append((run.energy.total[opened] - run.energy.total[closed]) / given_energy(given))
-    notes = [note for run in runs for note in _unresolved(run)]
-    figures += [
+    notes = [note for run in found.runs for note in _unresolved(run)]
+    figures = [
+        *found.figures(limits, 1e-7, better=True),
         Figure(f"{title}: notes of a step that is too long [-]", len(notes), 0.0),
         Figure(f"{title}: energy gained in the impact, relative [-]", float(np.max(gains)), 1e-9),
     ]
-    run, late = runs[-1], [each["contact duration"] for each in errors]
+    run, late = found.finest, found.errors[f"{title}: relative error of the contact duration [-]"]
     return figures, [
         Curve(f"depth, {title}", run.time, -run["fall.displacement"], y_label="depth [m]"),
-        error_curve(f"error of the duration, {title}", steps, late, "relative error"),
+        error_curve(f"error of the duration, {title}", found.steps, late, "relative error"),
     ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.references import size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "pushed_table"]
@@ -61,7 +62,7 @@ def judge_pushed_table(integrator: Any) -> Outcome:
         Figure("error of the instant at which it slides [s]", max(abs(t - onset) for t in slips), 1e-8),
         Figure("moved before [m]", float(np.max(np.hypot(run["place.x"], run["place.y"])[before])), 1e-12),
         Figure("friction outside of its cones [N]", outside, 1e-8),
-        Figure("change with the order of the legs [m]", float(np.max(np.abs(ends[0] - ends[1]))), 1e-3 * moved),
+        Figure("change with the order of the legs [m]", size(ends[0] - ends[1]), 1e-3 * moved),
     ]
     return Outcome(figures, [Curve("way of the table", run.t, np.hypot(run["place.x"], run["place.y"]), y_label="[m]")])
 

@@ -12,7 +12,7 @@ import numpy as np
 import mbd
 from mbd.hardcases.case import CLOSURE_ATOL, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
-from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "bricard", "parallel_cranks"]
@@ -75,23 +75,23 @@ def judge_parallel_cranks(integrator: Any) -> Outcome:
     angle, force = quantity(J2, "crank angle"), quantity(J2, "sum of the joint forces")
     spare = quantity(J2, "number of redundant")
     numbers = definition(J2)["definition"]
-    runs = []
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]))
-        runs.append(run)
+    def swing(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]))
+
+    def errors(run: Any) -> Mapping[str, float]:
         return {"error of the crank angle [rad]": distance_to(run.at(angle.times)["base 0.angle"], angle)}
 
-    found = study(errors, 4e-3, integrator)
-    finest, dt, rate = runs[-1], float(found.steps[-1]), math.sqrt(numbers["g"] / numbers["crank_length"])
+    found = study(swing, errors, 4e-3, integrator)
+    runs, finest, rate = found.runs, found.finest, math.sqrt(numbers["g"] / numbers["crank_length"])
     pins = [joint.name for joint in model.joints if joint.name.startswith("pin")]
     total = sum(finest[f"{pin}.reaction_force"][0, :2] for pin in pins)
     weight = (numbers["n_cranks"] * numbers["crank_mass"] + numbers["coupler_mass"]) * numbers["g"]
-    skew = max(float(np.max(np.abs(run[f"base {k}.angle"] - run["base 0.angle"])))
+    skew = max(size(run[f"base {k}.angle"] - run["base 0.angle"])
                for run in runs for k in range(1, len(pins)))  # fmt: skip
     return Outcome(
         [
-            *found.figures({"error of the crank angle [rad]": allowance(CRANK, rate, dt, angle.size)}),
+            *found.figures({"error of the crank angle [rad]": allowance(CRANK, rate, found.dt, angle.size)}),
             Figure("error of the sum of the joint forces [N]", distance_to(total, force), max(force.accuracy, 1e-10)),
             Figure("wrong count of redundant rows in the notes", max(_miscount(run, spare.value) for run in runs), 0),
             Figure("runs that do not say that multipliers are not unique", sum(not _warned(run) for run in runs), 0),
@@ -108,21 +108,21 @@ def judge_bricard(integrator: Any) -> Outcome:
     model, start = bricard()
     place, change, freedom = quantity(B4, "P3"), quantity(B4, "total energy change"), quantity(B4, "number of degrees")
     numbers = definition(B4)["definition"]
-    runs = []
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=dt, until=float(place.times[-1]))
-        runs.append(run)
+    def turning(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=float(place.times[-1]))
+
+    def errors(run: Any) -> Mapping[str, float]:
         total = run.energy.total
         return {
             "error of P3 [m]": distance_to(run.at(place.times)["rod 2.tip"], place),
-            "change of energy [J]": float(np.max(np.abs(total - total[0] - change.value))),
+            "change of energy [J]": size(total - total[0] - change.value),
         }
 
-    found = study(errors, 2e-3, integrator, 2)
-    finest, dt, rate = runs[-1], float(found.steps[-1]), math.sqrt(numbers["g"] / numbers["rod_length"])
+    found = study(turning, errors, 2e-3, integrator, 2)
+    runs, finest, rate = found.runs, found.finest, math.sqrt(numbers["g"] / numbers["rod_length"])
     work = numbers["rod_mass"] * numbers["g"] * numbers["rod_length"]
-    limits = (allowance(PLACE, rate, dt, place.size), allowance(ENERGY, rate, dt, work))
+    limits = (allowance(PLACE, rate, found.dt, place.size), allowance(ENERGY, rate, found.dt, work))
     rows = finest.record.lam.shape[1]
     free = max(abs(len(start.v) - rows + _spare(run) - float(freedom.value)) for run in runs)
     weight = (len(numbers["points"]) - 1) * numbers["rod_mass"] * numbers["g"]
@@ -155,7 +155,7 @@ def _warned(run: Any) -> bool:
 
 
 def _largest(runs: Any) -> float:
-    return max(float(np.max(np.abs(run.record.lam))) for run in runs)
+    return max(size(run.record.lam) for run in runs)
 
 
 CASES = (

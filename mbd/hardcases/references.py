@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -68,3 +69,12 @@ def size(values: Any) -> float:
     """The largest absolute value; NaN where one is none, 0 of nothing."""
     found = np.abs(np.asarray(values, dtype=float))
     return float(np.max(found)) if found.size else 0.0
+
+
+def limits_of(id: str, table: Mapping[str, tuple[str, float]]) -> tuple[dict[str, float], dict[str, float]]:
+    """By what errors are of, the most that each may be and ten times the accuracy of its reference.
+
+    table : the beginning of the name of each reference, and the most that its error may be over the largest value
+    """
+    limits = {what: limit * quantity(id, name).size for what, (name, limit) in table.items()}
+    return limits, {what: 10.0 * accuracy(id, name) for what, (name, _) in table.items()}

@@ -10,7 +10,7 @@ import numpy as np
 import mbd
 from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import EPS, force_floor
-from mbd.hardcases.references import quantity
+from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "block", "table"]
@@ -112,9 +112,9 @@ def judge_block(integrator: Any) -> Outcome:
             run = mbd.simulate(model, start, integrator, dt=dt, until=UNTIL)
             forces = np.array([run[f"point {k}.force"] for k in range(len(reference.value))])
             floor = _floor(integrator, dt, weight, numbers["m"], float(np.ptp(numbers["corners_x"])))
-            off = max(off, float(np.max(np.abs(forces - reference.value[:, None]))) / floor)
-            resultant = max(resultant, float(np.max(np.abs(forces.sum(axis=0) - weight))) / floor)
-            drift = max(drift, float(np.max(np.abs(run.record.q - run.record.q[0]))))
+            off = max(off, size(forces - reference.value[:, None]) / floor)
+            resultant = max(resultant, size(forces.sum(axis=0) - weight) / floor)
+            drift = max(drift, size(run.record.q - run.record.q[0]))
             events += len(run.events)
             wrong += _notes_redundancy(run) is not third
             curves.append(Curve(f"force of the first point, {name} [N]", run.time, forces[0]))

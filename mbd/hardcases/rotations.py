@@ -10,6 +10,7 @@ import numpy as np
 import mbd
 from mbd.equal import EQUAL_RTOL
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
+from mbd.hardcases.references import size
 from mbd.joints.quaternions import rotation_of
 
 __all__ = ["CASES", "coin", "free_body", "gimbal", "top"]
@@ -81,7 +82,7 @@ def judge_gimbal(integrator: Any) -> Outcome:
         run = mbd.simulate(*gimbal(axis, angle), integrator, dt=numbers["dt"], until=numbers["until"])
         found.append(np.stack([run[name] for name in names], -1))
         energies.append(float(np.ptp(run.energy.total)) / float(np.max(run.energy.kinetic)))
-    apart = max(float(np.max(np.abs(each - found[0]))) for each in found)
+    apart = max(size(each - found[0]) for each in found)
     figures = [
         Figure("difference of places by the frame [m]", apart, EQUAL_RTOL),
         Figure("change of the energy over its kinetic part [-]", max(energies), numbers["energy"]),

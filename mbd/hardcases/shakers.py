@@ -12,7 +12,7 @@ import numpy as np
 import mbd
 import mbd.tape.functions as tape
 from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
-from mbd.hardcases.convergence import error_curve, halved, second_order
+from mbd.hardcases.convergence import halved, study
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, quantity, size
 from mbd.hardcases.stepped import stepped_figures, within_steps
@@ -57,28 +57,31 @@ def staying_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], 
     given = numbers(id)
     m, g, A, w = (float(given[name]) for name in ("m", "g", "A", "w"))
     extremes = published(id, "contact force extremes")
-    steps = halved(period / 40.0)  # rows at the quarters of the period
-    runs = [shaken(id, scheme, float(dt), SETTLING_PERIODS) for dt in steps]
-    errors, peaks = [], []
-    for run in runs:
+    limits = dict.fromkeys(
+        ("error of the contact force [N]", "error of the extremes of the contact force [N]"), 2e-3 * m * g
+    )
+
+    def errors(run: Any) -> dict[str, Any]:
         exact = m * (g - A * w * w * np.sin(w * run.time))
         last = run.time > period * (SETTLING_PERIODS - 1.001)
-        errors.append(size((run["table.force"] - exact)[last]))
         force = run["table.force"][last]
-        peaks.append(np.array([np.min(force), np.max(force)]) - extremes)
+        peaks = np.array([np.min(force), np.max(force)]) - extremes
+        return dict(zip(limits, (size(force - exact[last]), peaks), strict=True))
+
+    # rows at the quarters of the period
+    found = study(lambda dt: shaken(id, scheme, dt, SETTLING_PERIODS), errors, period / 40.0, scheme, 2)
     count = int(re.findall(r"in (\d+) periods", quantity(id, "number of releases").name)[0])
-    run = shaken(id, scheme, float(steps[0]), float(count))
+    run = shaken(id, scheme, float(found.steps[0]), float(count))
     opened = [event for event in run.events if event.kind == "opened"]
-    floor, order = 1e-9 * m * g, scheme.order()
     figures = [
         Figure(f"releases in {count} periods [-]", abs(len(opened) - published(id, "number of releases")), 0.0),
         Figure(f"switches in {count} periods [-]", len(run.events), 0.0),
         Figure("error of Γ, A ω²/g [-]", abs(A * w * w / g - published(id, "Gamma")), accuracy(id, "Gamma") + 1e-15),
-        *second_order("error of the contact force [N]", steps, errors, 2e-3 * m * g, floor, order=order),
-        *second_order("error of the extremes of the contact force [N]", steps, peaks, 2e-3 * m * g, floor, order=order),
+        *found.figures(limits, 1e-9 * m * g),
         Figure("error of the height of the mass on the table [m]", size(run["table.gap"]), 1e-10),
     ]
-    curves = [Curve("contact force", runs[-1].time, runs[-1]["table.force"], y_label="force [N]")]
+    fine = found.finest
+    curves = [Curve("contact force", fine.time, fine["table.force"], y_label="force [N]")]
     return figures, curves
 
 
@@ -90,40 +93,30 @@ def thrown_figures(id: str, scheme: Any, period: float) -> tuple[list[Figure], l
     gamma = float(re.findall(r"Gamma = ([\d.]+)", entry.name)[0])
     amplitude = gamma * g / (w * w)
     first = float(entry.value)
-    steps = halved(period / 37.0)  # no row at the instant of lift-off
-    runs = [shaken(id, scheme, float(dt), THROWING_PERIODS, amplitude) for dt in steps]
-    errors, other = [], []
-    for run in runs:
+    one, every = (f"error of the {what} at Γ = {gamma:g} [s]" for what in ("first lift-off time", "lift-off times"))
+
+    def errors(run: Any) -> dict[str, Any]:
         opened = np.array([event.time for event in run.events if event.kind == "opened"])
-        errors.append(opened[0] - first if len(opened) else math.nan)
         phases = first + period * np.arange(THROWING_PERIODS)
-        other.append(opened - phases if len(opened) == THROWING_PERIODS else np.array([math.nan]))
-    run = runs[-1]
+        return {
+            one: opened[0] - first if len(opened) else math.nan,
+            every: opened - phases if len(opened) == THROWING_PERIODS else math.nan,
+        }
+
+    # no row at the instant of lift-off
+    found = study(lambda dt: shaken(id, scheme, dt, THROWING_PERIODS, amplitude), errors, period / 37.0, scheme, 2)
+    run = found.finest
     figures = [
-        *second_order(
-            f"error of the first lift-off time at Γ = {gamma:g} [s]",
-            steps,
-            errors,
-            1e-4 * period,
-            1e-10 * period,
-            order=scheme.order(),
-        ),
-        *second_order(
-            f"error of the lift-off times at Γ = {gamma:g} [s]",
-            steps,
-            other,
-            1e-4 * period * THROWING_PERIODS**0.5,
-            1e-9 * period,
-            order=scheme.order(),
-        ),
-        Figure(f"penetration at Γ = {gamma:g} [m]", float(np.max([deepest(each) for each in runs])), 1e-10),
+        *found.figures({one: 1e-4 * period}, 1e-10 * period),
+        *found.figures({every: 1e-4 * period * THROWING_PERIODS**0.5}, 1e-9 * period),
+        Figure(f"penetration at Γ = {gamma:g} [m]", float(np.max([deepest(each) for each in found.runs])), 1e-10),
         Figure(f"pull at Γ = {gamma:g} [N]", float(np.max(-run["table.force"])), 1e-9 * m * g),
         # the table, which moves, may give or take energy
         *(each for each in impact_figures(table(m, g, amplitude, w), run) if "energy" not in each.what),
     ]
     curves = [
         Curve(f"height over the table, Γ = {gamma:g}", run.time, run["table.gap"], y_label="gap [m]"),
-        error_curve("error of the first lift-off time", steps, errors, "error [s]"),
+        found.curve(one),
     ]
     return figures, curves
 

@@ -12,7 +12,7 @@ import mbd
 from mbd.hardcases.case import CLOSURE_ATOL, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.crossings import crossing
-from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "equal_slider_crank", "parallelogram"]
@@ -70,39 +70,35 @@ def judge_slider_crank(integrator: Any) -> Outcome:
     angle, slider = quantity(J3, "crank angle"), quantity(J3, "slider position")
     instant, rate = quantity(J3, "time of first"), quantity(J3, "crank rate at the first")
     energy = quantity(J3, "energy")
-    runs = []
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]), on_failure="return")
-        runs.append(run)
-        if not run.success:
-            return dict.fromkeys(("error of the crank angle [rad]", "error of the slider [m]"), math.nan)
+    def turning(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]), on_failure="return")
+
+    def errors(run: Any) -> Mapping[str, float]:
         at = run.at(angle.times)
         return {
             "error of the crank angle [rad]": distance_to(at["main.angle"] - 0.5 * math.pi, angle),
             "error of the slider [m]": distance_to(at["guide.displacement"], slider),
         }
 
-    found = study(errors, 2e-3, integrator)
-    finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3)["initial_conditions"]["crank_rate"]
+    found = study(turning, errors, 2e-3, integrator)
+    runs, finest, turn = found.runs, found.finest, definition(J3)["initial_conditions"]["crank_rate"]
     turned = finest["main.angle"] - 0.5 * math.pi
     passages = _passages(finest, "main.angle", 0.5 * math.pi)
     first = passages[0] if passages else math.nan
     speed = float(finest.at(first)["main.angle.rate"]) if passages else math.nan
-    L, most = definition(J3)["definition"]["L"], allowance(CRANK, turn, dt, angle.size)
-    branch = max(float(np.max(np.abs(
-        run["guide.displacement"] - 2.0 * L * np.cos(run["main.angle"] - 0.5 * math.pi)))) for run in runs)  # fmt: skip
+    L, most = definition(J3)["definition"]["L"], allowance(CRANK, turn, found.dt, angle.size)
+    off = [run["guide.displacement"] - 2.0 * L * np.cos(run["main.angle"] - 0.5 * math.pi) for run in runs]
+    branch = max(map(size, off))
     return Outcome(
         [
-            Figure("runs that stop early", sum(not run.success for run in runs), 0),
-            *found.figures(
-                dict(zip(found.errors, (most, 2.0 * L * most), strict=True)),
-                dict(zip(found.errors, (angle.accuracy, slider.accuracy), strict=True)),
-            ),
+            found.stopped,
+            *found.figures({"error of the crank angle [rad]": most}, angle.accuracy),
+            *found.figures({"error of the slider [m]": 2.0 * L * most}, slider.accuracy),
             Figure("error of the time of the first singular pose [s]", abs(first - float(instant.value)),
-                   allowance(CRANK, turn, dt, instant.size)),
+                   allowance(CRANK, turn, found.dt, instant.size)),
             Figure("error of the crank rate there [rad/s]", abs(speed - float(rate.value)),
-                   allowance(CRANK, turn, dt, rate.size)),
+                   allowance(CRANK, turn, found.dt, rate.size)),
             Figure("error of the energy at the start [J]", abs(float(finest.energy.total[0]) - float(energy.value)),
                    max(energy.accuracy, 1e-12 * float(energy.value))),
             Figure("jump of energy at a singular pose, relative [-]", _jump(finest, passages), ENERGY_JUMP_RTOL),
@@ -117,22 +113,21 @@ def judge_parallelogram(integrator: Any) -> Outcome:
     """Every flat pose is passed on the branch where the cranks stay parallel."""
     model, start = parallelogram()
     angle, count = quantity(J3B, "crank angle"), quantity(J3B, "flat positions")
-    runs = []
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]), on_failure="return")
-        runs.append(run)
-        found = distance_to(run.at(angle.times)["a.angle"], angle) if run.success else math.nan
-        return {"error of the crank angle [rad]": found}
+    def turning(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=float(angle.times[-1]), on_failure="return")
 
-    found = study(errors, 2e-3, integrator)
-    finest, dt, turn = runs[-1], float(found.steps[-1]), definition(J3B)["initial_conditions"]["thetadot"]
+    def errors(run: Any) -> Mapping[str, float]:
+        return {"error of the crank angle [rad]": distance_to(run.at(angle.times)["a.angle"], angle)}
+
+    found = study(turning, errors, 2e-3, integrator)
+    runs, finest, turn = found.runs, found.finest, definition(J3B)["initial_conditions"]["thetadot"]
     passages = _passages(finest, "a.angle")
-    skew = max(float(np.max(np.abs(run["d.angle"] - run["a.angle"]))) for run in runs)
+    skew = max(size(run["d.angle"] - run["a.angle"]) for run in runs)
     return Outcome(
         [
-            Figure("runs that stop early", sum(not run.success for run in runs), 0),
-            *found.figures({"error of the crank angle [rad]": allowance(FLAT, turn, dt, angle.size)}),
+            found.stopped,
+            *found.figures({"error of the crank angle [rad]": allowance(FLAT, turn, found.dt, angle.size)}),
             Figure("wrong number of flat poses", abs(len(passages) - float(count.value)), 0),
             Figure("jump of energy at a flat pose, relative [-]", _jump(finest, passages), ENERGY_JUMP_RTOL),
             Figure("cranks out of parallel [rad]", skew, CLOSURE_ATOL),

@@ -11,7 +11,7 @@ import numpy as np
 import mbd
 from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import allowance, study
-from mbd.hardcases.references import distance_to, quantity
+from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "knife_edge", "sleigh"]
@@ -73,10 +73,11 @@ def judge_sleigh(integrator: Any) -> Outcome:
     model, start = sleigh()
     motion, place, force = (quantity(D1, name) for name in ("[blade speed", "contact point P", "side force"))
     energy, final = quantity(D1, "kinetic energy"), quantity(D1, "limit speed")
-    runs: dict[float, mbd.Trajectory] = {}
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = runs[dt] = mbd.simulate(model, start, integrator, dt=dt, until=float(motion.times[-1]))
+    def slide(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=float(motion.times[-1]))
+
+    def errors(run: Any) -> Mapping[str, float]:
         at = run.at(motion.times)
         angle = at["body.angle"]
         speed = at["body.x.rate"] * np.cos(angle) + at["body.y.rate"] * np.sin(angle)
@@ -86,16 +87,16 @@ def judge_sleigh(integrator: Any) -> Outcome:
             ),
             "error of the place [m]": distance_to(np.column_stack([at["body.x"], at["body.y"]]), place),
             "error of the side force [N]": distance_to(at["blade.force"], force),
-            "change of energy [J]": float(np.max(np.abs(run["kinetic_energy"] - run["kinetic_energy"][0]))),
+            "change of energy [J]": size(run["kinetic_energy"] - run["kinetic_energy"][0]),
         }
 
-    found = study(errors, 0.01, integrator)
-    finest = runs[float(found.steps[-1])]
+    found = study(slide, errors, 0.01, integrator)
+    finest, dt = found.finest, found.dt
     tail = mbd.simulate(model, finest.final, integrator, dt=0.01, until=3.0 * float(motion.times[-1]))
     speed = math.hypot(tail["body.x.rate"][-1], tail["body.y.rate"][-1])
-    rate, dt = definition(D1)["initial_conditions"]["thetadot0"], float(found.steps[-1])
+    rate = definition(D1)["initial_conditions"]["thetadot0"]
     sizes = (motion.size, place.size, force.size, float(energy.value))
-    limits = (allowance(SLEIGH, rate, dt, size) for size in sizes)
+    limits = (allowance(SLEIGH, rate, dt, each) for each in sizes)
     return Outcome(
         [
             *found.figures(dict(zip(found.errors, limits, strict=True))),
@@ -107,7 +108,7 @@ def judge_sleigh(integrator: Any) -> Outcome:
                 abs(speed - float(final.value)),
                 allowance(SLEIGH, rate, dt, final.size),
             ),
-            Figure("slip [m/s]", max(float(np.max(np.abs(run["blade.residual"]))) for run in runs.values()), ROUND_OFF),
+            Figure("slip [m/s]", max(size(run["blade.residual"]) for run in found.runs), ROUND_OFF),
         ],
         [Curve("rate of turning [rad/s]", finest.time, finest["body.angle.rate"]), *found.curves()],
     )
@@ -120,22 +121,24 @@ def judge_knife_edge(integrator: Any) -> Outcome:
     lowest, drift = quantity(D2, "max downhill excursion"), quantity(D2, "mean sideways speed")
     rate = definition(D2)["initial_conditions"]["thetadot"]
     turn = 2.0 * math.pi / rate
-    slips, forces = [], []
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=dt, until=float(place.times[-1]))
-        slips.append(float(np.max(np.abs(run["blade.residual"]))))
+    def slide(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=float(place.times[-1]))
+
+    def errors(run: Any) -> Mapping[str, float]:
         at = run.at(place.times)
-        forces.append(distance_to(at["blade.multiplier"], force) / allowance(FORCE, rate, dt, force.size))
         return {"error of the place [m]": distance_to(np.column_stack([at["body.x"], at["body.y"]]), place)}
 
-    found = study(errors, 0.01, integrator)
+    found = study(slide, errors, 0.01, integrator)
+    forces = [
+        distance_to(each.at(place.times)["blade.multiplier"], force) / allowance(FORCE, rate, float(step), force.size)
+        for each, step in zip(found.runs, found.steps, strict=True)
+    ]
     dt = turn / 1600
     run = mbd.simulate(model, start, integrator, dt=dt, until=20 * turn)
-    slips.append(float(np.max(np.abs(run["blade.residual"]))))
     return Outcome(
         [
-            *found.figures({"error of the place [m]": allowance(EDGE, rate, float(found.steps[-1]), place.size)}),
+            *found.figures({"error of the place [m]": allowance(EDGE, rate, found.dt, place.size)}),
             Figure("error of the multiplier over what is allowed, at every dt [-]", max(forces), 1.0),
             Figure(
                 "error of the farthest place downhill [m]",
@@ -150,7 +153,7 @@ def judge_knife_edge(integrator: Any) -> Outcome:
                 abs(float(run["body.y"][-1] / run.time[-1]) - float(drift.value)),
                 allowance(EDGE, rate, dt, drift.size),
             ),
-            Figure("slip [m/s]", max(slips), ROUND_OFF),
+            Figure("slip [m/s]", max(size(each["blade.residual"]) for each in (*found.runs, run)), ROUND_OFF),
         ],
         [Curve("path: y over x", run["body.x"], run["body.y"], "downhill [m]", "sideways [m]"), *found.curves()],
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.references import Reference, quantity
+from mbd.hardcases.references import Reference, quantity, size
 from mbd.hardcases.schemes import DAMPED, EVERY
 
 __all__ = ["CASES", "bob", "four_bar_that_cannot_close"]
@@ -66,11 +66,11 @@ def judge_inconsistent_start(integrator: Any) -> Outcome:
             Figure("error of the velocity residual told [-]", _off(found_rate, rate), NUMBER_RTOL),
             Figure("error of the projected place [m]", _worst(start.q, place), place.accuracy),
             Figure("error of the projected velocity [m/s]", _worst(start.v, speed), speed.accuracy),
-            Figure("error of the changes that the start tells [m, m/s]", float(np.max(np.abs(moved - change))), 1e-12),
+            Figure("error of the changes that the start tells [m, m/s]", size(moved - change), 1e-12),
             Figure("starts that do not print their largest change", float(f"{largest:.2g}" not in repr(start)), 0),
             Figure("error of the tension of the projected start [N]", abs(float(pull[0]) - float(tension.value)),
                    max(tension.accuracy, 1e-12)),
-            Figure("change of the tension in ten steps [N]", float(np.max(np.abs(pull - pull[0]))), _transient(dt)),
+            Figure("change of the tension in ten steps [N]", size(pull - pull[0]), _transient(dt)),
         ],
         [Curve("tension from the projected start on", run.time, pull, y_label="tension [N]")],
     )  # fmt: skip
@@ -101,7 +101,7 @@ def _off(found: float, value: float) -> float:
 
 
 def _worst(found: Any, reference: Reference) -> float:
-    return float(np.max(np.abs(np.asarray(found) - reference.value)))
+    return size(np.asarray(found) - reference.value)
 
 
 def four_bar_that_cannot_close() -> mbd.Model:

@@ -42,7 +42,7 @@ def judge_followed(integrator: Any) -> Outcome:
     for joint in ("hip", "knee"):
         reference, found = quantity(LEG, f"{joint} torque"), run[f"{joint} drive.torque"]
         between = size(run.at(reference.times)[f"{joint} drive.torque"] - reference.value)
-        largest = float(np.max(np.abs(reference.value)))
+        largest = size(reference.value)
         figures.append(Figure(f"error of the {joint} torque between steps [-]", between / largest, allowed))
         angle, knots = run[f"{joint}.angle"], np.isin(run.time, given["times"])
         samples = np.interp(run.time[knots], given["times"], given[joint])

@@ -47,20 +47,19 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
     top = math.cos(definition(J1)["initial_conditions"]["angle_from_vertical"])
     low = (float(last.value) / (m * g) + 2.0 * top) / 3.0  # T = m g (3 cos θ − 2 cos θ₀), so cos θ from the reference
     place, speed = L * np.array([math.sqrt(1.0 - low * low), -low]), math.sqrt(2.0 * g * L * (low - top))
-    over, off, begun = [], [], []
 
-    def errors(dt: float) -> Mapping[str, float]:
-        run = mbd.simulate(model, start, integrator, dt=dt, until=until, store=max(1, round(until / dt / 1000)))
-        tension = abs(float(run["rod.multiplier"][-1]) - float(last.value))
-        floor = force_floor(integrator, dt, until / dt, m, L, speed)
-        over.append(tension / (ERROR_CONSTANT * m * g * g / L * dt * dt + floor))
-        off.append(run.violation.length / L)
-        begun.append(abs(float(run["rod.multiplier"][0]) - float(first.value)))
-        found = math.dist((run["place.x"][-1], run["place.y"][-1]), place)
-        return {"error of the place [m]": found, "error of the tension [N]": tension}
+    def swing(dt: float) -> Any:
+        return mbd.simulate(model, start, integrator, dt=dt, until=until, store=max(1, round(until / dt / 1000)))
 
-    found = study(errors, numbers["dts"], integrator)
-    places, steps = found.errors["error of the place [m]"], found.steps
+    def errors(run: Any) -> Mapping[str, float]:
+        return {
+            "error of the place [m]": math.dist((run["place.x"][-1], run["place.y"][-1]), place),
+            "error of the tension [N]": abs(float(run["rod.multiplier"][-1]) - float(last.value)),
+        }
+
+    found = study(swing, errors, numbers["dts"], integrator)
+    (places, tensions), steps = map(np.array, found.errors.values()), found.steps
+    begun = [abs(float(run["rod.multiplier"][0]) - float(first.value)) for run in found.runs]
     higher = integrator.order() > 2
     judgement = "what is missing to order 2" if higher else "|order − 2|"
     rest = 10.0 * EPS * L * np.sqrt(until / steps)
@@ -72,10 +71,11 @@ def judge_tiny_steps(integrator: Any) -> Outcome:
                float(np.max(places / (ERROR_CONSTANT * g * steps**2 + rest))), 1.0),
         Figure(f"error of the place at dt ≤ {NEAR_STEP:g} s [m]", float(np.max(places[steps <= NEAR_STEP])), NEAR),
         Figure(f"{judgement} of the tension above its round-off floor [-]",
-               deviation(steps, found.errors["error of the tension [N]"], floors, higher), 0.15),
-        Figure("error of the tension over C dt² and its round-off floor [-]", max(over), 1.0),
+               deviation(steps, tensions, floors, higher), 0.15),
+        Figure("error of the tension over C dt² and its round-off floor [-]",
+               float(np.max(tensions / (ERROR_CONSTANT * m * g * g / L * steps * steps + floors))), 1.0),
         Figure("error of the tension at the start [N]", max(begun), first.accuracy),
-        Figure("|constraint| over L [-]", max(off), ROUND_OFF),
+        Figure("|constraint| over L [-]", max(run.violation.length / L for run in found.runs), ROUND_OFF),
     ]  # fmt: skip
     if hasattr(integrator, "tolerance"):
         figures.append(_refusal(integrator, model, start, min(numbers["dts"])))

@@ -11,7 +11,7 @@ import numpy as np
 import mbd
 from mbd.dataclass import dataclass
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
-from mbd.hardcases.references import quantity
+from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "pushed_particle"]
@@ -67,12 +67,10 @@ def judge_nan(integrator: Any) -> Outcome:
         late = max(late, abs(kept - fault))
         ahead, x, v = fault - kept, float(run["place.x"][-1]), float(run["place.x.rate"][-1])
         carried = np.array([x + v * ahead + 0.5 * rise * ahead**2, v + rise * ahead])
-        beyond = max(beyond, float(np.max(np.abs(carried - last.value))))
+        beyond = max(beyond, size(carried - last.value))
         t = run.time
         place, speed = begin["x"] + begin["v"] * t + 0.5 * rise * t**2, begin["v"] + rise * t
-        off = max(
-            off, *(float(np.max(np.abs(error))) for error in (run["place.x"] - place, run["place.x.rate"] - speed))
-        )
+        off = max(off, *(size(error) for error in (run["place.x"] - place, run["place.x.rate"] - speed)))
         record = run.record
         bad += sum(int(np.count_nonzero(~np.isfinite(part))) for part in (record.q, record.v, record.a, record.time))
     return Outcome(

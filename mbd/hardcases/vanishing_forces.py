@@ -9,7 +9,7 @@ import numpy as np
 
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome
-from mbd.hardcases.references import numbers, quantity
+from mbd.hardcases.references import numbers, quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "cardan", "slider_crank"]
@@ -99,9 +99,9 @@ def judge_cardan(integrator: Any) -> Outcome:
             run = mbd.simulate(model, start, integrator, dt=case["dt"], until=case["until"])
             first, speed = np.asarray(run["first.angle"]), np.asarray(run["first.angle.rate"])
             wanted = np.unwrap(np.arctan2(math.cos(bend) * np.sin(first), np.cos(first)))
-            turned = max(turned, float(np.max(np.abs(np.unwrap(run["second.angle"]) - wanted))))
+            turned = max(turned, size(np.unwrap(run["second.angle"]) - wanted))
             exact = case["speed"] * np.sqrt(inertia(angle) / inertia(first))
-            fast = max(fast, float(np.max(np.abs(speed - exact))))
+            fast = max(fast, size(speed - exact))
             gained = max(gained, float(np.ptp(run.energy.total)) / float(run.energy.kinetic[0]))
             curves.append(Curve("speed of the driving shaft", run.time, speed, y_label="[rad/s]"))
     figures = [

@@ -11,7 +11,7 @@ import numpy as np
 import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.convergence import EPS
-from mbd.hardcases.references import quantity
+from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
 __all__ = ["CASES", "rolling_wheel"]
@@ -72,7 +72,7 @@ def judge_wheel(integrator: Any) -> Outcome:
             }
             for name, value in found.items():
                 worst[name] = float(np.maximum(worst[name], np.max(np.abs(value - values[name].value))))
-            slip = max(slip, float(np.max(np.abs(run["tyre.residual"]))))
+            slip = max(slip, size(run["tyre.residual"]))
             opened += len(run.events)
             curves.append(Curve(f"speed, {held}, dt = {dt:g} s", run.time, run["roll.x.rate"], y_label="speed [m/s]"))
     numbers = definition(D3)["definition"]
