@@ -12,6 +12,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Guard
 from mbd.kernel.records import TABLE
 from mbd.sensitivity.tangent.build import entry, plain_entry
+from mbd.sensitivity.tangent.follow_coupled_stages import MAX_COUPLED
 from mbd.sensitivity.tangent.interpreted import Table
 from mbd.sensitivity.tangent.printer import LANES
 from mbd.sensitivity.tangent.programs import (
@@ -115,6 +116,9 @@ class TangentStepper(Stepper):
         own = {"kkt": unknowns * unknowns, "rhs": unknowns, "pivots": unknowns}
         own["block"] = size + K.n + (K.n_rows + 1) * (K.n_v + 1)  # with W and Z behind it
         own["out"] = K.n + K.n_rows + K.n_v + 1
+        if given.get("coupled", 0):
+            coupled = min(3 * unknowns, MAX_COUPLED)
+            own |= {"coupled": coupled * coupled, "coupled_rhs": coupled, "coupled_pivots": coupled}
         more = {name: max(length, given.get(name, 0)) for name, length in own.items()}
         return given | more | {"starts": starts + K.n_rows * (K.n_v + K.n + K.n_rows)}
 

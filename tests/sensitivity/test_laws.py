@@ -81,3 +81,21 @@ def test_a_contact_watched_from_a_place_on_has_no_part_in_derivatives_before_it_
     names = ["slide.x", "slide.y"]
     found = mbd.sensitivities(model, start, scheme, dt=0.11, until=0.661, wrt=names, of=names)
     np.testing.assert_allclose(found.matrix, np.eye(2), atol=1e-12)
+
+
+@pytest.mark.parametrize("dt", [1e-2, 2e-2])
+def test_masses_that_fall_beside_a_walker_change_none_of_its_derivatives(dt):
+    """RadauIIA finds derivatives of few unknowns from one system of all stages, those of many by corrections."""
+    names = ["left hip.angle", "right hip.angle.rate", "left thigh.mass", "right shank.length", "gravity.x"]
+    found = []
+    for masses in (0, 20):
+        model = kneed_walker()
+        for k in range(masses):
+            mass = mbd.PointMass(f"mass {k}", mass=1.0)
+            model.connect(mbd.Translation(f"fall {k}", model.ground.origin, mass.origin))
+        start = kneed_walker_start(model)
+        of = [*START.names, *START.velocity_names, "time"]
+        run = mbd.sensitivities(model, start, mbd.RadauIIA(), dt=dt, until="right foot", wrt=names, of=of)
+        found.append(run.matrix)
+    assert np.abs(found[0]).max() > 1.0
+    assert np.allclose(*found, rtol=1e-9, atol=1e-9)

@@ -19,6 +19,7 @@ from mbd.kernel.translation.translate import Source, functions_of, translate
 from mbd.sensitivity.tangent import (
     follow_accelerations,
     follow_candidates,
+    follow_coupled_stages,
     follow_impacts,
     follow_newmark,
     follow_stages,
@@ -31,7 +32,15 @@ from mbd.trees.tree import Function
 
 __all__ = ["entry", "keep_optimized", "own_rules", "plain_entry"]
 
-PARTS = (words, follow_candidates, follow_newmark, follow_accelerations, follow_stages, follow_impacts)
+PARTS = (
+    words,
+    follow_candidates,
+    follow_newmark,
+    follow_accelerations,
+    follow_stages,
+    follow_coupled_stages,
+    follow_impacts,
+)
 FILES = tuple(Path(str(part.__file__)) for part in PARTS)
 """Where they stand."""
 
@@ -51,7 +60,8 @@ HELD = (
     "rules.prepare_rates", "schemes.explicit_rates.explicit_rates",
     "schemes.explicit_rates.rates_at_end", "schemes.runge_kutta.find_sizes", "schemes.runge_kutta.note_uneven",
     "schemes.radau_end.end_rates", "stepping.mass_ratios.polish_with_rows", "stepping.restart.holds_rows",
-    "rules.prepare_newton", "rules.prepare_stages", "stepping.observe.store_passed_row",
+    "rules.prepare_newton", "rules.prepare_stages", "rules.prepare_coupled",
+    "rules.prepare_coupled_stages", "stepping.observe.store_passed_row",
     "rules.follow_factors", "rules.factors_at", "rules.solve_by_value", "algebra.saddle.solve_values",
 )  # fmt: skip
 """Functions without derivatives: steps are tried and judged, and instants found, by values alone.

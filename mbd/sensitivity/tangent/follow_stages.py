@@ -22,6 +22,11 @@ from mbd.kernel.schemes.stages import (
     predict_stages,
 )
 from mbd.kernel.tangent_rules import NOT_FOLLOWED
+from mbd.sensitivity.tangent.follow_coupled_stages import (
+    MAX_COUPLED,
+    follow_coupled_stages,
+    prepare_coupled_stages,
+)
 from mbd.sensitivity.tangent.words import (
     MAX_CONTRACTION,
     MAX_CORRECTIONS,
@@ -94,13 +99,15 @@ def follow_held(K: Kernel, m: int) -> None:
             K.stages[o_H + i * m + k] = without_tangent(K.stages[o_H + i * m + k]) + total
 
 
-def factor_coupled_stages(K: Kernel, m: int, h: float, t1: float) -> bool:
-    """Factors, without derivatives, of the matrix of all stages at once; false where a pivot is missing."""
-    size = 3 * (K.n + m)
+def prepare_coupled(K: Kernel, m: int, h: float, t1: float) -> bool:
+    """Factors of the matrix of all stages at once; false where a pivot is missing."""
     couple_stages(K, m, h, t1)
-    for i in range(size * size):
-        K.coupled[i] = without_tangent(K.coupled[i])
-    return bool(factor(K.coupled, size, K.coupled_pivots) == 0)
+    return bool(factor(K.coupled, 3 * (K.n + m), K.coupled_pivots) == 0)
+
+
+def is_coupled(K: Kernel, m: int) -> bool:
+    """Whether one system has the derivatives of all stages: its matrix is the derivative itself, and not too large."""
+    return bool(K.vector == 1 and K.n_cones == 0 and 3 * (K.n + 2 * m) <= MAX_COUPLED)
 
 
 def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
@@ -108,8 +115,9 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
 
     Stages on both sides of a singular configuration are found once more, as they were found.
 
-    The matrices are those of the middle stage, as in the step itself: corrections are taken until they are round-off.
-    Where they do not shrink, each stage takes matrices of its own.
+    One system has them all where its matrix is the derivative itself. Else the matrices are those of the middle stage,
+    as in the step itself: corrections are taken until they are round-off. Where they do not shrink, each stage takes
+    matrices of its own.
     """
     if sharing(K):
         return NOT_FOLLOWED
@@ -129,6 +137,15 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
     o = stage_place(K, STAGE_RATES)
     for i in range(n_stage_numbers(K)):
         K.stages[o + i] = moved(K.stages[o + i], K.starts[place + i])
+    if is_coupled(K, m) and prepare_coupled_stages(K, m, h, t1):
+        o_U = stage_place(K, STAGE_SHIFT)
+        for i in range(3 * K.n_v):
+            K.stages[o_U + i] = without_tangent(K.stages[o_U + i])
+        evaluate_stages(K, h, t1, m, 1.0, c, c * c, False)
+        follow_coupled_stages(K, m, h)
+        status = complete(K, h, t1, m, False, False)
+        restore_stages(K)
+        return status
     if K.vector == 0:
         o_E = stage_place(K, STAGE_BEND)
         for i in range(3 * K.n_v):
@@ -162,7 +179,7 @@ def follow_stages(K: Kernel, h: float, t1: float, m: int) -> int:
                 change = max(change, largest_derivative(K.stages[o_D + i * size + j]))
                 largest = max(largest, largest_derivative(K.stages[o + i * n + j]))
         if not coupled and change > MAX_SHARE_LEFT * before and change > EQUAL_RTOL * largest:
-            if not factor_coupled_stages(K, m, h, t1):
+            if not prepare_coupled(K, m, h, t1):
                 return NOT_FOLLOWED
             coupled = True
             before = 1e300
