@@ -100,11 +100,8 @@ def place_of(point: Vector3, body: tuple[Rotation, Triple]) -> Triple:
 
 def center_of_mass(places: Mapping[str, tuple[Rotation, Triple]], bodies: Mapping[str, Body]) -> tuple[float, Vector3]:
     """Mass [kg] and center of mass [m] with every joint at zero."""
-    mass = 0.0
-    moment: Triple = ZERO
-    for body in bodies.values():
-        m = body.fields()["mass"]
-        mass += m
-        moment = total(moment, scaled(m, place_of(body.center.offset, places[body.name])))
-    x, y, z = (float(part) / mass for part in moment)
+    masses = {name: body.fields()["mass"] for name, body in bodies.items()}
+    mass = sum(masses.values())
+    moments = [scaled(masses[name], place_of(body.center.offset, places[body.name])) for name, body in bodies.items()]
+    x, y, z = (float(sum(parts)) / mass for parts in zip(*moments, strict=True))
     return mass, (x, y, z)
