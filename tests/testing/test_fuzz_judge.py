@@ -375,8 +375,8 @@ def test_the_judge_sees_accelerations_that_alternate_around_those_of_a_drive():
     assert "a drive gives its acceleration" in laws_broken(wrong, model, made.parameters)
 
 
-FORMS = [8, 10000501, 10020026]
-"""Masses in another unit; a driven table that is turned, in halves and beside others; a raised plane."""
+FORMS = [8, 10000501, 10020026, 8030121]
+"""Masses in another unit; a driven table, turned, in halves and beside others; a raised plane; a frame and a ball."""
 
 
 @pytest.mark.parametrize("number", FORMS)
@@ -389,6 +389,17 @@ def test_a_form_that_moves_in_another_way_is_seen(monkeypatch):
     monkeypatch.setattr(Form, "gravity", lambda form: np.array([0.0, -9.0, 0.0]))
     monkeypatch.setattr(forms, "CHANGES", {"turned": forms.CHANGES["turned"]})
     assert "turned: " in verdict(FORMS[0], 100_000, forms=True)["reasons"][0]
+
+
+def test_a_form_that_is_refused_where_its_scene_runs_is_reported(monkeypatch):
+    def without_mass(rng, form):
+        found = form.changed()
+        found.model.connect(mbd.Revolute("loose", found.model.ground.origin, mbd.PointMass("nothing", 0.0).origin))
+        return found
+
+    monkeypatch.setattr(forms, "CHANGES", {"without mass": without_mass})
+    (reason,) = verdict(FORMS[0], 100_000, forms=True)["reasons"]
+    assert "without mass: refused, ModelError: " in reason
 
 
 @pytest.mark.parametrize("given", [("--scenes", "30000000:30000001"), ("--space", "--scenes", "9000000:9000001")])

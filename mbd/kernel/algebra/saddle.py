@@ -272,8 +272,9 @@ def contradicts(K: Balance, y: Any, m: int, what: int) -> bool:
                 worst = max(worst, abs(missed))
                 size = max(size, terms)
                 round_off = max(round_off, ROUND_OFF_RTOL * free)
-                if what == POSITIONS:
-                    round_off = max(round_off, ROW_RTOL * max(K.scale[n + row], 1e-3))
+                if what != OWN_TERMS and (what == POSITIONS or K.dt > 0.0):
+                    unseen = ROW_RTOL * max(K.scale[n + row], 1e-3)
+                    round_off = max(round_off, unseen if what == POSITIONS else unseen / K.dt)
         if worst > COMPATIBILITY_RTOL * size + round_off:
             return True
     return False
