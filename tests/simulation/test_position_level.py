@@ -38,3 +38,18 @@ def test_multipliers_of_index_3_that_are_off_are_told_with_their_error(scheme, a
         if told:
             share = float(re.search(r"by (\d+) %", told[0])[1]) / 100.0
             assert "'drive'" in told[0] and share == pytest.approx(error, rel=0.5, abs=0.01)
+
+
+@pytest.mark.parametrize("dt", [3e-7, 1e-6, 3e-6, 1e-5, 1e-4])
+def test_multipliers_that_are_round_off_of_positions_over_tiny_steps_are_told(dt):
+    """A pendulum by rows on positions, in place of a joint: its tension errs by ε over dt²."""
+    model = mbd.Model("pendulum", cut="all")
+    bob = mbd.RigidBody("bob", 1.0, 0.1)
+    model.connect(mbd.Revolute("hinge", model.ground.point(0.3, 0.2), bob.point(0.1, 0.9)))
+    start = mbd.assemble(model, {"hinge.angle": 0.7})
+    run = mbd.simulate(model, start, mbd.HHT(0.3, formulation="index3"), dt=dt, until=20 * dt)
+    told = [note for note in run.stats["notes"] if "takes round-off of positions" in note]
+    ggl = mbd.simulate(model, start, mbd.HHT(0.3), dt=dt, until=20 * dt)
+    force, exact = run["hinge.reaction_force"][1:], ggl["hinge.reaction_force"][1:]
+    error = float(np.max(np.abs(force - exact)) / np.max(np.abs(exact)))
+    assert bool(told) == (error > 1e-3)

@@ -13,7 +13,7 @@ import numpy as np
 from mbd.assembly.doubtful import degrees
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.equations.equations import Contact
-from mbd.kernel.codes import PULL
+from mbd.kernel.codes import EPS, PULL
 from mbd.results.columns import ModelColumns
 from mbd.results.record import EventRecord, Record
 from mbd.simulation.diagnostics.coarse import coarse_steps, percent
@@ -123,7 +123,9 @@ def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     columns = ModelColumns(record, equations)
     notes += idle_modes(run, record, columns)
     if getattr(run.integrator, "formulation", "") == "index3":
-        notes.append(partial(_position_level_multipliers, record, columns))  # which takes longer than a short run
+        v = run.kernel
+        size = float(np.max(v.scale[v.n : v.n + v.n_rows], initial=0.0))
+        notes.append(partial(_position_level_multipliers, record, columns, size))  # which takes longer than a short run
     turned = _half_turns(columns)
     notes, doubts = [*notes, *turned], doubts + turned
     for number, contact in enumerate(run.manager.contacts):
@@ -354,12 +356,14 @@ def _rotation_vectors(columns: ModelColumns) -> list[tuple[str, list[str]]]:
     return found
 
 
-def _position_level_multipliers(record: Record, columns: ModelColumns) -> list[str]:
+def _position_level_multipliers(record: Record, columns: ModelColumns, size: float) -> list[str]:
     """The note of index 3 on rows whose multipliers differ from what the balance of forces has at the same state.
 
     A scheme of order 2 that holds ``h(q₁) = 0`` alone takes the error of its own position formula, O(dt³), for an
     acceleration: multipliers err by O(dt) in the first steps after a start or an event (Arnold, Brüls, Cardona 2015,
-    Numerische Mathematik 129, 149-179).
+    Numerische Mathematik 129, 149-179). So it does with the round-off of positions, O(1/dt²).
+
+    size : of the largest terms of rows on positions [m, rad]
     """
     if len(record.time) < 3:
         return []
@@ -368,15 +372,25 @@ def _position_level_multipliers(record: Record, columns: ModelColumns) -> list[s
     known = solved.sound & solved.unique
     off = np.max(np.abs(rows.lam - solved.lam)[known], axis=0, initial=0.0)
     share = off / np.maximum(np.max(np.abs(record.lam), axis=0, initial=0.0), 1e-300)
+    steps = np.diff(record.time[: len(rows.lam) + 1])
+    blurred = 16.0 * EPS * size / max(float(np.max(steps)), 1e-300) ** 2  # what rows may miss, as an acceleration
+    fastest_change = float(np.max(np.abs(record.a), initial=0.0))
+    is_brief = blurred > 0.05 * MAX_SHARE * fastest_change
     worst = [
         k
         for k, row in enumerate(columns.equations.rows)
-        if not row.is_velocity and row.friction < 0 and share[k] > MAX_SHARE
+        if not row.is_velocity and row.friction < 0 and share[k] > (0.05 if is_brief else 1.0) * MAX_SHARE
     ]
     if not worst:
         return []
     k = max(worst, key=lambda k: float(share[k]))
     row = columns.equations.rows[k]
+    if is_brief:
+        return [
+            f"multipliers are off, of {row.owner!r} by {percent(float(share[k]))} % of its largest: steps of "
+            f"{float(np.max(steps)):.2g} s are so short that index 3 takes round-off of positions for accelerations "
+            f"of up to {blurred:.2g} m/s² or rad/s²; use a larger dt, or formulation='ggl'"
+        ]
     return [
         f"multipliers of the first steps are off, of {row.owner!r} by {percent(float(share[k]))} % of its largest: "
         "index 3 has them with an error of first order in dt after the start and each event, until its damping has "
