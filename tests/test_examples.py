@@ -23,35 +23,14 @@ from tests.problems import case
 
 g = 9.81
 NAMES = (
-    "basin-picture", "chapter-walker", "compare-two-knees", "compass-gait", "double-pendulum", "find-a-gait",
-    "four-bar", "from-the-laboratory",
-    "identify-a-shank", "kneed-walker", "lagrangian-double-pendulum", "long-pendulum", "pendulum", "prosthetic-leg",
-    "rimless-wheel", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "spinning-top", "steeper-slope",
-    "tennis-racket", "tune-a-knee-damper",
-    "user-constraint", "user-integrator",
+    "amputee-in-space", "ankle-push-off", "basin-picture", "bicycle", "billiard-ball", "chapter-walker",
+    "compare-two-knees", "compass-gait", "double-pendulum", "find-a-gait", "four-bar", "from-the-laboratory",
+    "identify-a-shank", "kneed-walker", "lagrangian-double-pendulum", "long-pendulum", "mpk-swing-control", "pendulum",
+    "powered-knee", "prosthetic-leg", "push-off-wheel", "raibert-hopper", "reflex-walker", "rimless-wheel",
+    "rolling-coin", "shaken-block", "simplest-walker-lagrangian", "slider-crank", "slip-runner", "spinning-top",
+    "spring-mass-walker", "steeper-slope", "tennis-racket", "tippe-top", "torso-walker", "tune-a-knee-damper",
+    "user-constraint", "user-integrator", "walker-in-space",
 )  # fmt: skip
-NAMES = tuple(
-    sorted(
-        (
-            *NAMES,
-            "amputee-in-space",
-            "bicycle",
-            "billiard-ball",
-            "rolling-coin",
-            "tippe-top",
-            "walker-in-space",
-            "ankle-push-off",
-            "mpk-swing-control",
-            "powered-knee",
-            "push-off-wheel",
-            "raibert-hopper",
-            "reflex-walker",
-            "slip-runner",
-            "spring-mass-walker",
-            "torso-walker",
-        )
-    )
-)
 HEAVY = ("amputee-in-space",)
 """Whose plain twin takes minutes: see tests/cases/test_space_examples.py."""
 STUDIES = ("compare-two-knees", "from-the-laboratory", "identify-a-shank", "tune-a-knee-damper")
@@ -121,7 +100,7 @@ def test_an_example_runs_without_faults(name: str) -> None:
     assert max(run.violation.length, run.violation.angle) < 1e-10
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", [name for name in EACH if name not in HEAVY])
 def test_the_plain_twin_moves_like_the_machine_code(name: str) -> None:
     until = 20 * script(name)["dt"]
@@ -130,6 +109,7 @@ def test_the_plain_twin_moves_like_the_machine_code(name: str) -> None:
     assert fast.final.v == pytest.approx(plain.final.v, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in (*COARSE, *STUDIES, *HEAVY)])
 @pytest.mark.parametrize("integrator", [mbd.Newmark(), mbd.HHT(0.1), mbd.GeneralizedAlpha(0.8)], ids=repr)
 def test_the_choice_of_integrator_changes_little(name: str, integrator: Any) -> None:

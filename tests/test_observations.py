@@ -69,16 +69,6 @@ def test_the_motion_is_the_same_to_the_bit_and_costs_the_same():
     assert run.to_xarray(["bend", "lift"])["bend"].attrs["units"] == "rad" and "lift [m]" in model.describe()
 
 
-def test_observations_are_kept_in_files(tmp_path):
-    model, _, shank = leg()
-    model.observe("arm", lambda p: (p[0], p[1]), shank.point(0.1, 0.2), unit="m")
-    run = run_of(model)
-    again = mbd.load(run.save(tmp_path / "leg"))
-    np.testing.assert_array_equal(again["arm"], run["arm"])
-    np.testing.assert_array_equal(again.at(0.123)["arm"], run.at(0.123)["arm"])
-    assert again.to_dataframe(["arm"], at=0.1).attrs["units"]["arm.x"] == "m" and not again["arm.z"].any()
-
-
 def test_expressions_and_mechanisms_given_by_energies_are_observed():
     y = mbd.Coordinate("y", unit="m")
     m, g = sympy.symbols("m g")

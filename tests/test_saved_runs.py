@@ -36,6 +36,9 @@ def same(one: mbd.Trajectory, other: mbd.Trajectory, singly: Sequence[str] | Non
     np.testing.assert_array_equal(one.energy.numerical, other.energy.numerical)
     assert [repr(event) for event in one.events] == [repr(event) for event in other.events]
     assert one.violation == other.violation and repr(one.energy) == repr(other.energy)
+    assert (one.name, one.message, one.parameters) == (other.name, other.message, other.parameters)
+    assert one.settings == other.settings and one.stats == other.stats and repr(one) == repr(other)
+    assert one.final.mode == other.final.mode and np.array_equal(one.final.q, other.final.q)
 
 
 @pytest.mark.covering
@@ -65,6 +68,7 @@ def test_stored_rows_apart_changed_parameters_tables_and_pickles_do_the_same(tmp
     def soften(t, values, state):
         return {"spring.stiffness": 3.0 + t}
 
+    model.observe("height", mbd.height(model.bodies["bar 1"].end))
     model.apply(mbd.Controller("softer", soften, period=0.05, writes=("spring.stiffness",)))
     run = mbd.simulate(model, start, mbd.RadauIIA(), dt=2e-3, store=3, until=0.2)
     assert run.record.parameter_changes

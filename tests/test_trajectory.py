@@ -210,46 +210,6 @@ def test_a_closed_foot_holds_the_place_where_it_touched():
 # files ------------------------------------------------------------------------------------------------------------
 
 
-def test_a_saved_run_answers_the_same_without_its_model(tmp_path):
-    run = ball()
-    path = run.save(tmp_path / "ball")
-    assert path.name == "ball.mbd.npz"
-    again = mbd.load(path)
-    assert again.record.equations is None and again.names == run.names and again.name == "ball"
-    for name in (*run.names, "ball.origin"):
-        np.testing.assert_array_equal(again[name], run[name])
-    assert [e.name for e in again.events] == [e.name for e in run.events]
-    np.testing.assert_array_equal(again.events[0].impulse, run.events[0].impulse)
-    assert again.events[0].energy_loss == run.events[0].energy_loss and again.events[0].row == run.events[0].row
-    assert again.settings == run.settings and again.stats == run.stats and again.message == run.message
-    assert again.energy.sums == run.energy.sums and again.violation == run.violation
-    assert repr(again) == repr(run) and again.parameters == run.parameters
-
-
-def test_a_loaded_run_interpolates_like_a_live_one(tmp_path):
-    run = oscillator(0.02)
-    again = mbd.load(run.save(tmp_path / "run.npz"))
-    times = np.linspace(0.0, 2.0, 77)
-    for name in ("slider.displacement", "slider.rate", "slider.displacement.acceleration"):
-        np.testing.assert_allclose(again.at(times)[name], run.at(times)[name], rtol=0, atol=1e-15)
-    np.testing.assert_allclose(again.at(times)["spring.force"], run.at(times)["spring.force"], atol=2e-4)
-
-
-def test_a_loaded_run_can_be_saved_again_and_gone_on_from(tmp_path):
-    run = ball()
-    again = mbd.load(mbd.load(run.save(tmp_path / "one")).save(tmp_path / "two"))
-    np.testing.assert_array_equal(again["floor.force"], run["floor.force"])
-    assert again.final.mode == run.final.mode and again.final.time == run.final.time
-    np.testing.assert_array_equal(again.final.q, run.final.q)
-
-
-def test_only_the_names_asked_for_are_kept(tmp_path):
-    run = mbd.load(ball().save(tmp_path / "small", names=["ball.origin", "floor.force"]))
-    assert run.names == ("ball.origin.x", "ball.origin.y", "ball.origin.z", "floor.force")
-    with pytest.raises(UnknownNameError, match="'floor.gap'"):
-        run["floor.gap"]
-
-
 def test_a_file_holds_numbers_and_json_only(tmp_path):
     path = walker().save(tmp_path / "run")
     with np.load(path, allow_pickle=False) as file:

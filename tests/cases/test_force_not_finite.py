@@ -46,16 +46,6 @@ def test_the_run_stops_naming_force_time_and_body_and_keeps_what_it_has(scheme: 
     assert t * t / 2 <= J16["x and v at the last valid time"].value[0]
 
 
-def test_the_same_run_is_returned_when_that_is_asked_for() -> None:
-    model = particle(until_half_a_second)
-    run = mbd.simulate(model, mbd.assemble(model), mbd.HHT(), dt=1e-3, until=1.0, on_failure="return")
-    assert not run.success
-    assert run.status == -1
-    assert "'push'" in run.message
-    assert run["place.x"][-1] == pytest.approx(run.time[-1] ** 2 / 2, abs=1e-12)
-    assert run.final.time == pytest.approx(run.time[-1], rel=4e-15)  # the side before the jump
-
-
 def cliff(x: float) -> tuple[float, float]:
     """Real only up to x = 0.3."""
     return 2.0 + 1e-300 * mbd.sqrt(0.3 - x), 0.0

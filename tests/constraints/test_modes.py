@@ -204,23 +204,6 @@ def test_a_mode_sets_the_loss_of_an_ankle_that_a_motor_drives_through_a_spring()
     assert model.check() == []
 
 
-def test_a_run_that_goes_on_or_was_saved_is_the_same_to_the_bit(tmp_path: Any) -> None:
-    model = knee()
-    start = mbd.assemble(model, {"knee.angle": 0.8})
-    whole = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=3.0)
-    first = mbd.simulate(model, start, mbd.RungeKutta853(), dt=0.01, until=whole.events[0].time + 0.07)
-    second = mbd.simulate(model, first.final, mbd.RungeKutta853(), dt=0.01, until=3.0)
-    for name in ("q", "v", "anchors"):
-        np.testing.assert_array_equal(getattr(second.final, name), getattr(whole.final, name))
-    assert second["phase"][0] == "pull"
-    whole.save(tmp_path / "run.npz")
-    loaded = mbd.load(tmp_path / "run.npz")
-    for name in ("phase", "phase.time", "phase.turn", "drive.torque"):
-        np.testing.assert_array_equal(loaded[name], whole[name])
-        assert loaded.at(1.234)[name] == whole.at(1.234)[name]
-    assert set(whole.to_dataframe(["phase"])["phase"]) == {"swing", "pull", "brake"}
-
-
 def test_derivatives_go_through_transitions_timers_and_memories() -> None:
     model = knee()
     names = ("knee.angle", "phase.pull to brake.after", "knee loss.coefficient.pull", "shank.mass")

@@ -54,13 +54,6 @@ def test_a_stride_keeps_events_the_start_and_the_end(store):
     assert len(trajectory.time) <= 1210 / store + 3 * len(every.events) + 3
 
 
-def test_a_last_step_is_cut_to_the_end_of_the_run():
-    trajectory = run(pendulum(), {"hinge.angle": 0.4}, until=0.1234, dt=0.01)
-    assert trajectory.time[-1] == 0.1234 and trajectory.final.time == 0.1234
-    fine = run(pendulum(), {"hinge.angle": 0.4}, until=0.1234, dt=1e-4)
-    assert trajectory["hinge.angle"][-1] == pytest.approx(fine["hinge.angle"][-1], abs=1e-4)
-
-
 def test_the_memory_of_a_long_run_grows_with_its_stored_rows_only():
     model = pendulum()
     start = mbd.assemble(model, {"hinge.angle": 0.4})

@@ -11,7 +11,7 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from tests.comparisons import at_least, compared
 from tests.simulation.frictions import brick, rod
-from tests.simulation.mechanisms import G, ball, run
+from tests.simulation.mechanisms import G, run
 
 LAWS = ("newton", "poisson", "sequential")
 every_law = pytest.mark.parametrize("law", LAWS)
@@ -32,11 +32,6 @@ def thrown(model, law, angle, forward, spin):
     trajectory = run(model, position, velocity, impact=law, until=0.6, dt=0.01)
     row = next(event.row for event in trajectory.events if event.impulse.any())
     return trajectory, row - 1, row
-
-
-def test_an_unknown_law_is_named_with_those_there_are():
-    with pytest.raises(mbd.ModelError, match="sequential"):
-        run(ball(), {"fall.displacement": 1.0}, impact="newtonian")
 
 
 # one contact --------------------------------------------------------------------------------------------------------

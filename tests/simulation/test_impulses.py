@@ -42,13 +42,3 @@ def test_an_opening_has_zero_impulses_of_its_contact():
     assert event.kind == "opened"
     np.testing.assert_array_equal(event.impulse, np.zeros(len(event.impulses["floor"])))
     assert len(event.impulse) == 1 and "impulse" not in repr(event)
-
-
-def test_impulses_are_kept_in_files(tmp_path):
-    trajectory = mbd.simulate(*_tipping(), dt=1e-3, until=("right", 2.0))
-    loaded = mbd.load(trajectory.save(tmp_path / "run"))
-    assert any(event.impulses for event in trajectory.events)
-    for one, other in zip(trajectory.events, loaded.events, strict=True):
-        assert list(one.impulses) == list(other.impulses)
-        for name in one.impulses:
-            np.testing.assert_array_equal(one.impulses[name], other.impulses[name])

@@ -1,12 +1,10 @@
 """Dry friction in joints, in chains and loops; tables and pictures of it."""
 
-import pickle
-
 import numpy as np
 import pytest
 
 import mbd
-from tests.simulation.frictions import brick, check_friction, four_bar
+from tests.simulation.frictions import check_friction, four_bar
 from tests.simulation.mechanisms import pendulum, run
 
 
@@ -63,20 +61,3 @@ def test_pin_friction_that_was_left_out_cannot_be_had_at_run_time():
     model = pendulum(mbd.PinFriction(0.0, 0.1))
     with pytest.raises(mbd.MbdError, match=r"hinge loss\.mu"):
         mbd.simulate(model, mbd.assemble(model), dt=0.01, until=0.1, parameters={"hinge loss.mu": 0.2})
-
-
-# around ------------------------------------------------------------------------------------------------------------
-
-
-def test_friction_is_kept_in_files_tables_and_pictures(tmp_path):
-    trajectory = run(brick(0.3), {"place.y": 0.15}, {"place.x": 2.0}, closed=["left", "right"], until=0.9)
-    again = mbd.load(trajectory.save(tmp_path / "run.npz") or tmp_path / "run.npz")
-    assert [repr(event) for event in again.events] == [repr(event) for event in trajectory.events]
-    np.testing.assert_array_equal(again["left.friction"], trajectory["left.friction"])
-    assert "1 × left stuck" in str(trajectory)
-    assert "left.friction" in trajectory.to_dataframe()
-    assert "stuck" in trajectory.page(tmp_path / "page.html").read_text("utf-8")
-    trajectory.plot("left.friction", "place.x")
-    assert pickle.loads(pickle.dumps(trajectory.final)).mode == trajectory.final.mode
-    swing = run(pendulum(mbd.Coulomb(0.3)), {"hinge.angle": 1.0})
-    assert swing.plot("hinge.friction").axes[0].get_ylabel().endswith("[N m]")

@@ -20,14 +20,6 @@ def balls(heights, **law):
     return model, {f"fall {k}.displacement": height for k, height in enumerate(heights)}
 
 
-def test_sixteen_balls_land_at_one_instant():
-    model, position = balls([0.3] * 16)
-    trajectory = run(model, position)
-    assert len({event.time for event in trajectory.events}) == 1 and len(trajectory.events) == 16
-    for k in range(16):
-        assert trajectory[f"floor {k}.force"][-1] == pytest.approx((1.0 + k) * G, rel=1e-9)
-
-
 def test_code_is_made_only_for_the_modes_that_occur():
     model, position = balls([0.1, 0.2, 0.3, 0.4, 0.5])
     trajectory = run(model, position)

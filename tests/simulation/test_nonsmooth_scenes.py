@@ -82,11 +82,6 @@ def test_contacts_are_located_and_only_what_differs_from_that_is_printed():
     assert "contact  " not in str(run(model, until=0.1, backend="python"))
 
 
-def test_a_wrong_word_is_refused_with_the_right_ones():
-    with pytest.raises(mbd.ModelError, match=r"(?s)non-smooth.*nonsmooth"):
-        run(ball(), {"fall.displacement": 1.0}, contact="non-smooth", backend="python")
-
-
 # ground that moves --------------------------------------------------------------------------------------------------
 def shaken(amplitude, restitution=0.0):
     model, _body = falling(1.0)

@@ -40,14 +40,6 @@ def test_an_event_fires_at_every_crossing_in_its_direction(direction, expected):
     np.testing.assert_array_equal(trajectory.record.v[rows], trajectory.record.v[np.array(rows) - 1])
 
 
-def test_events_at_one_instant_all_happen():
-    guard = mbd.measure("slide.displacement")
-    model = oscillator(mbd.Event("one", guard), mbd.Event("two", guard, direction=-1), mbd.Event("three", guard))
-    trajectory = run(model, {"slide.displacement": 1.0}, until=0.5)
-    assert sorted(event.name for event in trajectory.events) == ["one", "three", "two"]
-    assert len({event.time for event in trajectory.events}) == 1
-
-
 def test_an_event_without_consequence_leaves_the_motion_alone():
     plain = run(oscillator(), {"slide.displacement": 1.0}, dt=1e-3, until=2.0)
     watched = run(
@@ -322,12 +314,6 @@ def test_a_run_ends_at_the_first_closing_of_a_contact_or_at_its_latest_time(unti
 def test_a_run_until_a_contact_that_rests_at_the_start_ends_there():
     trajectory = run(ball(), {"fall.displacement": 0.0}, until="floor")
     assert trajectory.time[-1] == 0.0 and "ended by 'floor'" in trajectory.message
-
-
-def test_a_run_until_an_event_of_the_user_ends_there():
-    model = oscillator(mbd.Event("zero", mbd.measure("slide.displacement"), direction=1))
-    trajectory = run(model, {"slide.displacement": 1.0}, until="zero", dt=1e-3)
-    assert trajectory.time[-1] == pytest.approx(0.75, abs=1e-4)
 
 
 def test_a_run_that_waits_for_an_event_in_vain_has_failed():
