@@ -15,21 +15,24 @@ from tests.simulation.mechanisms import ball, falling
 from tests.simulation.test_many_runs import SCHEMES, same, starts_of
 
 
-@settings(max_examples=10)
+@settings(max_examples=14)
 @given(
-    seed=st.integers(0, 300), scheme=st.sampled_from(SCHEMES), workers=st.sampled_from([1, 2]), spatial=st.booleans()
-)
-def test_a_batch_is_the_runs_of_simulate(seed, scheme, workers, spatial):
+    seed=st.integers(0, 300), scheme=st.sampled_from(SCHEMES), workers=st.sampled_from([1, 2]), spatial=st.booleans(),
+    contact=st.sampled_from(["events", "nonsmooth"]),
+)  # fmt: skip
+def test_a_batch_is_the_runs_of_simulate(seed, scheme, workers, spatial, contact):
     model = random_tree(seed, 3, True, 4) if spatial else random_scene(seed, 2)
     starts = starts_of(model, np.random.default_rng(seed), 3)
     energies = ["kinetic_energy", f"{starts[0].velocity_names[0]}"]
-    found = mbd.batch(model, starts, scheme, 0.02, until=0.4, results=energies, workers=workers)
+    how = {"until": 0.4, "contact": contact if isinstance(scheme, mbd.HHT) and not spatial else "auto"}
+    found = mbd.batch(model, starts, scheme, 0.02, results=energies, workers=workers, **how)
     for k, start in enumerate(starts):
-        alone = mbd.simulate(model, start, scheme, 0.02, until=0.4, on_failure="return")
+        alone = mbd.simulate(model, start, scheme, 0.02, on_failure="return", **how)
         assert found.success[k] == alone.success
         if alone.success:
             assert same(found.final(k), alone.final)
             assert found.message(k) in alone.message
+            assert found.steps[k] == alone.stats["steps"] and found.events[k] == len(alone.events)
             for name in energies:
                 np.testing.assert_allclose(found.results[name][k], alone[name][-1], rtol=1e-12, atol=1e-12)
 

@@ -4,17 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.kernel import codes
 from mbd.simulation.many_runs import ManyRuns, start_line
 from mbd.simulation.marching import Run
 from mbd.simulation.repeated import RepeatedRun
 from mbd.simulation.simulate import REST_SPEED, laid_out
-from mbd.testing.mechanisms import random_scene
 from tests.cases.walkers import kneed, standing
-from tests.comparisons import at_least, compared
 from tests.gait.walkers import simplest
 from tests.problems import case
 from tests.simulation.mechanisms import ball
@@ -34,32 +30,6 @@ def starts_of(model: mbd.Model, rng: np.random.Generator, count: int) -> list[mb
     """States with velocities drawn at random, all contacts open."""
     base = mbd.assemble(model)
     return [mbd.assemble(model, velocity={n: rng.uniform(-1, 1) for n in base.velocity_names}) for _ in range(count)]
-
-
-@at_least(10)
-@settings(max_examples=8)
-@given(seed=st.integers(0, 300), scheme=st.sampled_from(SCHEMES), contact=st.sampled_from(["events", "nonsmooth"]))
-def test_many_runs_are_the_same_as_single_ones(seed, scheme, contact):
-    model = random_scene(seed, bodies=2)
-    if contact == "nonsmooth" and not isinstance(scheme, mbd.HHT):
-        contact = "auto"
-    starts = starts_of(model, np.random.default_rng(seed), 3)
-    try:
-        run = laid_out(model, starts[0], scheme, 0.01, LENGTH, {}, {**OPTIONS, "contact": contact})
-    except mbd.CapabilityError:
-        return
-    many = ManyRuns(run)
-    ends = many(np.array([start_line(run, start) for start in starts]))
-    for k, start in enumerate(starts):
-        alone = mbd.simulate(model, start, scheme, dt=0.01, until=LENGTH, contact=contact, on_failure="return")
-        if ends.status[k] >= codes.DOUBTFUL_START:
-            continue
-        compared()
-        assert (ends.status[k] == codes.DONE) == alone.success or "energy" in alone.message
-        if alone.success:
-            assert same(ends.state(run, k, {}), alone.final)
-            assert ends.steps[k] == alone.stats["steps"]
-            assert ends.events[k] == len(alone.events)
 
 
 @cache
