@@ -12,123 +12,56 @@ from mbd.joints.base import Joint, Label
 from mbd.joints.losses import DissipationFunction, Loss
 from mbd.testing import LawBroken, Verdict, check_joint, check_loss
 
-
-class WrongSign(Revolute):
-    """A hinge whose velocity has the sign turned round."""
-
-    def subspace(self, q, scope):
-        return [((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))]
-
-
-class GroundAxes(mbd.Prismatic):
-    """A slider along x in a turned frame that tells its velocity in the parent's axes."""
-
-    def transform(self, q, scope):
-        R, _ = Revolute("turn", self.parent, self.child).transform([0.5], scope)
-        return R, (q[0], 0.0, 0.0)
-
-    def subspace(self, q, scope):
-        return [((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))]
-
-
-class Stretching(Revolute):
-    """A 'rotation' that stretches."""
-
-    def transform(self, q, scope):
-        R, p = super().transform(q, scope)
-        return tuple(tuple(1.01 * x for x in row) for row in R), p
-
-
-class Forgetful(Revolute):
-    """It reads its angle half."""
-
-    def recover(self, R, p, scope):
-        return [0.5 * super().recover(R, p, scope)[0]]
-
-
-class Stiff(Revolute):
-    """A row too many, which resists the turn."""
-
-    def rows(self, R, p, scope):
-        return [*super().rows(R, p, scope)[:4], ("turn z", R[1][0])]
-
-
-class Loose(Revolute):
-    """Two rows that say the same."""
-
-    def rows(self, R, p, scope):
-        rows = list(super().rows(R, p, scope))
-        return [*rows[:4], ("turn again", rows[3][1])]
-
-
-class Drawn(Revolute):
-    """A joint with play, drawn again each time it is asked."""
-
-    def transform(self, q, scope):
-        COUNT.append(1)
-        return super().transform(q, scope)[0], (1e-4 * len(COUNT), 0.0, 0.0)
-
-
 COUNT: list[int] = []
 
 
-class Secret(Revolute):
-    """It uses a parameter that it does not declare."""
-
-    def transform(self, q, scope):
-        scope.parameter(self.name, "play", 0.25)
-        return super().transform(q, scope)
+def wrong(name: str, base: type = Revolute, **methods: Any) -> type:
+    """A hinge, or another joint, some of whose methods are wrong."""
+    return type(name, (base,), methods)
 
 
-class Flat(Revolute):
-    """A hinge about x that calls itself planar."""
-
-    @property
-    def is_planar(self):
-        return True
+def turning(self, q, scope):
+    return Revolute.transform(self, q, scope)
 
 
-class Wide(Revolute):
-    """⊕ that is not +."""
-
-    def compose(self, q, x):
-        return [a + 2.0 * b for a, b in zip(q, x, strict=True)]
+def all_rows(self, R, p, scope):
+    return list(Revolute.rows(self, R, p, scope))
 
 
-class Degrees(Revolute):
-    """A unit that nothing knows."""
-
-    @property
-    def labels(self):
-        return (Label("angle", "deg"),)
+def shaken(self, q, scope):
+    """Drawn again each time it is asked."""
+    COUNT.append(1)
+    return turning(self, q, scope)[0], (1e-4 * len(COUNT), 0.0, 0.0)
 
 
-class Twins(Revolute):
-    """Two rows of one name."""
-
-    def rows(self, R, p, scope):
-        return [("x", value) for _, value in super().rows(R, p, scope)]
+def with_a_secret(self, q, scope):
+    scope.parameter(self.name, "play", 0.25)
+    return turning(self, q, scope)
 
 
-class Shifted(Revolute):
-    """q ⊕ 0 is not q."""
-
-    def compose(self, q, x):
-        return [a + b + 0.1 for a, b in zip(q, x, strict=True)]
+def stretched(self, q, scope):
+    R, p = turning(self, q, scope)
+    return tuple(tuple(1.01 * x for x in row) for row in R), p
 
 
-class Short(Revolute):
-    """A row is missing."""
-
-    def rows(self, R, p, scope):
-        return list(super().rows(R, p, scope))[:4]
+def half(self, R, p, scope):
+    return [0.5 * Revolute.recover(self, R, p, scope)[0]]
 
 
-class Weak(Revolute):
-    """It finds a fault with itself."""
+def turned_slide(self, q, scope):
+    R, _ = Revolute("turn", self.parent, self.child).transform([0.5], scope)
+    return R, (q[0], 0.0, 0.0)
 
-    def faults(self):
-        return ["the pin is worn"]
+
+WrongSign = wrong("WrongSign", subspace=lambda self, q, scope: [((0.0, 0.0, -1.0), (0.0, 0.0, 0.0))])
+GroundAxes = wrong(
+    "GroundAxes", mbd.Prismatic, transform=turned_slide,
+    subspace=lambda self, q, scope: [((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))],
+)  # fmt: skip
+Forgetful = wrong("Forgetful", recover=half)
+Stiff = wrong("Stiff", rows=lambda self, R, p, scope: [*all_rows(self, R, p, scope)[:4], ("turn z", R[1][0])])
+Flat = wrong("Flat", is_planar=True)
+Short = wrong("Short", rows=lambda self, R, p, scope: all_rows(self, R, p, scope)[:4])
 
 
 @dataclass(frozen=True)
@@ -166,20 +99,32 @@ class Corkscrew(Joint):
 
 JOINTS = {
     "the subspace is the derivative of the transform": (WrongSign, r"expected 1, found -1.*at angle = .*seed 0"),
-    "R is a rotation": (Stretching, r"R Rᵀ entry .*expected 1, found 1\.02"),
+    "R is a rotation": (wrong("Stretching", transform=stretched), r"R Rᵀ entry .*expected 1, found 1\.02"),
     "recover inverts the transform": (Forgetful, r"expected .*, found"),
     "rows vanish on the joint's own motion": (Stiff, r"h entry 4: expected 0"),
-    "rows and coordinates share the six freedoms": (Loose, r"smallest singular value"),
+    "rows and coordinates share the six freedoms": (
+        wrong("Loose", rows=lambda self, R, p, scope: [
+            *(rows := all_rows(self, R, p, scope))[:4], ("turn again", rows[3][1])
+        ]), r"smallest singular value",
+    ),
     "rows do not resist the joint's motion": (Stiff, r"ḣ along 'angle' entry 4: expected 0"),
-    "units are 'rad' or 'm'": (Degrees, r"units \['deg'\]"),
-    "names are told apart": (Twins, r"row names \['x', 'x'"),
-    "q ⊕ 0 = q": (Shifted, r"q ⊕ 0: expected"),
-    "it finds no fault with itself": (Weak, r"the pin is worn"),
-    "determinism": (Drawn, r"transform asked again"),
-    "parameters are declared before they are used": (Secret, r"undeclared: \{'joint\.play': 0\.25\}"),
+    "units are 'rad' or 'm'": (wrong("Degrees", labels=(Label("angle", "deg"),)), r"units \['deg'\]"),
+    "names are told apart": (
+        wrong("Twins", rows=lambda self, R, p, scope: [("x", row) for _, row in all_rows(self, R, p, scope)]),
+        r"row names \['x', 'x'",
+    ),
+    "q ⊕ 0 = q": (wrong("Shifted", compose=lambda self, q, x: [a + b + 0.1 for a, b in zip(q, x, strict=True)]),
+                  r"q ⊕ 0: expected"),
+    "it finds no fault with itself": (wrong("Weak", faults=lambda self: ["the pin is worn"]), r"the pin is worn"),
+    "determinism": (wrong("Drawn", transform=shaken), r"transform asked again"),
+    "parameters are declared before they are used": (
+        wrong("Secret", transform=with_a_secret), r"undeclared: \{'joint\.play': 0\.25\}",
+    ),
     "is_planar tells the truth": (Flat, r"is_planar is True, the transform moves z"),
-    "⊕ is + where is_vector says so": (Wide, r"q ⊕ x"),
-}
+    "⊕ is + where is_vector says so": (
+        wrong("Wide", compose=lambda self, q, x: [a + 2.0 * b for a, b in zip(q, x, strict=True)]), r"q ⊕ x",
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("law", JOINTS)
