@@ -3,8 +3,6 @@
 Names are loaded when they are first used, so that ``import mbd`` itself is quick.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 from mbd.later import register

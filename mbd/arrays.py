@@ -1,7 +1,5 @@
 """Array aliases; the alias says the shape."""
 
-from __future__ import annotations
-
 import ctypes
 from typing import Any, TypeAlias
 

@@ -4,8 +4,6 @@ What the kernel compares these with are scales of the mechanism (`mbd.kernel.ste
 others ask about results: two states, two sides, two rows of a matrix, each relative to its own size.
 """
 
-from __future__ import annotations
-
 SMALL_SUM_RTOL = 1e-14
 """Round-off of a sum of few terms, relative to the largest of them [-]."""
 ROUND_OFF_RTOL = 1e-12

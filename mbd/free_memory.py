@@ -1,7 +1,5 @@
 """How much memory this process may still take, and when it is not searched for what nobody needs."""
 
-from __future__ import annotations
-
 import gc
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The second front door: textbook problems given by their energies, without bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 

@@ -5,8 +5,6 @@ registers these functions by name, and a method looks its function up here when 
 one above it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any

@@ -1,7 +1,5 @@
 """What notebooks show in place of text: tables that can be read aloud too, and texts that keep their lines."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape

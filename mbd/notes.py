@@ -7,8 +7,6 @@ everything of `logging` and `warnings` is. Runs keep theirs in ``run.stats["note
 records.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """Units of columns: results by their names, parameters by what words say of their values, or by their names too."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A linear motion with its rows beside it: all coordinates, accelerations and multipliers, nothing eliminated."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

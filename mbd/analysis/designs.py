@@ -5,8 +5,6 @@ Both spread points better than independent draws: a Latin hypercube has one poin
 where n is a power of two (Sobol 1967; scrambled as in Owen, J. Complexity 14, 1998). `scipy.stats.qmc` makes them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Independent coordinates of a constrained mechanism: a choice by pivoted QR, and how all others follow from them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A mechanism at one instant: which rows act, which frictions stick or slide, accelerations and multipliers."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """From a state to its linear motion: instant, derivatives, independent coordinates, inputs and outputs, modes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

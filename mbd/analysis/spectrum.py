@@ -8,8 +8,6 @@ say all (Hughes 1987, The Finite Element Method, ch. 9; Hilber, Hughes & Taylor 
 with z of the principal pair in the last two.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

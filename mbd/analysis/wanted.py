@@ -1,7 +1,5 @@
 """Results that a study is asked to look at, by name."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.values import names_given

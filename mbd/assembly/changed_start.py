@@ -1,7 +1,5 @@
 """A start with some of its coordinates and rates changed, completed as the first time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Whether a state satisfies the rows that are active in it, and how far it is off."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

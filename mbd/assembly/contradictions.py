@@ -1,7 +1,5 @@
 """What is wrong with a start that does not close: constraints in conflict, or named values that contradict them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rows of constraints that depend on each other: how many are independent, and which follow from which."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is possible but was hardly meant: degrees for radians, millimetres for metres, a hinge twice."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Places at which feet stand at a start: of feet of no mass, and of points of bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import field
 from typing import Any

@@ -5,8 +5,6 @@ unit rate. The singular values of J, its columns of length 1, have no cancellati
 scaled mass matrix.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

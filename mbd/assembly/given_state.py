@@ -1,7 +1,5 @@
 """A model at a state that somebody gives: its compiled equations with the parameters that are valid there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from typing import Any

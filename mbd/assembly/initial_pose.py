@@ -1,7 +1,5 @@
 """Where closing begins, whatever joints are cut: the start that the model has with only its loops cut."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 n bodies that do not touch each other are n small problems; those of one shape are solved as one stack of matrices.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.arrays import Matrix

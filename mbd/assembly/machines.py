@@ -1,7 +1,5 @@
 """What machines hold at a start."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

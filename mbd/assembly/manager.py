@@ -1,7 +1,5 @@
 """The active set of a mechanism, without the rows that hold whatever the motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from mbd.arrays import Vector

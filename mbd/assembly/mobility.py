@@ -1,7 +1,5 @@
 """How many ways a mechanism can move: by the rank of its rows, against Grübler's count."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

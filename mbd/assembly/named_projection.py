@@ -7,8 +7,6 @@ The places and rates that are named, coordinates and other results alike, are th
 angles modulo a turn; rates follow at the pose that was found. What these leave open moves least.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

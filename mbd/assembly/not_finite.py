@@ -1,7 +1,5 @@
 """Which force, constraint, gap or guard is not a finite number at an instant."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which way round cut joints in space are put together: rows that hold directions are 0 half a turn off too."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A mechanism on the way to a consistent start, as numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Closing a mechanism: positions and velocities that satisfy its rows, moved least in the metric of the mass matrix."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

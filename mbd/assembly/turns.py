@@ -1,7 +1,5 @@
 """Whole turns: which of the angles that give one pose is meant, chosen at a start and kept from then on."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Orientations and vectors that a start names as a whole, spelled out as the numbers of their parts."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Quantities that depend on the state of a mode: one for each state, of which that of now acts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """Which values the parameters of a word may have: declared once, held wherever a value is given."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from math import inf
 

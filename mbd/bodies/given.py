@@ -1,7 +1,5 @@
 """What users may give in place of a number, as type checkers and editors see it; values are checked when they come."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeAlias
 

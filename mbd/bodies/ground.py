@@ -1,7 +1,5 @@
 """The ground: what everything is connected to in the end."""
 
-from __future__ import annotations
-
 from mbd.bodies.algebra import ZERO, Triple
 from mbd.bodies.base import Body, Parameter, ParameterSource
 from mbd.bodies.mass import MassProperties

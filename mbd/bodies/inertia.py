@@ -4,8 +4,6 @@ Each helper gives a `Solid` (mass, center, inertia), from which bodies are made:
 ``Link("rod", length=1.0, **rod(2.0, 1.0).link)``, ``RigidBody("box", **box(2.0, (1, 2, 3)).body)``.
 """
 
-from __future__ import annotations
-
 from dataclasses import field
 from typing import Any
 

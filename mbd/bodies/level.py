@@ -1,7 +1,5 @@
 """The height at which joints hold a body of a planar mechanism."""
 
-from __future__ import annotations
-
 from mbd.bodies.algebra import IDENTITY, Rotation, Triple
 from mbd.bodies.base import Frame, ParameterSource
 from mbd.dataclass import dataclass

@@ -1,7 +1,5 @@
 """A straight link, the bone of walkers and linkages."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from mbd.bodies.algebra import ZERO, Triple

@@ -1,7 +1,5 @@
 """Points to look at: places on bodies that results, plots and pages show under a name of their own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Body, Frame

@@ -1,7 +1,5 @@
 """Mass, center of mass and inertia, as scalars for the derivation and as numbers for the check."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 

@@ -4,8 +4,6 @@ A method is compared with the one of the library that it stands for: with the ar
 What is asked of a word without arguments, its parameters, is looked at as the word is taken up.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, lru_cache

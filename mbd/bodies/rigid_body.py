@@ -1,7 +1,5 @@
 """A rigid body in space."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from mbd.bodies.algebra import ZERO, Triple

@@ -5,8 +5,6 @@ derivation hands it a `Scope`, through which it sees parameters, motions and nam
 All vectors are triples of scalars in ground axes, rotations are rows of a 3×3 matrix.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol
 

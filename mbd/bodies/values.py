@@ -1,7 +1,5 @@
 """What users give, checked at the border: finite numbers, triples, axes, names, switches."""
 
-from __future__ import annotations
-
 import math
 import unicodedata
 from collections.abc import Collection, Iterable, Mapping

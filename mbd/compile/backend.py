@@ -1,7 +1,5 @@
 """Machine code or plain Python: the one place that decides."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field

@@ -5,8 +5,6 @@ stopped: a process that ends waits for the step at hand and leaves the rest, and
 steps, so that no lock is held in the child, which goes on with the same jobs as soon as it looks at one (`wake`).
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import os

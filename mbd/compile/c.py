@@ -1,7 +1,5 @@
 """Tape outputs as C99 text."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from mbd.compile.elements import MIN_OPERATIONS

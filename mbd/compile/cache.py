@@ -10,8 +10,6 @@ warning says so; nor is a file of another user, one that others may write to, or
 Nothing here raises: a directory that cannot be used is a cache that remembers nothing.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import stat

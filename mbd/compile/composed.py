@@ -4,8 +4,6 @@ Nothing is derived or compiled for a mode but a jump to the loop over its table,
 costs no more than the table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Kinetic and potential energy at many states: by numpy at first, by machine code where it is asked for often."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any

@@ -8,8 +8,6 @@ inputs of programs, and no part of the digest. The sources of the package that t
 What is met and not known here, such as a joint of a class of a user's own, has no digest.
 """
 
-from __future__ import annotations
-
 import marshal
 import os
 from collections.abc import Iterable, Sequence

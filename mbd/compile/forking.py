@@ -5,8 +5,6 @@ does not exist. So the thread that forks takes these locks first, which waits un
 on both sides.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

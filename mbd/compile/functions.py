@@ -1,7 +1,5 @@
 """Functions of a model by name."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 

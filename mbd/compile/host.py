@@ -1,7 +1,5 @@
 """The processor that machine code is made for."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from functools import cache

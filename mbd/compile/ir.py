@@ -5,8 +5,6 @@ bit of the results in which object file one lies. A piece takes some 50 ms to co
 has to wait for whoever compiles them in the background.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 from mbd.compile.elements import MIN_OPERATIONS

@@ -1,7 +1,5 @@
 """Machine code of loops over tables, each made once, and jumps to it that know their tables."""
 
-from __future__ import annotations
-
 import ctypes
 import weakref
 

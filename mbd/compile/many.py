@@ -1,7 +1,5 @@
 """A compiled function at many blocks of inputs in one call: the loop over the rows is machine code too."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Mapping
 from functools import cache

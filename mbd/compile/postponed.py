@@ -1,7 +1,5 @@
 """A function whose machine code is made the first time it is called."""
 
-from __future__ import annotations
-
 import ctypes
 import threading
 from collections.abc import Callable

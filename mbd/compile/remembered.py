@@ -7,8 +7,6 @@ way. It is text that is read as data; the object files are checked as any other 
 damaged, everything is made again.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Hashable, Mapping
 from functools import cached_property

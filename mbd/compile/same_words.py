@@ -8,8 +8,6 @@ user's, nobody can tell what it will do as it is called, so that a description t
 `as_it_is` tell whether functions that were recorded would be recorded as they were.
 """
 
-from __future__ import annotations
-
 import dis
 import functools
 import sys

@@ -7,8 +7,6 @@ bodies, that is on parameters: it is judged for their values, at positions anywh
 before they cancel (`mbd.equations.derivation`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A ball of a body as what another ball touches, from outside or inside."""
 
-from __future__ import annotations
-
 from mbd.bodies.algebra import cross, difference, dot, scaled, total
 from mbd.bodies.base import Frame
 from mbd.bodies.scope import Scope, Triple

@@ -1,7 +1,5 @@
 """A constraint that always acts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.domains import Domain

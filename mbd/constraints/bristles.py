@@ -1,7 +1,5 @@
 """Friction of a soft contact that sticks elastically: bristles of a fixed stiffness which slide at μ p."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mbd.bodies.domains import Domain, positive

@@ -1,7 +1,5 @@
 """Decisions in plain Python at sample instants and events."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import Any

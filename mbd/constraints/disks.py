@@ -1,7 +1,5 @@
 """A thin disk that may lean any way, and where it touches a plane."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import field
 from typing import Any

@@ -1,7 +1,5 @@
 """A user's own event."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any

@@ -1,7 +1,5 @@
 """Sympy expressions in the names of quantities: ``cos(theta)`` needs no list of what it depends on."""
 
-from __future__ import annotations
-
 import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence

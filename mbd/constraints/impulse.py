@@ -1,7 +1,5 @@
 """An impulse that acts as a contact closes: push-off, a kick, an actuator that fires at a strike."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """A blade, skate or sharp wheel that cannot slip sideways."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

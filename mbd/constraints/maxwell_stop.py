@@ -1,7 +1,5 @@
 """A stop of viscoelastic rubber."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """The promise of measures: where."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Measures of joints and of points: flexion, extension, height, distance, separation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.algebra import difference, dot, norm, rotate

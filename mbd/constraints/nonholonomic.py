@@ -1,7 +1,5 @@
 """A user's own constraint on velocities."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

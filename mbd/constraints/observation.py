@@ -1,7 +1,5 @@
 """Results of one's own: functions of the motion that runs are asked for by name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

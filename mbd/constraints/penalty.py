@@ -1,7 +1,5 @@
 """A contact by a force law."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Stiffness, loss and step of a penalty contact from what it shall do."""
 
-from __future__ import annotations
-
 import math
 
 from mbd.bodies.values import among, number

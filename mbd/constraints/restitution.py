@@ -8,8 +8,6 @@ where the integral from −e to 1 is zero, ``(1 + e) χ = ln((1 + χ)/(1 − e �
 Kelvin–Voigt, ``F = k δ + c δ̇`` with the damping ratio ``ζ = c/(2 √(k m))``, ends at δ = 0 ('gap') or F = 0 ('pull').
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

@@ -1,7 +1,5 @@
 """A wheel, a disk or a ball that rolls without slip."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import field
 from typing import Any

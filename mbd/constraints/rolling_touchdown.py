@@ -1,7 +1,5 @@
 """Where a foot meets the ground and rolls: a round one, and a convex sole of any shape."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """Convex soles: their support function and its integral, from points or from a function."""
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Callable, Sequence

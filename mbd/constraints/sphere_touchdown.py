@@ -1,7 +1,5 @@
 """Where a ball meets the ground, on which it rolls, slips and spins."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import field
 from typing import Any

@@ -1,7 +1,5 @@
 """A leg of no mass that is a spring: runners and hoppers on springs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """What stops with memory have in common: where they are, and numbers of which each is a parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Where a foot meets the ground."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import field
 from typing import Any

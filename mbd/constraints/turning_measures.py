@@ -1,7 +1,5 @@
 """Measures of joints that turn freely: how far inside a cone of directions, and how far from a limit of twist."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A contact by Lagrange multipliers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """A user's own measure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

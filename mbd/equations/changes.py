@@ -8,8 +8,6 @@ change by
 Where coordinates add these are ∂p/∂x_j and ∂R/∂x_j; else see `Inputs.by_increments`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mbd.bodies.algebra import cross, difference, rotate, total

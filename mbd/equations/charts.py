@@ -1,7 +1,5 @@
 """Motions within the chart of a step, as expressions: where coordinates do not add (see `mbd.configuration`)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.tape.derivatives import jvp, substitute

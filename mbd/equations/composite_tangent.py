@@ -21,8 +21,6 @@ dynamics by them: A. Jain, G. Rodriguez, AIAA J. 31 (1993) 1460; J. Carpentier, 
 virials, where a plane leaves one number of each, is our own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 

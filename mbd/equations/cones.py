@@ -13,8 +13,6 @@ s = (1, 1), (1, 1, 0)  w = γ: opposite to the velocity as it changes within a s
 ‖s‖ = 10²⁰         along s, whatever γ: in the step in which sliding ends, and at instants
 """
 
-from __future__ import annotations
-
 from mbd.equal import MIN_SQUARED_SPEED
 from mbd.equations.equations import Equations
 from mbd.tape.functions import sqrt

@@ -1,7 +1,5 @@
 """The derivation as words see it where there are generalized coordinates and no bodies."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import NoReturn

@@ -1,7 +1,5 @@
 """What the equations cost in scalar operations, in all and for each effect."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

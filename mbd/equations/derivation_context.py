@@ -1,7 +1,5 @@
 """The derivation as words see it: parameters, tables, states, motions of frames and joints, and named quantities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace

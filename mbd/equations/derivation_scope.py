@@ -1,7 +1,5 @@
 """What the derivation of forces and constraints asks of its surroundings: a tree of bodies, or bare coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """The causes of forces, each with its own virtual work: weight, joint springs and losses, and forces."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import field
 from functools import partial

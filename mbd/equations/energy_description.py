@@ -1,7 +1,5 @@
 """A mechanism in energies: textbook problems, without bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, Self, TypeAlias, cast

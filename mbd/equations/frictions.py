@@ -1,7 +1,5 @@
 """Dry friction that truly sticks: along the tangent of a contact, and in joints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Faults of words, gathered while a model is derived, so that one error reports all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 

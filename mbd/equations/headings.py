@@ -4,8 +4,6 @@ A rotation matrix gives the angle between two bodies modulo a turn only. In a pl
 heading φ, the sum of the angles on its way from the ground, and the angle of a cut joint is the difference of two.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Impulses of the user's as generalized impulses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from mbd.constraints.base import Constraint

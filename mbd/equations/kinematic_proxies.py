@@ -5,8 +5,6 @@ rotation of a certain body, whatever the tape finds equal afterwards; `Kinematic
 the motion itself in.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 
 from mbd.bodies.algebra import ZERO, cross, rotate, transpose

@@ -1,7 +1,5 @@
 """Where rates of first-order states and forces that follow them have kinks: friction reverses, bristles slide."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from mbd.equations.derivation_scope import DerivationScope

@@ -1,7 +1,5 @@
 """The law of a constraint as its kind promises it, or what is missing: nothing that a word says is left aside."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import field
 

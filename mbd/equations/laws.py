@@ -1,7 +1,5 @@
 """The constraints of a model as expressions, while they are gathered."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import field
 

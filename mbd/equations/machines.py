@@ -1,7 +1,5 @@
 """Machines as expressions: first their anchors and named quantities, which laws ask for, and last their changes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 

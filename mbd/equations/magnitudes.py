@@ -1,7 +1,5 @@
 """How large the terms of an expression are before they cancel, which bounds its round-off."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from math import perm
 

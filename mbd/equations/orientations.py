@@ -1,7 +1,5 @@
 """What is read off joints that turn freely: angular velocities in three frames, rotation vector, Euler angles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 

@@ -1,7 +1,5 @@
 """What every derivation offers to words, with bodies or without: the time, parameters, tables."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 
 from mbd.equations.inputs import Inputs

@@ -1,7 +1,5 @@
 """Parameters of a derivation: run-time inputs by name, with exact 0 and ±1 folded into the structure."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 
 from mbd.bodies.promises import line_of_user

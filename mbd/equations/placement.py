@@ -4,8 +4,6 @@ Every point, rotation and velocity made here is remembered with the body that ca
 they change, without differentiating through the chain of rotations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 
 from mbd.bodies.algebra import IDENTITY, ZERO, cross, difference, product, rotate, total

@@ -1,7 +1,5 @@
 """The equations of motion in print: text that can be read line by line, or LaTeX."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import Any

@@ -22,8 +22,6 @@ Of a row on velocities h is zero; index 3 has its rate in the place of h.
 All are values: functions from equations to nodes, which the compile stage turns into code.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple

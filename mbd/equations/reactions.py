@@ -6,8 +6,6 @@ directions of the joint (its springs, losses, motors, stops) is not part of the 
 ``−(∂h/∂ε)ᵀ λ`` of its own rows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 

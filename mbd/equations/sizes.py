@@ -5,8 +5,6 @@ out where pairs are few, and a loop where they are many (`mbd.equations.composit
 bodies, arrays with the square of the coordinates.
 """
 
-from __future__ import annotations
-
 from mbd.errors import ModelError
 from mbd.free_memory import available, size_in_words
 from mbd.topology.plan import Plan

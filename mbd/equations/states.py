@@ -1,7 +1,5 @@
 """First-order states of forces, losses and laws: ``ż = s(t, q, v, z)`` beside the balance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from mbd.equations.derivation_scope import DerivationScope

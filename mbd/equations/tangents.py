@@ -5,8 +5,6 @@ derivation knows of its own (`Geometry.tangent`): of planar trees, quantities of
 the same to round-off.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 They are offered by name, and not listed: they cost nothing until somebody asks for them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cached_property
 

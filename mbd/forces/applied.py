@@ -1,7 +1,5 @@
 """A force or torque applied to a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import Any

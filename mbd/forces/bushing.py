@@ -1,7 +1,5 @@
 """An elastic joint: springs and dampers in all six directions between two frames."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.algebra import cross, difference, product, rotate, scaled, total, transpose

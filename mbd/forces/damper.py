@@ -1,7 +1,5 @@
 """A damper between two points."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

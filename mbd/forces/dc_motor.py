@@ -1,7 +1,5 @@
 """An electric motor with its current."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive

@@ -1,7 +1,5 @@
 """The mass matrix and the forces of motion and weight, as arguments of laws: computed torque."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A drive on the coordinate of a joint."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

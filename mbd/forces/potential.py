@@ -1,7 +1,5 @@
 """A user's own potential."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.given import Function

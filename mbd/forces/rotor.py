@@ -1,7 +1,5 @@
 """The rotor of a drive behind a gear: inertia on the coordinate of a joint."""
 
-from __future__ import annotations
-
 from mbd.bodies.domains import Domain, at_least_zero
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import name_of, number

@@ -1,7 +1,5 @@
 """Curves of `scipy.interpolate` as tables: those that are cubics, piece by piece."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Noisy samples made smooth before a spline goes through them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """A spring between two points."""
 
-from __future__ import annotations
-
 from mbd.bodies.algebra import difference, dot, norm
 from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode, require_use

@@ -1,7 +1,5 @@
 """A measured spring on the coordinate of a joint."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.scope import Scope

@@ -1,7 +1,5 @@
 """A spring on the coordinate of a joint."""
 
-from __future__ import annotations
-
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode, require_use
 from mbd.bodies.given import NumberByMode
 from mbd.bodies.scope import Scope

@@ -7,8 +7,6 @@ the other side. A parameter keeps both sides alike where they are alike beside i
 both, wherever parameters enter a mirrored gait.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise

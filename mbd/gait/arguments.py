@@ -1,7 +1,5 @@
 """What may be given to a search for gaits: every fault of the arguments, said before the first run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -7,8 +7,6 @@ beside them they do not. Where a square matrix is needed, w ∇gᵀ is added to 
 of g to F(c) − c: as F keeps E, w is across F(c) − c, and both vanish together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Literal
 

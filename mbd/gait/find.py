@@ -1,7 +1,5 @@
 """Look for gaits from many starts, and say how each went."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """Stability of a gait: eigenvalues of the derivative of its return map, with those that every gait has told apart."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -12,8 +12,6 @@ itself too. That the mechanism is the same is tried at some states: inertia, for
 what does not depend on the directions along the ground that they are written in, BᵀB, Bᵀḣ and Bᵀ(Ḃv).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ the turn to p₀, which has a solution for every q where the columns of A span w
 follows: of a quaternion the product, of a hinge about the vertical the sum; all that hangs from it is turned with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

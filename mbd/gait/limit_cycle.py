@@ -1,7 +1,5 @@
 """Find a gait that repeats itself."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Literal

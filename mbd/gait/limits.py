@@ -4,8 +4,6 @@ Up to such a point the return map is smooth; beyond it the walk has other events
 along the tangent between a gait with the events of before and what lies beyond.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace

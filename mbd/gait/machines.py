@@ -5,8 +5,6 @@ what was stored as the section was reached follows from the state there; the res
 is among the coordinates of the section.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ whose unit may be any, h is such that the numbers of the map change by as much a
 coordinates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

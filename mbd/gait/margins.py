@@ -5,8 +5,6 @@ that sticks would need more friction than μ where ``μ p − |T| < 0``. Neither
 branch goes on; the least value over the cycle is a smooth test function.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 

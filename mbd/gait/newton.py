@@ -3,8 +3,6 @@
 Of a family of gaits, where one number more picks the member (`mbd.gait.family`), the residual has one entry more.
 """
 
-from __future__ import annotations
-
 from dataclasses import field, replace
 
 import numpy as np

@@ -6,8 +6,6 @@ its velocities, or by the opposite of it, exchanges coordinates with it up to si
 theirs, those along it turn the other way, quaternions (w, x, y, z) follow their angular velocities.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

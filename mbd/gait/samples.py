@@ -4,8 +4,6 @@ The time to the next sample is part of the state. It comes back where the period
 periods: the walk falls in with its samples, as an oscillator is entrained by a clock of nearly its own frequency.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """From a return map and a start to a gait: the section, the step, Newton's method, the multipliers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -9,8 +9,6 @@ Jacobian is regular, so that Newton's method leads from it to every small ε, wh
 singular there.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -5,8 +5,6 @@ inertia, forces, rows, gaps nor events, and no reset names it, a state stands fo
 multiples of 2π. That is tried where an angle has gone further than half a turn, and nowhere else.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.arrays import Vector

@@ -1,7 +1,5 @@
 """Scenes on which multibody systems fail, often silently: definitions, references, and what must hold."""
 
-from __future__ import annotations
-
 import re
 from importlib import import_module
 

@@ -1,7 +1,5 @@
 """A scene with effects that never act: j17."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

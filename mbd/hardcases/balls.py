@@ -1,7 +1,5 @@
 """A ball that bounces to rest (g1, j8), and one that flies into a corner (j9b)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Blocks on two corners: rocking to rest (g3), landing flat (j9)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache, partial
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """What a hard case is: a definition with reference values, what must hold, and a judge that measures it."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence

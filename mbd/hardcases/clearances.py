@@ -1,7 +1,5 @@
 """A slider-crank whose slider has clearance in its guide (g6)."""
 
-from __future__ import annotations
-
 from functools import cache, partial
 from typing import Any
 

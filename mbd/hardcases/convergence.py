@@ -5,8 +5,6 @@ order 2 allows, and in round-off after a few halvings: they must fall by order 2
 allows at every step, not only at the finest.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Newton's cradle: balls in a row that all touch (g2, g2b)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Instants at which a value of a run passes zero."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

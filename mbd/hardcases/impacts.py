@@ -1,7 +1,5 @@
 """Momentum, complementarity and energy at every impact of a run, recomputed from its stored rows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cases chosen by name, judged with their schemes, timed; an error of a judge is a verdict too."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence

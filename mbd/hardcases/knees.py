@@ -1,7 +1,5 @@
 """A leg whose knee runs into a stop of spring and damper, with two rules of release (h1, h1b)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache, partial
 from typing import Any

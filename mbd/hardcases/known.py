@@ -1,7 +1,5 @@
 """What is known not to hold: pairs of a case and a scheme, each with the reason. The one place to list them."""
 
-from __future__ import annotations
-
 KNOWN: dict[tuple[str, str], str] = {}
 """Reasons by case and scheme.
 

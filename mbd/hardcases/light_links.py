@@ -1,7 +1,5 @@
 """Heavy bodies on a light link in space: p5."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

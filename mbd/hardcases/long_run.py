@@ -1,7 +1,5 @@
 """A pendulum over very many periods: j12."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Verdicts as one self-contained HTML page: the table, then each case with its figures and plots."""
 
-from __future__ import annotations
-
 import base64
 import io
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Bodies at rest on more contacts than statics determines: j11 and j11b."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

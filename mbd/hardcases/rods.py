@@ -1,7 +1,5 @@
 """A rod dropped on one end (g4)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Bodies that turn freely in space: p1 to p4."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

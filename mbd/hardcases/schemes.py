@@ -1,7 +1,5 @@
 """The integrators that hard cases are judged with, by name, and what judges ask of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Starts that contradict the rows, and loops that cannot close: j14 and j15."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The same scenes in non-smooth steps: what holds whatever happens within a step, and errors of the size of a step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

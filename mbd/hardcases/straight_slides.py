@@ -1,7 +1,5 @@
 """Sliding in space along a straight line, across which nothing moves: a block stops, a ball rolls on (p8)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Verdicts as a table, for a terminal and for a page of the docs."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A user's force that stops being a number: j16."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

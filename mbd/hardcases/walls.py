@@ -1,7 +1,5 @@
 """A double pendulum whose tip hits a wall (g5)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache, partial
 from typing import Any

@@ -1,7 +1,5 @@
 """A wheel that rolls down a slope without slip: d3."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

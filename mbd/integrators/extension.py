@@ -4,8 +4,6 @@ Each integrator gives one (`Integrator.between`); `mbd.results` evaluates it, an
 them states are led onto the rows that act, and forces and multipliers come from the balance.
 """
 
-from __future__ import annotations
-
 from dataclasses import field
 
 from mbd.dataclass import dataclass

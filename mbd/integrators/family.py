@@ -11,8 +11,6 @@ the stabilized form (Gear, Gupta & Leimkuhler 1985) enforces ḣ = 0 as well, by
 normal to the rows in the metric of the Newton matrix. Rows on velocities are enforced as they are in both.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from typing import Any, ClassVar, Literal, TypeAlias
 

@@ -1,7 +1,5 @@
 """The generalized-α scheme (Chung & Hulbert 1993, J. Appl. Mech. 60:371)."""
 
-from __future__ import annotations
-
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator

@@ -1,7 +1,5 @@
 """Hilber, Hughes & Taylor's scheme (1977, Earthq. Eng. Struct. Dyn. 5:283)."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from mbd.bodies.values import among, is_number, shown

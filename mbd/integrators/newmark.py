@@ -1,7 +1,5 @@
 """Newmark's scheme (Newmark 1959, J. Eng. Mech. Div. ASCE 85:67)."""
 
-from __future__ import annotations
-
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
 from mbd.integrators.base import Integrator

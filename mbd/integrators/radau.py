@@ -1,7 +1,5 @@
 """The three-stage Radau IIA method of order 5: its parameters."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from mbd.bodies.values import is_number, shown

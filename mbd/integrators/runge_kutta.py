@@ -1,7 +1,5 @@
 """Explicit Runge–Kutta schemes; Dormand & Prince's of order 8 (1980, J. Comput. Appl. Math. 6:19)."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from mbd.dataclass import dataclass

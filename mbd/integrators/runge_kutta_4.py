@@ -1,7 +1,5 @@
 """The classical explicit Runge–Kutta scheme of order 4 (Kutta 1901, Z. Math. Phys. 46:435)."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from mbd.dataclass import dataclass

@@ -4,8 +4,6 @@ A step copies what the scheme carries into a record of the kernel, in which the 
 programs of a model, calls the scheme, and copies the outcome back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import field, replace
 from functools import lru_cache

@@ -3,8 +3,6 @@
 Integrators know nothing but numbers. Anything with an `evaluate` can stand in for a walker.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import field
 from typing import Any, Protocol, runtime_checkable

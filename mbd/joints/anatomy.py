@@ -13,8 +13,6 @@ and adduction like a hip besides. A left joint is seen in the mirror, ``R ← S 
 pose of both sides has the same angles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

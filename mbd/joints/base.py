@@ -1,7 +1,5 @@
 """The promise every joint makes: one definition, two uses (tree edge and cut edge)."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -6,8 +6,6 @@ second = ±π/2 where its axes are three and at 0 or π where they are two: firs
 only their sum or difference is known. There `third` is 0, so that the three angles still give R.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import product as every

@@ -1,7 +1,5 @@
 """Names of what is read off joints besides their coordinates and velocities."""
 
-from __future__ import annotations
-
 from mbd.joints.anatomy import angles_of
 from mbd.joints.base import Joint
 from mbd.joints.euler import ANGLE_SUFFIXES, SEQUENCES

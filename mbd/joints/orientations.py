@@ -1,7 +1,5 @@
 """Orientations as users give them: a quaternion, a rotation of scipy, a matrix, an axis with an angle, Euler angles."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rows and angles that several joints share."""
 
-from __future__ import annotations
-
 from mbd.bodies.algebra import basis, dot, rotate
 from mbd.bodies.scope import Rotation, Triple
 from mbd.bodies.values import Vector3

@@ -1,7 +1,5 @@
 """Free motion in a plane."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, field
 

@@ -1,7 +1,5 @@
 """The slider."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, field
 

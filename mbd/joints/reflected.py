@@ -5,8 +5,6 @@ joint whose partner on the other side moves by the mirrored twist for each of it
 exchanges coordinates with it up to signs.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """A joint seen from its child."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mbd.bodies import algebra

@@ -1,7 +1,5 @@
 """A nut on a thread."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, field

@@ -1,7 +1,5 @@
 """Shifts without turning."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, field
 

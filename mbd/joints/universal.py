@@ -1,7 +1,5 @@
 """The cross joint of Cardan and Hooke."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, field
 

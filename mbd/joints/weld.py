@@ -1,7 +1,5 @@
 """No motion at all."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mbd.bodies.algebra import IDENTITY, ZERO

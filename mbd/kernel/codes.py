@@ -1,7 +1,5 @@
 """Numbers that the kernel tells things by: modes of steps, functions, statuses, guards, the log; and its round-off."""
 
-from __future__ import annotations
-
 PASSING, LEFT = 1, 2
 """Values of `near_singular`: within a few steps of a singular configuration, and just beyond it."""
 ACCELERATIONS, GUARDS, SCALES, COMPOSE, TERMS, INCREMENT_RATES, CHART_END, CHART_MOTION, FREE_RATES = range(9)

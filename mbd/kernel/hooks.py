@@ -4,8 +4,6 @@ Interpreted, model functions are Python callables and the scheme is any integrat
 compiled, functions are called by address and the scheme is one of the kernel's own (see `build`).
 """
 
-from __future__ import annotations
-
 from mbd.kernel.records import Kernel, Model, Reals
 
 

@@ -6,8 +6,6 @@ and the sources of the kernel are those that it was made from. A checkout has no
 kernel is built.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from hashlib import sha256

@@ -3,8 +3,6 @@
 The tangent pass (`mbd.sensitivity.tangent`) translates the kernel with other functions of these names, its `rules`.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.records import Balance, Equations, Integers, Kernel, Reals, Steps
 
 NOT_FOLLOWED = -3

@@ -1,7 +1,5 @@
 """Which foot stood on which plate, by where and when."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The axes of a file turned into x forward, y up, z to the right."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What inverse dynamics finds, asked for by name."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path

@@ -6,8 +6,6 @@ and the next entry, 0 at the last one; a parameter then has a type, dimensions a
 guide, ch. 5, 2008).
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tables ``.csv``: a line of names, then numbers between commas, semicolons or tabs."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``mbd gait recording.c3d``: a recording alone, or with a model whose moments stand behind its motion."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

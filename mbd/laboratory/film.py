@@ -1,7 +1,5 @@
 """A run as a laboratory would record it: markers with errors, and a force plate under each foot."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a force plate measured, acting on the foot that stands on it."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from functools import cached_property, partial

@@ -1,7 +1,5 @@
 """Motion from markers: the postures of a model nearest to what the cameras saw."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

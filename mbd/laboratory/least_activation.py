@@ -1,7 +1,5 @@
 """Activations of least Σ a³ that give moments, at all frames at once, by an interior-point method."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

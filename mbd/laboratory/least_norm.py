@@ -1,7 +1,5 @@
 """Forces that balance a motion, at all frames at once; where they are not unique those of least norm."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

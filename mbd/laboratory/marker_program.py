@@ -1,7 +1,5 @@
 """Places of markers and rows of a model with their exact derivatives, as one compiled program."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

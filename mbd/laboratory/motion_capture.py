@@ -1,7 +1,5 @@
 """Files ``.c3d`` through ezc3d: points, analog channels, force plates, events."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A motion as rows of a run, with the forces of contacts and frictions that are known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Postures nearest to measured places, by Gauss–Newton steps from frame to frame and then of all frames at once."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

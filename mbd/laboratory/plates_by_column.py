@@ -1,7 +1,5 @@
 """Force plates in columns of numbers: ``ground_force_vx``, ``1_ground_force_px``, ``plate_1_torque_y``, …"""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Angular velocities and accelerations of orientations that are given as unit quaternions over time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.arrays import Matrix

@@ -1,7 +1,5 @@
 """Recordings from files of other programs."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A person scaled to a patient: lengths from a static trial or by hand, masses by the tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """How far noise in measured angles scatters the moments that inverse dynamics finds from them."""
 
-from __future__ import annotations
-
 from math import comb
 from typing import NamedTuple
 

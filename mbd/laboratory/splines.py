@@ -1,7 +1,5 @@
 """Derivatives of what was sampled: those of not-a-knot cubic splines at their knots."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg.lapack import dpttrf, dpttrs

@@ -1,7 +1,5 @@
 """Storage files of OpenSim, ``.sto`` and ``.mot``: a header up to ``endheader``, labels, columns over time."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

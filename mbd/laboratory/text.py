@@ -1,7 +1,5 @@
 """Tables of numbers in text files: cells, decimal commas, gaps, and errors that name the line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

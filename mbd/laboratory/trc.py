@@ -5,8 +5,6 @@ The first line is ``PathFileType 4 (X/Y/Z) name``, the second names the fields o
 guide).
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

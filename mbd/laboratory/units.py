@@ -1,7 +1,5 @@
 """Units that files are written in."""
 
-from __future__ import annotations
-
 import math
 
 FACTORS = {

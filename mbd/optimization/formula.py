@@ -1,7 +1,5 @@
 """What is sought, as a function of numbers by name, with its derivative by them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Numbers of runs with their exact derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -5,8 +5,6 @@ name, so that two of a kind live side by side. ``mbd.parts.locking_knee(model, "
 connects 'left knee' and constrains 'left knee lock'. See docs/parts.md for equations and sources.
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import TYPE_CHECKING, Any
 

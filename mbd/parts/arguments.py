@@ -1,7 +1,5 @@
 """What the functions of parts are given, checked at the border."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Results at one state: places and velocities, no forces."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

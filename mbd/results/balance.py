@@ -6,8 +6,6 @@ the constraint manifold, as at a stage of an explicit step, all of them together
 other. Their multipliers are those of least norm among all that give the same forces.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary

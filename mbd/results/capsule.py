@@ -1,7 +1,5 @@
 """Files of failures: numbers and words as in the file of a run, the model pickled beside them."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """What the words of a file must be, and which arrays of which shapes they call for; anything else is refused."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ constraint Jacobian loses rank would err by 1/x, x how far it is from there: pol
 lie far enough from such poses, take its place.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

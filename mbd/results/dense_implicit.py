@@ -9,8 +9,6 @@ in the middle of the interval, which the error of a step of order 5 is far below
 short steps, in which δ is no matter.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

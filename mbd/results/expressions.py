@@ -5,8 +5,6 @@ a run that is read from a file gives the same bits between its rows as the one t
 executed but these operations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any

@@ -1,7 +1,5 @@
 """The step at which a run failed, with everything needed to repeat it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path

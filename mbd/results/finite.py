@@ -1,7 +1,5 @@
 """Results of users' own that are no numbers somewhere are errors where they are asked for by name."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.arrays import Matrix, Vector

@@ -12,8 +12,6 @@ polynomials through the stored values are better. What changes less when q and v
 lower degree is taken.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -6,8 +6,6 @@ their class and what a pickle of them holds, and classes by all that they define
 of the list counts by its name. What cannot be read has no digest, and is named.
 """
 
-from __future__ import annotations
-
 import copyreg
 import dis
 import functools

@@ -1,7 +1,5 @@
 """Values between stored rows: cubic Hermite within a smooth segment, never across a switch."""
 
-from __future__ import annotations
-
 from dataclasses import field, replace
 from itertools import pairwise
 from typing import Literal

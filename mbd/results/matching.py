@@ -1,7 +1,5 @@
 """Events of two runs, each with its like in the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

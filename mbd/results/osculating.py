@@ -9,8 +9,6 @@ Rows beyond a kink, as of a contact force, must not count: where P does not diff
 its two sides from each other still less, the side nearer to Q is taken, or Q itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import perm
 

@@ -6,8 +6,6 @@ number of rows is taken from one side, and stretches that are short or uneven gi
 rates are ``∫ P dt = h/2 (P₀ + P₁) + h²/12 (Ṗ₀ − Ṗ₁)``, of order 4 (Davis & Rabinowitz 1984, ch. 2.9).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States in plain words and arrays, and back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from importlib import import_module

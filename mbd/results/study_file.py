@@ -5,8 +5,6 @@ seal, a hash of the first line and of its own content, so that a line of another
 last line that a kill has cut short counts as a part that was not done.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator, Mapping

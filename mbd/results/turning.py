@@ -8,8 +8,6 @@ one row to the next it changes by the multiple of 2π that brings it nearest to 
 Where the two differ by more than `MAX_TURN`, the count is a guess, which a note of the run tells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Units of named results, from their names."""
 
-from __future__ import annotations
-
 from mbd.results.facts import Facts
 
 ENDINGS = {

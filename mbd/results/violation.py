@@ -1,7 +1,5 @@
 """How far the active constraints of a run are from holding."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.dataclass import dataclass

@@ -1,7 +1,5 @@
 """What a run is asked to be differentiated by, and what is made of the derivatives that it carries."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Derivatives of the state and instant at which a run ended."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 

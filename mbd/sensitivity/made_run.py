@@ -1,7 +1,5 @@
 """A run that carries its derivatives as it is made, so that it need not be made a second time for them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 

@@ -5,8 +5,6 @@ by all the friction that it can have slides where it needs more; an event whose 
 end, happens within the run on one side of it and not on the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Results at the end of a run, instants of its events, and their derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a pass over a run has found: the end and the events, with their derivatives."""
 
-from __future__ import annotations
-
 from dataclasses import field
 
 from mbd.arrays import Vector

@@ -1,7 +1,5 @@
 """Resets of users' events, differentiated: the functions that give the values are traced as those of forces are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

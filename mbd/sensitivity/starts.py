@@ -5,8 +5,6 @@ least in the metric of the mass matrix until the rows on positions and the gaps 
 where they are then; then velocities.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ An orientation has three directions: 'hip.turn.x', '.y', '.z' are small rotation
 ``R → R exp(δθ̂)`` [rad]. 'hip.orientation' stands for all of them, 'hip.angular_velocity' for its three components.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

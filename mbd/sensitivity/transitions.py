@@ -1,7 +1,5 @@
 """What machines hold at a start, with its derivatives."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

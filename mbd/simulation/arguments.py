@@ -1,7 +1,5 @@
 """What may be given to a run: every fault of the arguments, said before the first step."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from numbers import Integral

@@ -1,7 +1,5 @@
 """Many runs of one laid-out run, in few calls of the kernel: starts as a table, ends as a table."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from time import perf_counter
 

@@ -4,8 +4,6 @@
 which only the end is asked: here the kernel's arrays are laid out once, and a run is a start put into them and a march.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Plain evaluation of tape expressions, node by node: simple, and never raising on numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Samples to piecewise cubics: the breaks and coefficients of a `Table`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

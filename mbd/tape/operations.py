@@ -4,8 +4,6 @@
 of UNARY and BINARY raise as `math` does; `value` never raises and follows IEEE 754.
 """
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable

@@ -11,8 +11,6 @@ Costs are products of how many entries a row and a column have besides the pivot
 that an order takes little more time than the elimination has entries.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from heapq import heappop, heappush
 

@@ -1,7 +1,5 @@
 """One of several values, by a number that is known as the program runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mbd.tape.functions import where

@@ -3,8 +3,6 @@
 sympy is the symbolic face only; it is imported inside the functions and stays out of the derivation.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

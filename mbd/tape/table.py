@@ -1,7 +1,5 @@
 """Piecewise cubics of one variable, stored beside the parameters."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Users' functions on the tape: plain Python functions of scalars, sympy expressions, or numbers."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import re

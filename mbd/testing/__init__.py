@@ -8,8 +8,6 @@ what holds is returned as a `Verdict`.
 ``postures``, ``frames``, ``trees``, ``loops``, ``scenes`` and ``states`` are Hypothesis strategies (extra `test`).
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

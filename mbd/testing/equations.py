@@ -1,7 +1,5 @@
 """Laws of equations of motion: what holds for every mechanism, whatever it is made of."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Laws of forces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Laws of integrators."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws of measures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 

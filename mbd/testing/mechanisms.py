@@ -1,7 +1,5 @@
 """Random mechanisms, each made from a seed: trees with any joints, planar loops, scenes with contacts and losses."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Numbers from equations: random inputs, evaluation by the plain interpreter, finite differences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 

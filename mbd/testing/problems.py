@@ -1,7 +1,5 @@
 """Smooth problems in a few numbers, on which integrators show their order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws along a run: complementarity, impacts, what is held stays held, energy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

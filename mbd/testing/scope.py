@@ -1,7 +1,5 @@
 """A plain scope for tests of words: every body floats freely, and numbers come out of the tape."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

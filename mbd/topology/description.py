@@ -1,7 +1,5 @@
 """A mechanism in words: what is connected to what."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """What is possible in a description but was hardly meant: millimetres for metres, grams for kilograms, twin hinges."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations, pairwise
 from typing import Any

@@ -5,8 +5,6 @@ without fused multiply-add, which is used in sines and cosines only. C may compu
 any order; of the kernel's functions no two that stand in one expression change what the other reads.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

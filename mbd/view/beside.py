@@ -1,7 +1,5 @@
 """Files that a copy of this process writes while this one continues."""
 
-from __future__ import annotations
-
 import os
 import sys
 import warnings

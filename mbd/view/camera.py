@@ -1,7 +1,5 @@
 """How a spatial scene is seen: parallel rays, so that lengths across them are true and a scale holds everywhere."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Facets are so small that painting them from the farthest to the nearest hides what is behind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

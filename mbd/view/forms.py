@@ -5,8 +5,6 @@ A body is drawn as the uniform solid of equal mass and moments of inertia: the o
 `mbd.box`, `mbd.cylinder`, `mbd.disk` and `mbd.sphere` describe is drawn as it is; an inertia that was mistaken shows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

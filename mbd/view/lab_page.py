@@ -1,7 +1,5 @@
 """The page that ``mbd accuracy`` and ``mbd effects`` fill: self-contained, no network, no libraries, our own script."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from html import escape

@@ -1,7 +1,5 @@
 """A parser of command lines that takes no abbreviations and suggests what a misspelt word was to be."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import difflib

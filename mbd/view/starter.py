@@ -1,7 +1,5 @@
 """The script that ``mbd new NAME`` writes."""
 
-from __future__ import annotations
-
 STARTER = '''"""{title}: a leg that swings, bends its knee and meets the ground.
 
 Run it with   mbd run {file}   : numbers, plots and a page with the motion.

@@ -1,7 +1,5 @@
 """The look that plots and pages share."""
 
-from __future__ import annotations
-
 from typing import Any
 
 CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#4D4D4D")

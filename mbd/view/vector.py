@@ -1,7 +1,5 @@
 """Plots as SVG that follow the light or dark page of their reader."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

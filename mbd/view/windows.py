@@ -1,7 +1,5 @@
 """Figures that users look at: a window of a script, or the cell of a notebook. Importing this needs matplotlib."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from matplotlib import get_backend, pyplot

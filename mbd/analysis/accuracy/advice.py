@@ -1,7 +1,5 @@
 """What the points of the lab mean, in plain words: the cheapest for an error, and what ten times less would cost."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The study of effects: the whole scene, the scene without each of them, and without all that may go."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext

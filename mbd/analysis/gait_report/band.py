@@ -1,7 +1,5 @@
 """Bands of normal gait behind the curves of a report, from tables that a user has."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Forces of fiber and tendon over their lengths and velocity, normalized: De Groote & Fregly, and Millard et al."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from functools import cache, cached_property

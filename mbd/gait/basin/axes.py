@@ -1,7 +1,5 @@
 """Axes of a study of starts → columns: coordinates and rates on the section, parameters."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

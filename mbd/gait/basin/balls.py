@@ -8,8 +8,6 @@ by at least a tenth of what the linear map promises; r is halved until they do. 
 map in a ball this small they leave little room.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The outcomes of starts, by number and letter."""
 
-from __future__ import annotations
-
 KINDS: tuple[str, ...] = (
     "walks", "falls forward", "falls backward", "falls", "scuffs", "stands", "chatters", "numerical error",
     "other event", "wrong contacts", "misses", "not on the section", "not decided",

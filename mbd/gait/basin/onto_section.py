@@ -5,8 +5,6 @@ name; velocities, of which rows are linear, one such step over those without a n
 what is left, and the caller judges it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the end of a return says: it arrives, or what became of the walk; by the rules of `ReturnMap`, for many."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Friction that rises or falls in proportion to the speed."""
 
-from __future__ import annotations
-
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import number

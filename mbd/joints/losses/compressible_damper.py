@@ -1,7 +1,5 @@
 """A hydraulic damper whose oil is compressed before it flows: the hysteresis of its valves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive

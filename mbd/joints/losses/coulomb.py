@@ -1,7 +1,5 @@
 """Dry friction, truly sticking or smoothed."""
 
-from __future__ import annotations
-
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import number

@@ -1,7 +1,5 @@
 """Dry friction as a spring that yields: Dahl's model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive

@@ -1,7 +1,5 @@
 """A user's own dissipation function."""
 
-from __future__ import annotations
-
 import math
 
 from mbd.bodies.algebra import derivatives_at

@@ -1,7 +1,5 @@
 """A loss of a velocity in a plane or in space, against it whatever its direction."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mbd.bodies.scope import Scope

@@ -1,7 +1,5 @@
 """Dry friction as bristles that bend and slip: the LuGre model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive

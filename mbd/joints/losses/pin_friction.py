@@ -1,7 +1,5 @@
 """Dry friction of a pin in its bore."""
 
-from __future__ import annotations
-
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.dataclass import dataclass

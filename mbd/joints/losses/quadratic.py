@@ -1,7 +1,5 @@
 """Hydraulic damping: an orifice."""
 
-from __future__ import annotations
-
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import number
 from mbd.dataclass import dataclass

@@ -1,7 +1,5 @@
 """Dry friction that falls from its static to its kinetic size as sliding sets in."""
 
-from __future__ import annotations
-
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.scope import Scope
 from mbd.bodies.values import number

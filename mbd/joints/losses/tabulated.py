@@ -1,7 +1,5 @@
 """A measured damper."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.scope import Scope

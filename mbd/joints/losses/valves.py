@@ -1,7 +1,5 @@
 """One loss for motion backwards and another for motion forwards: one-way valves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any

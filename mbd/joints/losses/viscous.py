@@ -1,7 +1,5 @@
 """Damping in proportion to the rate."""
 
-from __future__ import annotations
-
 from dataclasses import field
 
 from mbd.bodies.by_mode import number_by_mode, parameter_by_mode, parameters_by_mode, require_use

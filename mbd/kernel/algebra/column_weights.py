@@ -5,8 +5,6 @@ column would be all that there is of a row, and which rows depend on others be d
 counts as less than a share of the largest of its unit. Planar coordinates, which add up, keep theirs.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.records import Model, Reals
 
 MIN_INERTIA_SHARE = 1e-8

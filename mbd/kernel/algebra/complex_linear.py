@@ -3,8 +3,6 @@
 A complex N×N elimination takes half the operations of the real one of 2N × 2N, and the parts apart become vectors.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.records import Reals
 from mbd.kernel.tangent_rules import takes_part
 

@@ -4,8 +4,6 @@ Each is a problem of its own: n bodies that do not touch each other are n small 
 than 0.0; where one vanishes at an instant both orders of solving are the same.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.redundancy import shared
 from mbd.kernel.records import DependentRows, LinearAlgebra
 from mbd.kernel.tangent_rules import takes_part

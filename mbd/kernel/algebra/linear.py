@@ -3,8 +3,6 @@
 Hand-written because it runs inside the compiled kernel, where below about 28 unknowns it beats a library call.
 """
 
-from __future__ import annotations
-
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals

@@ -6,8 +6,6 @@ knows which concern it. Nothing is exchanged; instead every pivot is compared wi
 `mbd.tape.elimination`, and where one is too small the caller searches for pivots.
 """
 
-from __future__ import annotations
-
 from mbd.compile.orders import HEADER_SIZE
 from mbd.kernel.algebra.linear import solve
 from mbd.kernel.records import Equations, Model, Motion, Reals

@@ -1,7 +1,5 @@
 """LU factors of a complex matrix in an order chosen beforehand: `algebra.ordered` with real and imaginary parts."""
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.ordered import HEADER_SIZE, is_sound
 from mbd.kernel.records import Steps
 from mbd.kernel.tangent_rules import takes_part

@@ -1,7 +1,5 @@
 """The steps of Gram–Schmidt on rows of n numbers that lie one behind another in an array."""
 
-from __future__ import annotations
-
 from mbd.kernel.records import Reals
 from mbd.kernel.tangent_rules import takes_part
 

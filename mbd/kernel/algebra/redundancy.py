@@ -5,8 +5,6 @@ no friction slides the forces Bᵀλ alone matter, so that the solve leaves λ_d
 Where one does, its force depends on how a load is shared (other μ, other drag): the shares are part of the solve then.
 """
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL, RANK_RTOL
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.linear import factor, solve

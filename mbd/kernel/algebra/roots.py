@@ -1,7 +1,5 @@
 """The square root of the kernel's language: one rounding, whether interpreted or at any level of optimization."""
 
-from __future__ import annotations
-
 import math
 
 

@@ -4,8 +4,6 @@
 of velocity and λ the impulse. M may be singular; only the whole matrix is ever solved with.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.equal import DIRECT_PIVOT_RTOL, ROUND_OFF_RTOL

@@ -1,7 +1,5 @@
 """The active-set manager: constraints register, it keeps who is closed and by which rule each opens."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 from itertools import accumulate, chain

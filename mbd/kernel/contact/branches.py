@@ -1,7 +1,5 @@
 """The linear equations of a set of branches: who pushes, who sticks, and which way the rest slides."""
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.redundancy import sharing, spread
 from mbd.kernel.algebra.saddle import solve_at
 from mbd.kernel.contact.cone_loads import keep_in_cones

@@ -5,8 +5,6 @@ its rest smoothly, what it moves has neither speed nor acceleration yet; the mot
 which way.
 """
 
-from __future__ import annotations
-
 from mbd.equal import REST_SPEED
 from mbd.kernel.contact.cones import aim, follows, set_loose, set_sticking
 from mbd.kernel.records import DependentRows, Switching

@@ -16,8 +16,6 @@
 Non-smooth steps with friction in space begin with the cones.
 """
 
-from __future__ import annotations
-
 from mbd.equal import LAW_RTOL, NOMINAL_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CONFLICT, NO_IMPACT

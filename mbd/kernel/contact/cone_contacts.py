@@ -9,8 +9,6 @@ contact pushes (see `kernel.contact.cone_problem`). Of a non-smooth step z is th
 smooth part included, so that what was closed may push less than it did there, but never pull.
 """
 
-from __future__ import annotations
-
 from mbd.equal import REST_SPEED
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.redundancy import shared, sharing

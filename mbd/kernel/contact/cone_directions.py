@@ -6,8 +6,6 @@ on the angles continues, ``γ × e = 0``, with slopes by differences: what γ is
 a plane turns by one angle, a direction in space by two.
 """
 
-from __future__ import annotations
-
 from mbd.equal import SMALL_SUM_RTOL
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt

@@ -12,8 +12,6 @@ slips then and which way: σ rises with the power that the load has beyond that 
 feet.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL, LAW_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.redundancy import largest_limit, share, sharing

@@ -18,8 +18,6 @@ impulses are the same in any order of contacts and close to those of least norm;
 solved, with ε on the diagonal, which keeps steps small along what is undetermined.
 """
 
-from __future__ import annotations
-
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt

@@ -10,8 +10,6 @@ Far from rest λ_T follows γ within a step. No step can go through ‖γ‖ = 0
 A motion that only comes close to rest turns around it in shortened steps, and slides on.
 """
 
-from __future__ import annotations
-
 from mbd.equal import EQUAL_RTOL, MIN_DIVISOR, REST_SPEED
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import STICK

@@ -1,7 +1,5 @@
 """How fast friction in a plane or in space turns the direction in which it slides."""
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL, REST_SPEED
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.roots import sqrt

@@ -7,8 +7,6 @@ is 0.0 while they do. K.hold says how much of that direction counts within a ste
 nothing, λ_T follows γ.
 """
 
-from __future__ import annotations
-
 from mbd.equal import MIN_DIVISOR, MIN_SQUARED_SPEED
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, Frictions, Guards, Reals

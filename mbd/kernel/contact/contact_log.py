@@ -1,7 +1,5 @@
 """Lines of the event log."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import LOG_CLOSED, LOG_EVENT, LOG_OPENED
 from mbd.kernel.contact.impact_solve import strikes
 from mbd.kernel.records import Sizes, Switching

@@ -1,7 +1,5 @@
 """After an event: who pushes, sticks and slides, so that accelerations and forces are consistent."""
 
-from __future__ import annotations
-
 from mbd.equal import REST_SPEED
 from mbd.kernel.algebra.islands import find_islands
 from mbd.kernel.algebra.roots import sqrt

@@ -7,8 +7,6 @@ conditions of optimality with κ_i (−g_i) = τ, τ → 0 (Boyd & Vandenberghe 
 ch. 11.7). All numbers are of the size of one: whoever asks scales them.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import Complementarity

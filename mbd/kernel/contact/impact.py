@@ -13,8 +13,6 @@ Stronge       as Poisson, with one factor on all impulses of the second phase, s
               taken where another law would create energy or, with restitution and friction, has no solution
 """
 
-from __future__ import annotations
-
 from mbd.equal import LAW_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CONFLICT, ENERGY_GAIN, NO_IMPACT, PULL

@@ -1,7 +1,5 @@
 """One impact: the jump of velocities and its impulses, of all contacts and frictions that take part in it."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import ACCELERATIONS
 from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import hold_directions

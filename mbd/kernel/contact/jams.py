@@ -6,8 +6,6 @@ an instant the push grows until the slide has stopped, as in an impact whose app
 laws: of an approach that tends to zero, which leaves no solution in which the contact slides on.
 """
 
-from __future__ import annotations
-
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.codes import LOG_OPENED, LOG_STUCK, NO_FORCE
 from mbd.kernel.contact.contact_log import ALL_IMPULSES, NO_IMPULSE, log_event

@@ -12,8 +12,6 @@ instead of carrying the accelerations of the free flight on. A contact that woul
 beyond its limit, let go before it, and the step is taken again.
 """
 
-from __future__ import annotations
-
 from mbd.equal import REST_SPEED
 from mbd.kernel.algebra.linear import largest_entry
 from mbd.kernel.codes import CONFLICT, EPS, LOG_OPENED, NO_IMPACT, PULL

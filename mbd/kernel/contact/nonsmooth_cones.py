@@ -6,8 +6,6 @@ whole step is found again, as an impulse in the cone opposite to the velocity at
 first order, for all contacts together.
 """
 
-from __future__ import annotations
-
 from mbd.equal import NOMINAL_RTOL, REST_SPEED
 from mbd.kernel.codes import PULL
 from mbd.kernel.contact.cone_turns import MIN_STEPS_TO_REST, STABILITY_SHARE, estimated_turn_rate

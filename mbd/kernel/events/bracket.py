@@ -1,7 +1,5 @@
 """The root of one guard that fired between two distances from the accepted state."""
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, OPEN_FORCE, OPEN_GAP, OPEN_PULL, PRESS, SLIP, STICK, WATCH
 from mbd.kernel.contact.cones import along

@@ -7,8 +7,6 @@ however many, take part in no other's impact. What is counted depends on the mot
 instant wherever it is cut.
 """
 
-from __future__ import annotations
-
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.records import Guards, Switching
 

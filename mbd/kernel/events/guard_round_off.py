@@ -16,8 +16,6 @@ guard that a closed contact holds at zero, as its own gap, is not crossed by wha
 its units, a small guard is thus measured by its own scale; nothing of this is evaluated unless a sign has changed.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.codes import EPS, GUARDS, TERMS
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Guards, Model, Reals, Switching

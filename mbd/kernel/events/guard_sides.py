@@ -12,8 +12,6 @@ before, ġ₀:
     otherwise   it has passed
 """
 
-from __future__ import annotations
-
 from mbd.equal import INSTANT_RTOL, MIN_DIVISOR
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, LOG_EVENT, STICK
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event

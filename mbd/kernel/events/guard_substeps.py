@@ -10,8 +10,6 @@ is by four short steps in place of the long one; one that is shallower than the 
 like one between two short steps.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.codes import EPS
 from mbd.kernel.events.guards import gap_scale, gap_tolerance, goes_back, is_watched, judge, watch
 from mbd.kernel.records import Contacts, Guards, Switching

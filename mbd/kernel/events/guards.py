@@ -5,8 +5,6 @@ the step (cubic Hermite interpolant; `locate` then steps to the dip itself). A c
 armed is ignored until its gap has risen above zero. Closed contacts fire by their release rule.
 """
 
-from __future__ import annotations
-
 from mbd.equal import NOMINAL_RTOL, ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import (

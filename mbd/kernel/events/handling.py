@@ -1,7 +1,5 @@
 """What a step ends with: an event that was located, or the impact of a non-smooth step."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import (
     CHATTER,
     CLOSE,

@@ -1,7 +1,5 @@
 """Guards between the ends of a step: their cubic Hermite interpolant, its turn and its zero."""
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.roots import sqrt
 
 

@@ -4,8 +4,6 @@ The impulse alone changes velocities by M⁻¹ w P. What rows and contacts make 
 are closed, in which none closes; with the order 'with' it is the impact of the closing ones itself.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import LOG_OPENED, LOG_PUSHED
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event

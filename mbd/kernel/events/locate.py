@@ -1,7 +1,5 @@
 """The instant at which a guard fired, exactly: steps of varying size from the same accepted state."""
 
-from __future__ import annotations
-
 from mbd.equal import INSTANT_RTOL, NOMINAL_RTOL
 from mbd.kernel.codes import (
     BY_MEASURE,

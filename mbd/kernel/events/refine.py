@@ -1,7 +1,5 @@
 """The root of a guard in a bracket, by Brent's method on steps of varying size from the same accepted state."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, EPS, OPEN_GAP, WATCH
 from mbd.kernel.events.guards import gap_tolerance, guard_value
 from mbd.kernel.records import ContactRows, Kernel

@@ -1,7 +1,5 @@
 """What an event does: contacts close by impact, open by their rules; frictions stick and slip."""
 
-from __future__ import annotations
-
 from mbd.equal import EQUAL_RTOL, REST_SPEED
 from mbd.kernel.codes import (
     CLOSE,

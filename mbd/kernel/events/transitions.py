@@ -6,8 +6,6 @@ leaves its state of now, has a cause among the marks, and whose condition holds.
 marks of the next one, until a round takes none.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.codes import ENDLESS_TRANSITIONS, EPS, LOG_EVENT, LOG_OPENED
 from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.events.guard_round_off import guard_round_off

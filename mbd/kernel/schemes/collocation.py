@@ -3,8 +3,6 @@
 ``Y_i = y₀ + h Σ a_ij f(Y_j)`` at the points c_i of a step; ``A = T Λ T⁻¹`` with one real eigenvalue and a pair.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.arrays import Matrix, Vector

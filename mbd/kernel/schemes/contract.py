@@ -9,8 +9,6 @@ The functions are compiled with all that they call, from any module: they use wh
 Python.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from dataclasses import fields

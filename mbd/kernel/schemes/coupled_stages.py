@@ -9,8 +9,6 @@ stage holds at the last, where a spring meets its stop within the step, or where
 is solved as it stands, with three times as many unknowns.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, SINGULAR

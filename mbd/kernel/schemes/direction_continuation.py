@@ -7,8 +7,6 @@ next one, whose σ is smaller, down to that of the step itself (Allgower & Georg
 Continuation Methods, ch. 2).
 """
 
-from __future__ import annotations
-
 from mbd.kernel.codes import NOT_CONVERGED, STAGNATED
 from mbd.kernel.contact.cones import HOLD_AT_ONSET, HOLD_DIRECTION, fill_slips
 from mbd.kernel.records import ContactRows, Frictions

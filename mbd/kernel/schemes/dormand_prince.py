@@ -4,8 +4,6 @@ Dormand & Prince 1980, J. Comput. Appl. Math. 6:19, in the form of Hairer, Nørs
 Differential Equations I, II.5 (their code DOP853). Stages are counted from 0; slope 12 is that at the end of the step.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.kernel.schemes.tableau import Tableau, weights_at

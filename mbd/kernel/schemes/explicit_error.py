@@ -1,7 +1,5 @@
 """The local error of an explicit step by its embedded formulas."""
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.roots import sqrt

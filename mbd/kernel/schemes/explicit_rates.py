@@ -1,7 +1,5 @@
 """Rates and multipliers at a stage of an explicit scheme, from the balance and the rows at acceleration level."""
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.linear import solve_definite, sum_of_sizes
 from mbd.kernel.algebra.ordered import solve_kkt

@@ -1,7 +1,5 @@
 """What every Newton iteration of a step shares: prediction, size of the residual, acceptance."""
 
-from __future__ import annotations
-
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.algebra.ordered import clear_tangent
 from mbd.kernel.algebra.redundancy import clear_dependent

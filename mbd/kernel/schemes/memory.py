@@ -1,7 +1,5 @@
 """What a scheme takes along from step to step, as it is at a start: nothing, and sizes of forces to measure by."""
 
-from __future__ import annotations
-
 from mbd.kernel.records import SingularSteps, State, Steps
 from mbd.kernel.stepping.restart import note_scales, raise_scales, retain_scales
 

@@ -5,8 +5,6 @@ the position correction U in the metric of the same matrix (Gear, Gupta & Leimku
 the velocity formulas of the scheme with their own rate ż, of order 2 as well (Jansen, Whiting & Hulbert 2000).
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import PASSING
 from mbd.kernel.contact.cones import HOLD_DIRECTION, follows, friction_size

@@ -4,8 +4,6 @@ The tangent K is that of the compiled model at the iterate, or factors of it and
 straight-line code. The stabilized form corrects positions by U first, then the rates, in the metric of the same matrix.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import OF_TANGENT, clear_tangent, columns_at, factor_ordered, order_at, solve_kkt

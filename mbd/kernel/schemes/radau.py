@@ -6,8 +6,6 @@ Newton's method has one pair of matrices a step; next to a singular configuratio
 acceleration level, which makes them as accurate as positions and velocities.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, PASSING, SINGULAR, STAGNATED, TOO_TIGHT

@@ -1,7 +1,5 @@
 """The end of a step of the Radau IIA method: consistent accelerations and multipliers, and the error estimate."""
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import clear_dependent, sharing

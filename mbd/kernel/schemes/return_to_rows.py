@@ -1,7 +1,5 @@
 """The end of an explicit step is projected onto the rows, positions and velocities, in the metric of M."""
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL, REST_SPEED
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.saddle import factor_saddle

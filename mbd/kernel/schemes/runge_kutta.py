@@ -9,8 +9,6 @@ positions add, ẋ = v; else ``ẋ = D(x)⁻¹ v`` of the increments x in the ch
 that the formula needs (Munthe-Kaas 1999, Appl. Numer. Math. 29:115).
 """
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import INCREMENT_RATES, NOT_CONVERGED, PASSING, SINGULAR

@@ -5,8 +5,6 @@ of order 3 at least are ``b + s (0, 0, 0, 1, −1)``: c = (0, ½, ½, 1, 1) and 
 direction in which Σ b, Σ b c, Σ b c² and Σ b A c stay as they are. s = −1/6 takes k₅ in the place of k₄.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.schemes.runge_kutta import explicit_scheme
 from mbd.kernel.schemes.tableau import FOURTH_ORDER
 

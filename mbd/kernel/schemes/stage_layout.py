@@ -1,7 +1,5 @@
 """Where the numbers of a step of several stages lie in K.stages."""
 
-from __future__ import annotations
-
 from mbd.kernel.records import Settings
 
 # where the numbers of the method lie in K.stages (see `mbd.kernel.schemes.collocation`)

@@ -12,8 +12,6 @@ with ``K_i = [M_i R_i; B_i 0]`` and the rows' residuals as accelerations, ``(hA)
 of its own, and is done where corrections with matrices of the middle stage alone leave much of the error.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import solve_definite
 from mbd.kernel.algebra.ordered import solve_kkt

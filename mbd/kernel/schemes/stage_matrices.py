@@ -5,8 +5,6 @@ one-stage step with ∂v/∂v̇ = hμ and ∂x/∂v̇ = (hμ)². The real one is
 together from three of them.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.complex_linear import factor_complex, solve_complex
 from mbd.kernel.algebra.linear import factor

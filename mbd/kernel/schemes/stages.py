@@ -12,8 +12,6 @@ rows: with x' = v − Z η this is the stabilized form of Gear, Gupta & Leimkuhl
 held over the step. Newton's matrices are those of `stage_matrices`.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.ordered import solve_held
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import EPS, INCREMENT_RATES

@@ -1,7 +1,5 @@
 """Coefficients of explicit Runge–Kutta formulas, with embedded estimates of their errors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -6,8 +6,6 @@ the configuration stays as it is, and time and state of the event come from the 
 (`mbd.kernel.events.guard_substeps`). One that changes something ends the run with an error of its own (`refuses`).
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.orthogonal import square
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CROSS, LOG_EVENT

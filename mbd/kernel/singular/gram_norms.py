@@ -6,8 +6,6 @@ rows fill up with what they were cleared of, G keeps its zeros: a row that is do
 neighbours only, so that a large mechanism, most rows of which have nothing in common, costs little.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import DependentRows, Singular, SingularSteps

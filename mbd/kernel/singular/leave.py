@@ -1,7 +1,5 @@
 """The restart just beyond a singular configuration."""
 
-from __future__ import annotations
-
 from mbd.kernel.events.guards import update_armed, update_sides, watch
 from mbd.kernel.hooks import scheme_resume
 from mbd.kernel.records import Kernel

@@ -4,8 +4,6 @@ Within `MAX_STEPS_AWAY` steps of it h alone is held, with ∂h/∂x = B = H − 
 projected onto the rows and the scheme starts again, but for the average that it carries. See `mbd.kernel.singular`.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import OF_TANGENT, clear_tangent, factor_ordered, order_at, solve_kkt, weakest_pivot

@@ -13,8 +13,6 @@ Newton's method with the matrices of the middle stage, its rows ``B₂ δV_i = B
 linearly, the faster the shorter the step.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing

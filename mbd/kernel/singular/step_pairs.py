@@ -6,8 +6,6 @@ singularity near which none may lie. One step of dt/2 would err by 3/8 c dt³ le
 by where the grid happens to lie: enough to hide that the sum of all errors falls as dt².
 """
 
-from __future__ import annotations
-
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.records import State
 

@@ -9,8 +9,6 @@ columns scaled by √M_ii, passes zero. |w| at the ends of steps tells where it 
 ``q + τ v + τ²/2 v̇`` as well, and where it vanishes by a secant.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.orthogonal import clear_row, square
 from mbd.kernel.algebra.roots import sqrt

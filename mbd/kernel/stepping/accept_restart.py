@@ -4,8 +4,6 @@ Steps of index 3 leave B v + h_t of the size of their error, which a candidate l
 guards change with it: where an event is looked for, they are those of the velocities that it will leave.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.saddle import correct_velocities, solve_rows
 from mbd.kernel.codes import PULL
 from mbd.kernel.events.guards import watch

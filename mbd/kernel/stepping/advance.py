@@ -1,7 +1,5 @@
 """Many steps with switching: step, judge, accept or switch, observe."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import (
     DONE,
     EVENT,

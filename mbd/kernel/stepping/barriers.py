@@ -11,8 +11,6 @@ step follows (`growth`), the motion would not have passed; friction that falls w
 e > 0 on all the way.
 """
 
-from __future__ import annotations
-
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.kernel.records import Guards, Reals, Switching
 from mbd.kernel.schemes.iteration import MAX_UNEXPLAINED_CHANGE, MIN_RATE_SHARE

@@ -1,7 +1,5 @@
 """How a run begins: the start in the arrays, where one of many is put first, is judged as in `simulation.run.begin`."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import ACCELERATIONS, DOUBTFUL_START, GUARDS, SCALES
 from mbd.kernel.events.guard_round_off import guard_round_off
 from mbd.kernel.events.guards import is_watched

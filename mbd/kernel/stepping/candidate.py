@@ -1,7 +1,5 @@
 """The candidate of a step and the accepted state, the one taken for the other; numbers carried there and back."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.kernel.records import Events, Guards, Kernel, State

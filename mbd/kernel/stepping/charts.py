@@ -6,8 +6,6 @@ of a turn charts are as good as coordinates that add. A step that would turn suc
 that do not, and rows are stored so close that there is one way from each to the next.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import CHART_END, CHART_MOTION
 from mbd.kernel.hooks import call_on

@@ -1,7 +1,5 @@
 """A candidate without events becomes the accepted state, and the grid of steps goes on from it."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import AT_POSE, LEFT, NOT_CONVERGED
 from mbd.kernel.contact.cones import follow_motion
 from mbd.kernel.events.guards import update_armed, update_sides

@@ -7,8 +7,6 @@ error e is what each correction by the balance leaves of the error before (Wilki
 2002, Accuracy and Stability of Numerical Algorithms, ch. 12); with e near 1 nothing is left to correct with.
 """
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.ordered import solve_kkt
 from mbd.kernel.algebra.redundancy import sharing

@@ -8,8 +8,6 @@ went in. As a contact closes the step is found in which its force changes the ga
 for a spring ``(ω h)²`` with ω² = k/m. Steps stay that short until the contact opens, or until it rests.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.codes import TOO_BRIEF
 from mbd.kernel.events.guards import gap_tolerance, watch
 from mbd.kernel.records import Guards, Switching

@@ -14,8 +14,6 @@ elsewhere, and one that begins at zero is measured by what longer tries made of 
 step), gives the next one; schemes with memory or factors keep their step between 0.8 and 1.25.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import (
     EPS,

@@ -1,7 +1,5 @@
 """Accelerations of a tree on which no row acts, by articulated bodies (`mbd.equations.articulated_bodies`)."""
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.codes import FREE_RATES
 from mbd.kernel.hooks import call

@@ -9,8 +9,6 @@ grows by more than e in a step, which no scheme of order 2 follows. Explicit sch
 to their bound of stability only.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import solve_rows
 from mbd.kernel.codes import COMPOSE

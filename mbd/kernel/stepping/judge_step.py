@@ -1,7 +1,5 @@
 """A candidate is judged: the event in it is located and handled, or it is accepted and observed, or taken again."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import AT_POSE, CHATTER, CROSS, JUMPED, PAUSE, PULL, STICK
 from mbd.kernel.contact.carried import slides_as_carried
 from mbd.kernel.contact.cone_steps import (

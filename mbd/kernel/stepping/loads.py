@@ -1,7 +1,5 @@
 """What follows multipliers at a state: R, which maps them to forces, and the limits of frictions."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import ACCELERATIONS
 from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call

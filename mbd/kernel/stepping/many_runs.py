@@ -6,8 +6,6 @@ for a mode that is met first, and a look whether somebody interrupts, need Pytho
 with it. Runs that Python must judge (`DOUBTFUL_START`, `NEEDS_PYTHON`) are left to it.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.codes import DONE, EVENT, LAST, LOG_CLOSED, LOG_EVENT, LOG_OPENED, NEEDS_PYTHON, NEW_MODE, PAUSE
 from mbd.kernel.contact.cones import phase_of
 from mbd.kernel.records import Kernel

@@ -7,8 +7,6 @@ are in line. The balance r = M v̇ + f + R λ itself, body by body, adds up no m
 the factor that elimination has lost, so one or two suffice. Where nothing is lost none is made.
 """
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL, EQUAL_RTOL, HALF_PRECISION_RTOL
 from mbd.kernel.algebra.linear import solve_again, solve_definite
 from mbd.kernel.algebra.ordered import order_at, solve_kkt

@@ -1,7 +1,5 @@
 """What a run leaves behind: rows of results, and events that someone waits for."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import LOG_EVENT, LOG_PUSHED, LOG_SLIPPED, LOG_STUCK
 from mbd.kernel.contact.cones import phase_of
 from mbd.kernel.records import Reals, Switching

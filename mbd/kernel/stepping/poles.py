@@ -8,8 +8,6 @@ An explicit scheme of twelve stages whose estimated error is small has looked at
 step from any other at most; next to an end it has not. In space, without rows, that is enough.
 """
 
-from __future__ import annotations
-
 from mbd.equal import DIRECT_PIVOT_RTOL
 from mbd.kernel.algebra.linear import solve_definite
 from mbd.kernel.codes import ACCELERATIONS, NOT_FINITE

@@ -10,8 +10,6 @@ rate. Where that is large, accelerations are asked for again, by tests that impl
 - *stability*: whether forces are so stiff along a change that was not predicted that an explicit step amplifies it.
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import GAINED, LEAPT, NOT_FINITE, OUTGROWN, UNSTABLE
 from mbd.kernel.hooks import scheme_error

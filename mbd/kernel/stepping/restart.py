@@ -1,7 +1,5 @@
 """The block of inputs at a state, magnitudes, and consistent accelerations."""
 
-from __future__ import annotations
-
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.algebra.redundancy import find_dependence, find_shares, shared, sharing, spread, take_shares
 from mbd.kernel.algebra.saddle import solve_rows

@@ -17,8 +17,6 @@ The extent is noted at accepted states, where scales are measured (`note_extent`
 it only grows.
 """
 
-from __future__ import annotations
-
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import ACCELERATIONS, EPS, SCALES

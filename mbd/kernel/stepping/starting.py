@@ -1,7 +1,5 @@
 """The start of a scheme from a consistent state, in the mode of the contacts that are closed then."""
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.redundancy import find_dependent, sharing
 from mbd.kernel.codes import LOG_OPENED, NEW_MODE, PULL
 from mbd.kernel.contact.cones import let_directions_go

@@ -1,7 +1,5 @@
 """Where the next step ends, and what is tried until there is a candidate."""
 
-from __future__ import annotations
-
 from mbd.equal import NOMINAL_RTOL
 from mbd.kernel.codes import (
     GAINED,

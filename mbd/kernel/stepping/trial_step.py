@@ -1,7 +1,5 @@
 """A step that is tried: its candidate with multipliers of all rows and with its guards."""
 
-from __future__ import annotations
-
 from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, NOMINAL_RTOL
 from mbd.kernel.codes import (
     EPS,

@@ -1,7 +1,5 @@
 """What to write instead of Python that the kernel may not use: the advice of its translator."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The kernel's functions → LLVM IR text (`mbd.trees.llvm`), its record a table of addresses."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 

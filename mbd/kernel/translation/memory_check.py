@@ -1,7 +1,5 @@
 """Whether schemes give a length to all the memory that their functions use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import is_dataclass
 from typing import Any

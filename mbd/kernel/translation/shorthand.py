@@ -1,7 +1,5 @@
 """Shorthand of the kernel's Python, spelled out: slices as loops, formulas of records as their expressions."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re

@@ -7,8 +7,6 @@ annotated ``Any`` has the kind it is called with, and a function is translated o
 Local names hold what all their assignments have in common: int and float make float.
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Moments of inertia that a body can have."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Models of MuJoCo, ``.xml``, through its own compiler, which resolves includes, defaults and inertia from shapes."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Models of OpenSim, ``.osim``, in the formats 20303 and 30000 (joints within bodies) and 40000."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Constraints of ``.osim`` files: couplers between coordinates, locks, stops, and motions that are functions."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What elements of an ``.osim`` file say: texts, numbers, flags, sets, names."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.laboratory.models.xml import Element

@@ -1,7 +1,5 @@
 """An ``.osim`` file while it is read: what of it is known so far."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import field
 from typing import Any

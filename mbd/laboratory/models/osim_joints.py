@@ -1,7 +1,5 @@
 """Joints of ``.osim`` files: their frames, coordinates and motions, and the chains of joints that state them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Muscles of ``.osim`` files as `Muscle`s on paths of points."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Surfaces of ``.osim`` files that paths of muscles wrap around."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """Models from files of other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from mbd.bodies.values import among, flag

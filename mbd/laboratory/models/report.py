@@ -1,7 +1,5 @@
 """What became of a file of another program: the model, and what of the file is in it."""
 
-from __future__ import annotations
-
 from dataclasses import field
 from typing import Any
 

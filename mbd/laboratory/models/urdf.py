@@ -1,7 +1,5 @@
 """Robots in the Unified Robot Description Format, ``.urdf`` (wiki.ros.org/urdf/XML)."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from pathlib import Path

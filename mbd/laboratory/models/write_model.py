@@ -1,7 +1,5 @@
 """Models written for other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Models written as URDF: links with their frames at the joints, z up."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 from xml.sax.saxutils import quoteattr

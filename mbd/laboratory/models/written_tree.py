@@ -1,7 +1,5 @@
 """A model as other programs write it down: bodies with numbers, joints with frames, one after the other."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

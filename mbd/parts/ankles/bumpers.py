@@ -1,7 +1,5 @@
 """A single-axis ankle between two bumpers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A hydraulic ankle."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

@@ -1,7 +1,5 @@
 """An ankle that a motor drives through a spring."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

@@ -1,7 +1,5 @@
 """An ankle from the test bench."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

@@ -1,7 +1,5 @@
 """What a joint of the body resists by itself: ligaments and resting muscles."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.values import among, number

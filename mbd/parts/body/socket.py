@@ -1,7 +1,5 @@
 """The socket that a limb sits in."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

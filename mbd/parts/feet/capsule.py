@@ -1,7 +1,5 @@
 """A foot that is a capsule: two balls at the ends of an edge, and the straight line between."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

@@ -1,7 +1,5 @@
 """A foot with a heel and a toe."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

@@ -1,7 +1,5 @@
 """A foot with an elastic keel."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

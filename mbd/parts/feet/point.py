@@ -1,7 +1,5 @@
 """A foot that is a point."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

@@ -1,7 +1,5 @@
 """A foot that is a convex polygon: one contact at each corner."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

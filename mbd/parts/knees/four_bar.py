@@ -1,7 +1,5 @@
 """A polycentric knee: the four-bar linkage of the 3R60, with its hydraulic units."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

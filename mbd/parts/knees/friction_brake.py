@@ -1,7 +1,5 @@
 """A knee with a brake that the weight closes."""
 
-from __future__ import annotations
-
 from mbd.bodies.base import Frame
 from mbd.joints.losses.base import Loss
 from mbd.joints.losses.pin_friction import PinFriction

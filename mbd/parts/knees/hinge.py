@@ -1,7 +1,5 @@
 """A knee on one axis, with any loss and a stop."""
 
-from __future__ import annotations
-
 from mbd.bodies.base import Frame
 from mbd.constraints.measures import flexion
 from mbd.joints.losses.base import Loss

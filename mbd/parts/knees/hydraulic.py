@@ -1,7 +1,5 @@
 """A knee with a hydraulic cylinder."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

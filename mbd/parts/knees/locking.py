@@ -1,7 +1,5 @@
 """A knee that locks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from mbd.bodies.base import Frame

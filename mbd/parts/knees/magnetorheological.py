@@ -1,7 +1,5 @@
 """A knee whose brake follows the phase of the gait."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

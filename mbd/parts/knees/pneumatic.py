@@ -1,7 +1,5 @@
 """A knee with a pneumatic cylinder."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What hips, knees and ankles of a person resist by themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from mbd.forces.potential import Potential

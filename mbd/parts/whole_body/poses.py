@@ -1,7 +1,5 @@
 """Poses to start from."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Segments of men and women, of a table of measured persons."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 SEXES = ("male", "female")

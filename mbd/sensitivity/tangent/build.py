@@ -1,7 +1,5 @@
 """The kernel with derivatives as an object file, compiled once for a machine when it is first asked for."""
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import inspect

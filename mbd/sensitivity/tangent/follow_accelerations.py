@@ -1,7 +1,5 @@
 """Accelerations at a state with their derivatives, and what explicit steps make of them."""
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Kernel

@@ -1,7 +1,5 @@
 """Candidates of steps once more, with derivatives: those that are accepted, and those at events."""
 
-from __future__ import annotations
-
 from mbd.kernel.codes import CLOSE, CROSS, CROSS_BACK, PASSING, STICK
 from mbd.kernel.contact.cone_directions import MAX_GROUP_SIZE, fill_tangents
 from mbd.kernel.contact.cone_steps import keeps_direction

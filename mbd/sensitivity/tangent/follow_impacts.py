@@ -1,7 +1,5 @@
 """Edges of impacts: what neither pushes nor parts, or comes as fast as another, where a direction decides."""
 
-from __future__ import annotations
-
 from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL
 from mbd.kernel.contact.branches import is_on
 from mbd.kernel.contact.cones import follows, friction_size

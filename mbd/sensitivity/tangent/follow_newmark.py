@@ -1,7 +1,5 @@
 """One implicit step of the Newmark family, whose solution is known, with its derivatives."""
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import clear_tangent, solve_kkt
 from mbd.kernel.algebra.redundancy import sharing

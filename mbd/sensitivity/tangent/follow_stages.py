@@ -1,7 +1,5 @@
 """A step of several implicit stages, which are known, with its derivatives."""
 
-from __future__ import annotations
-
 from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL
 from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.redundancy import sharing

@@ -1,7 +1,5 @@
 """Decisions of a run that a small change may turn: its events, its start and its end, told from their neighbours."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Numbers in K.starts: inputs of the last of Newton's matrices | W | the block of 
 (1), and of the run (5) | the candidate | columns of K₀⁻¹ or stages.
 """
 
-from __future__ import annotations
-
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.kernel.records import Integers, Kernel, Reals, Sizes
 

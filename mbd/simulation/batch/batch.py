@@ -1,7 +1,5 @@
 """Thousands of runs in few calls of the kernel."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Starts and parameters of many runs as columns, checked as those of one run are."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

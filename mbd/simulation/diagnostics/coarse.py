@@ -1,7 +1,5 @@
 """Steps of fixed size within which forces changed as nothing before them predicted, and the step that resolves them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.results.record import Record

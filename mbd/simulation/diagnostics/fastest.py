@@ -1,7 +1,5 @@
 """The fastest motion of a mechanism, and the steps that it needs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The step that resolves the impacts of a penalty contact in a run: what `mbd.penalty_parameters` would say of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a run tells its user in ``stats["notes"]``: what happened on purpose but might surprise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial

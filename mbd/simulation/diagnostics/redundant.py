@@ -1,7 +1,5 @@
 """What a run says of rows that depend on each other, and of rows that conflict."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

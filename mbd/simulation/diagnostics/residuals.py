@@ -1,7 +1,5 @@
 """Residuals of a step by the names of what they belong to."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is left of the balance where a step stops, and what round-off of its inputs makes of it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.arrays import Vector

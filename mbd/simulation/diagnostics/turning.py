@@ -1,7 +1,5 @@
 """Angles that are too large to tell a pose, and turns that the steps of a run do not resolve."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How a run begins: the start put into the kernel's arrays, contacts and guards told on which side they are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Instants at which steps must end: samples of controllers, jumps and kinks of signals in time."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import deepcopy

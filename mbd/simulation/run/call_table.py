@@ -1,7 +1,5 @@
 """What the compiled kernel is called with: bits of numbers and addresses of arrays, in the order of its fields."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from operator import itemgetter

@@ -1,7 +1,5 @@
 """What a run holds between two calls of the kernel, which all that drives, saves and judges it takes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from time import perf_counter

@@ -1,7 +1,5 @@
 """Where a run stops: its last step, its last row, and the state to go on from."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Events of a run, from the lines in which the kernel has logged them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 from mbd.arrays import Matrix, Vector, read_only

@@ -1,7 +1,5 @@
 """Steppers that runs have left: arrays, tables and addresses that stand already for the next run of the same kind."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping
 from typing import Any
 

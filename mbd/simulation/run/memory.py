@@ -1,7 +1,5 @@
 """What lets a run go on as if it had never been cut: written into its final state, read by the run that goes on."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from operator import itemgetter

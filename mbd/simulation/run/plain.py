@@ -1,7 +1,5 @@
 """Any integrator behind the interpreted kernel: a mechanism as a `System`, and the hooks that drive `step`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any

@@ -5,8 +5,6 @@ flag and index must lie where the kernel itself puts them; and the seal, a hash 
 change.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from typing import Any

@@ -4,8 +4,6 @@ A run in steps of the size it has taken so far stores ``n ≈ n_now (T − t₀)
 each; where an event may end it sooner only those that it has are counted.
 """
 
-from __future__ import annotations
-
 from mbd.free_memory import available, size_in_words as memory
 from mbd.notes import doubt
 from mbd.simulation.run.data import RoomFindings, RunData

@@ -4,8 +4,6 @@ The kernel takes thousands of steps in a call. A savepoint before each call cost
 steps give the same bits, the state before any step of the call is reached again by repeating those before it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mbd.errors import SimulationError

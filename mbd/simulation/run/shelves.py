@@ -4,8 +4,6 @@ A shelf holds the arrays of one kind that the next step depends on, or those tha
 cache line. Lengths follow from the sizes of a mechanism and of a run, so that runs alike share one plan.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 from itertools import accumulate

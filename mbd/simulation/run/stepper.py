@@ -1,7 +1,5 @@
 """The kernel's arrays for one run, and the call into the kernel, compiled or interpreted."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any

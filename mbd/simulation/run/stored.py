@@ -1,7 +1,5 @@
 """The rows that a run has stored until now, as a record."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """How contacts are treated where the user leaves it open: located, and in non-smooth steps once that cannot go on."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mbd.kernel import codes

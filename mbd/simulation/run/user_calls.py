@@ -1,7 +1,5 @@
 """Calling what users wrote."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

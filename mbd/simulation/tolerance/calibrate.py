@@ -1,7 +1,5 @@
 """A tolerance on the whole run: trial runs until the error of one agrees with it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

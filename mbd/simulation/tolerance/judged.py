@@ -1,7 +1,5 @@
 """Which results a tolerance holds for: every coordinate, or those that `tol_of` names."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -12,8 +12,6 @@ another that costs a fifth to two fifths more. Runs that miss the tolerance, by 
 repeated; where three runs tell the order, the more pessimistic one of it and κ counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
