@@ -147,6 +147,12 @@ class Configuration:
         q = np.asarray(q, dtype=float)
         if self.is_vector:
             return np.asarray(q)
+        if q.ndim == 1:  # the same numbers as of many placements at once, in a tenth of the time
+            found: Vector = q.copy()
+            for joint, first, _ in self.charts:
+                own = slice(first, first + len(joint.labels))
+                found[own] = joint.normalise(list(q[own]))
+            return found
         return self._by_joints(
             "q", lambda joint: lambda own, _: joint.normalise(own), (q, "q"), (q, "q"), lambda a, b: a
         )

@@ -135,7 +135,7 @@ def assemble(
     store_first(mechanism, 0.0, work.q, work.y, values, work.anchors)
     hold(mechanism, held, work.anchors)
     feet.hold(work)
-    doubt(*doubts, *doubtful(model, equations, position or {}), of=model)
+    doubt(*doubts, *doubtful(model, mechanism, position or {}), of=model)
     assembled = State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),
@@ -329,7 +329,9 @@ def _gaps(work: Posture) -> Vector:
 
 def _below(work: Posture, opened: set[str]) -> list[str]:
     """Open contacts that start inside their surface without having been named open."""
-    faults = []
+    faults = list[str]()
+    if not work.manager.contacts:
+        return faults
     values, count = _gaps(work), len(work.manager.contacts)
     for c, contact in enumerate(work.manager.contacts):
         named_off = isinstance(contact.only_while, str) and contact.only_while not in work.manager.mode(work.flags)
@@ -360,7 +362,9 @@ def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
 
     One that touches (|g| below 1e-8) and waits for another by `When` is a trailing foot: ignored until it has risen.
     """
-    armed = set()
+    armed = set[str]()
+    if not work.manager.contacts:
+        return frozenset(armed)
     values = _gaps(work)
     for c, contact in enumerate(work.manager.contacts):
         lifted = values[c] > ASSEMBLED_RESIDUAL

@@ -55,6 +55,8 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
     """Every row and named result that the named values contradict, with both residuals and who is in conflict."""
     equations, rows, misfit, speed_misfit = work.equations, attempt.rows, attempt.misfit, attempt.speed_misfit
     active = work.active_rows
+    if not (active or rows or work.places or work.rates):
+        return []
     speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
     fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > EQUAL_RTOL * speed)
     if fast and np.isfinite(speed_misfit).all():

@@ -3,15 +3,23 @@
 from collections.abc import Mapping
 from typing import Any
 
+from mbd.compile.mechanism import Mechanism
 from mbd.equations.equations import Equations
 from mbd.tape.derivatives import gradient, live, substitute
 from mbd.tape.node import Node
 from mbd.topology.doubts import doubts, in_radians
 
 
-def doubtful(model: Any, equations: Equations, position: Mapping[str, float]) -> list[str]:
-    """Sentences on values of a start and of the model that look like mistakes."""
-    return degrees(equations, position) + _reversals(equations) + doubts(model)
+def doubtful(model: Any, mechanism: Mechanism, position: Mapping[str, float]) -> list[str]:
+    """Sentences on values of a start and of the model that look like mistakes; those of a model are found once."""
+    equations = mechanism.equations
+    jumps = mechanism.kept(_reversals, lambda: _reversals(equations))
+    return degrees(equations, position) + jumps + doubts_of(model, mechanism)
+
+
+def doubts_of(model: Any, mechanism: Mechanism) -> list[str]:
+    """Sentences on what looks like a mistake in a model, which follow from the words that its mechanism is made of."""
+    return mechanism.kept(doubts, lambda: doubts(model))
 
 
 def _reversals(equations: Equations) -> list[str]:

@@ -13,7 +13,14 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.inertia import lost_sentence
 from mbd.compile.mechanisms import is_known
-from mbd.equations.sizes import MIN_CHECKED_OPERATIONS, MIN_JOINTS, OF_PAIR, pairs_on_paths, require_room
+from mbd.equations.sizes import (
+    MIN_CHECKED_OPERATIONS,
+    MIN_JOINTS,
+    OF_PAIR,
+    is_surely_small,
+    pairs_on_paths,
+    require_room,
+)
 from mbd.errors import AssemblyError
 from mbd.joints.base import Joint
 from mbd.tape.node import Node, Tape
@@ -49,6 +56,8 @@ def require_inertia(model: Any, position: Mapping[str, float], changed: Mapping[
     if not isinstance(model, Description) or len(model.joints) < MIN_JOINTS:
         return
     if not is_known(model) and faults(model):
+        return
+    if is_surely_small(len({id(frame.body) for frame in model.points()})):
         return
     chosen = plan(model)
     free = not (chosen.cut or model.bilaterals or model.nonholonomic)

@@ -246,6 +246,8 @@ def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
 
 def capture(work: Posture) -> None:
     """Store what closed contacts hold, such as the place of touchdown, into the anchors."""
+    if not any(work.flags):
+        return
     terms = work.terms()
     for contact, flag in zip(work.manager.contacts, work.flags, strict=True):
         if flag:

@@ -37,6 +37,8 @@ def printable(name: str, what: str) -> str:
     >>> printable("left knee", "Revolute")
     'left knee'
     """
+    if name.isascii() and name.isprintable():
+        return name
     wrong = [sign for sign in name if unicodedata.category(sign) in ("Cc", "Cs", "Zl", "Zp") or sign in DIRECTION_MARKS]
     if wrong:
         raise ModelError(f"{what} {name!r}: a name holds no control characters such as {wrong[0]!r}; leave them out")

@@ -69,22 +69,24 @@ class Reader:
         CannotTellError
             for what is not read.
         """
-        titles, stack = list[str](), [root]
-        parts: Iterable[Any]
-        while stack:
-            item = stack.pop()
-            kind, parts = type(item), ()
-            if kind in PLAIN:
-                title = f"{kind.__name__} {item!r}"
-            elif id(item) in self.met:
-                title = f"again {self.met[id(item)]}"
+        titles, met = list[str](), self.met
+        left = [iter((root,))]  # what is still to be read, of the innermost object last
+        while left:
+            for item in left[-1]:
+                kind = type(item)
+                if kind in PLAIN:
+                    titles.append(f"{kind.__name__} {item!r}")
+                elif (number := met.get(id(item))) is not None:
+                    titles.append(f"again {number}")
+                else:
+                    met[id(item)] = len(met)
+                    self.kept.append(item)
+                    title, parts = self.parts(item)
+                    titles.append(title)
+                    left.append(iter(parts))
+                    break
             else:
-                self.met[id(item)] = len(self.met)
-                self.kept.append(item)
-                title, parts = self.parts(item)
-            titles.append(title)
-            if parts:
-                stack += [*parts][::-1]
+                left.pop()
         return sha256("\0".join(titles).encode(errors="backslashreplace")).hexdigest()
 
     def parts(self, item: Any) -> tuple[str, Iterable[Any]]:
@@ -169,7 +171,8 @@ def changing(words: Iterable[Any]) -> list[Any]:
         elif kind in CALLABLE or not _is_installed(kind.__module__):
             found.append(item)
         elif kind.__module__.startswith("mbd."):
-            stack += [part for name, part in getattr(item, "__dict__", {}).items() if name not in CALLED]
+            own = getattr(item, "__dict__", {})
+            stack += [part for name, part in own.items() if type(part) not in PLAIN and name not in CALLED]
     return found
 
 

@@ -26,6 +26,12 @@ MIN_JOINTS = 12
 """Fewer joints make no tree of so many operations: with two floating bodies each, 18 coordinates a joint at most."""
 
 
+def is_surely_small(bodies: int) -> bool:
+    """Whether no tree of so many bodies has operations enough to be checked, whatever its joints are."""
+    most = 6 * bodies  # coordinates, on a single path
+    return 0.5 * max(OF_PAIR.values()) * most * (most + 1) < MIN_CHECKED_OPERATIONS
+
+
 def pairs_on_paths(plan: Plan) -> int:
     """Pairs of coordinates on one path from the ground, each coordinate with itself among them."""
     depth: dict[str, int] = {}

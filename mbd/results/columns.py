@@ -154,7 +154,7 @@ class ModelColumns(StoredStates, Columns):
         return self._nodes[name]
 
     def at_rows(self, names: Sequence[str]) -> list[Vector]:
-        return self.evaluate([self.node(name) for name in names], self.rows)
+        return self.evaluate_stored([self.node(name) for name in names])
 
     def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
         nodes = [self.node(name) for name in names]

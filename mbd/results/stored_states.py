@@ -34,10 +34,15 @@ class StoredStates:
         self.record, self.equations = record, equations
         self.grid = Grid(record.time)
 
-    @property
+    @cached_property
     def rows(self) -> Rows:
         """The stored states."""
         return self.record.rows(self.anchors)
+
+    @cached_property
+    def _inputs_of_rows(self) -> Mapping[str, NDArray[Any]]:
+        """The inputs of expressions at the stored states, which every name that is read is evaluated with."""
+        return self.all_inputs(self.rows)
 
     def part(self, chosen: NDArray[np.intp], nodes: Sequence[Node]) -> Rows:
         """Some of the stored states; what contacts have captured is found only where these expressions need it."""
@@ -62,12 +67,19 @@ class StoredStates:
             rates = jvp(compose, seeds)
         return np.column_stack(self.evaluate(rates, self.rows))
 
-    def evaluate(self, nodes: Sequence[Node], rows: Rows) -> list[Vector]:
-        """Each expression at each row, (R,)."""
+    def evaluate_stored(self, nodes: Sequence[Node]) -> list[Vector]:
+        """Each expression at each stored row, (R,)."""
+        return self.evaluate(nodes, self.rows, self._inputs_of_rows)
+
+    def evaluate(
+        self, nodes: Sequence[Node], rows: Rows, inputs: Mapping[str, NDArray[Any]] | None = None
+    ) -> list[Vector]:
+        """Each expression at each row, (R,); `inputs` are `all_inputs` of these rows where they are known."""
         if not nodes:
             return []
         unique = list({node.index: node for node in nodes}.values())
-        values = array_function(unique)(self.all_inputs(rows), self.record.parameters_at(rows.source))
+        inputs = self.all_inputs(rows) if inputs is None else inputs
+        values = array_function(unique)(inputs, self.record.parameters_at(rows.source))
         found = {node.index: value for node, value in zip(unique, values, strict=True)}
         return [found[node.index] for node in nodes]
 

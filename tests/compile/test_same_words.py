@@ -13,6 +13,7 @@ import pytest
 
 import mbd
 import tests.comparisons
+from mbd.assembly import doubtful
 from mbd.compile import mechanisms
 from mbd.compile.mechanisms import mechanism_of
 from mbd.hardcases.shakers import table
@@ -346,6 +347,18 @@ def test_named_points_gravity_and_names_of_inputs_count():
     assert mechanism_of(rod(1.0, gravity=(0.0, -1.6, 0.0))) is not first
     assert mechanism_of(rod(1.0, tunable=["gravity.x"])) is not first
     assert mechanism_of(rod(1.0)) is first
+
+
+def test_doubts_are_those_of_the_words_and_looked_for_once(monkeypatch):
+    asked, doubts = [], doubtful.doubts
+    monkeypatch.setattr(doubtful, "doubts", lambda model: (asked.append(model), doubts(model))[1])
+    for _ in range(2):
+        model = rod(1.25)
+        mbd.assemble(model)
+        model.gravity = (0.0, 9.81, 0.0)
+        with pytest.warns(mbd.MbdWarning, match="pulls upwards"):
+            mbd.assemble(model)
+    assert len(asked) == 2
 
 
 def test_only_the_last_few_are_kept():

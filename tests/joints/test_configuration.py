@@ -5,6 +5,7 @@ import pytest
 
 import mbd
 from mbd.bodies import Ground
+from mbd.compile.mechanisms import mechanism_of
 from mbd.configuration import Configuration
 from mbd.testing import LawBroken, check_joint, check_model
 from tests.joints.quaternion_ball import CayleyBall, QuaternionBall, axis_angle
@@ -76,6 +77,15 @@ def test_a_configuration_holds_coordinates_that_add_beside_those_that_do_not(bal
     np.testing.assert_array_equal(whole.compose(q[0], x[0]), there[0])
     np.testing.assert_allclose(whole.interpolate(q, there, np.ones(5)), there, atol=1e-14)
     np.testing.assert_allclose(whole.increment_velocities(x, whole.increment_rates(x, v)), v, atol=1e-14)
+
+
+@BALLS
+def test_one_placement_is_normalised_as_many_are(ball):
+    configuration, rng = mechanism_of(two_bodies(ball)).equations.configuration, np.random.default_rng(3)
+    many = rng.normal(size=(50, configuration.n_q))
+    each = np.stack([configuration.normalise(one) for one in many])
+    np.testing.assert_array_equal(each, configuration.normalise(many))
+    assert np.all(configuration.misplaced(many[0], 1e-9)) and not configuration.misplaced(each[0], 1e-9)
 
 
 @BALLS

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from mbd.assembly.doubtful import degrees
+from mbd.assembly.doubtful import degrees, doubts_of
 from mbd.equal import HALF_PRECISION_RTOL
 from mbd.equations.equations import Contact
 from mbd.kernel.codes import EPS, PULL
@@ -24,7 +24,7 @@ from mbd.simulation.diagnostics.stiff import bounded_by_stability
 from mbd.simulation.diagnostics.turning import blocks, unresolved_turns
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.stored import record_of
-from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE, doubts
+from mbd.topology.doubts import MAX_PLAUSIBLE_ANGLE
 
 MAX_SHARE = 0.02
 """Difference from the balance, over the largest multiplier of the run, above which a run says so [-]."""
@@ -89,7 +89,7 @@ MAX_ENERGY_SHARE = 0.5
 def notes_of(run: RunData, record: Record) -> tuple[list[Note], list[str]]:
     """The notes of a run that is over, and those of them that put its result in doubt."""
     equations = run.mechanism.equations
-    notes: list[Note] = [*_doubts(run)]
+    notes: list[Note] = [*doubts_of(run.model, run.mechanism)]
     if np.maximum.reduce(np.abs(run.start.q), initial=0.0) >= MAX_PLAUSIBLE_ANGLE:
         notes = [*degrees(equations, dict(zip(run.start.names, run.start.q.tolist(), strict=False))), *notes]
     notes += [*run.mechanism.notes, *getattr(run.mechanism.common, "notes", ())]
@@ -147,11 +147,6 @@ def _redundancy(run: RunData, record: Record) -> str:
     slid = loaded and any(code.active.given_rows for code in run.stepper.modes)
     moved = any(np.max(np.abs(part - record.q[:1]), initial=0.0) > MIN_MOTION for part in blocks(record.q))
     return redundancy(equations.rows, dependent, slid, moved, _left_singular(run), readers_of(equations, dependent))
-
-
-def _doubts(run: RunData) -> list[str]:
-    """What looks like a mistake in the description, which is looked through once for a mechanism."""
-    return run.mechanism.kept(doubts, lambda: doubts(run.model))
 
 
 def _pushing(run: RunData, columns: ModelColumns) -> tuple[list[str], list[str]]:
