@@ -35,6 +35,8 @@ def undetermined(work: Posture) -> list[str]:
         inputs = tape_inputs(work.mechanism, block, work.parameters)
         cause = first_cause(equations, inputs, when=" at the start")
         return [cause or "a mass or a derivative is not finite at the start; check the parameters and functions used"]
+    if n == equations.n_v and not picked and _has_inertia(matrix):
+        return []
     faults, lost = [], []
     for _, motion in _weak_motions(matrix, n):
         weights = np.abs(motion)
@@ -70,9 +72,8 @@ def lost_inertia(work: Posture) -> str:
 
 def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
     """Unknowns that the equations, scaled, hardly determine, the weakest last, with their relative singular values."""
-    scale = np.sqrt(np.max(np.abs(matrix), axis=1))
-    scale[scale == 0.0] = 1.0
-    scaled, found, largest = matrix / np.outer(scale, scale), list[tuple[float, Vector]](), 1e-300
+    scaled, scale = _scaled(matrix)
+    found, largest = list[tuple[float, Vector]](), 1e-300
     if len(matrix) < MIN_UNKNOWNS and _is_regular(scaled[np.newaxis], len(matrix)):
         return []
     groups = list(alike_islands(scaled, n))
@@ -87,6 +88,26 @@ def _weak_motions(matrix: Matrix, n: int) -> list[tuple[float, Vector]]:
             found.append((float(sizes[place, k]), motion / scale))
     weak = [(size / largest, motion) for size, motion in found if size / largest < ROUND_OFF_RTOL]
     return sorted(weak, key=lambda each: -each[0])
+
+
+def _scaled(matrix: Matrix) -> tuple[Matrix, Vector]:
+    """A symmetric matrix over the roots of the largest numbers in its rows and columns, and these roots."""
+    scale = np.sqrt(np.maximum.reduce(np.abs(matrix), axis=1))
+    scale[scale == 0.0] = 1.0
+    return matrix / (scale[:, np.newaxis] * scale), scale
+
+
+def _has_inertia(M: Matrix) -> bool:
+    """Whether factors of M tell that it resists every motion clearly; all that is looked at else is sound then."""
+    if len(M) > 64:  # one factorization of all takes longer than one of each island
+        return False
+    scaled, _ = _scaled(M)
+    scaled.flat[:: len(M) + 1] -= 1e-8  # eigenvalues above this are no round-off
+    try:
+        np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _is_regular(blocks: Matrix, size: int) -> bool:
