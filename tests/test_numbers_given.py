@@ -67,3 +67,30 @@ def test_a_quaternion_of_length_zero_is_no_orientation(parts):
     ):
         with pytest.raises(mbd.ModelError, match="which is no orientation: a quaternion has length 1"):
             act()
+
+
+@pytest.mark.parametrize("wrong", [True, "1", np.nan, -1.0, np.array([1.0, 2.0])])
+def test_what_is_no_value_of_a_parameter_stays_none_after_another_run(wrong):
+    """What was allowed last is not judged again; True is equal to 1, and the model may have changed since."""
+    model, _ = falling()
+    start = mbd.assemble(model, backend="python")
+    how = {"dt": 0.1, "until": 0.1, "backend": "python"}
+    for _ in range(2):
+        mbd.simulate(model, start, **how, parameters={"ball.mass": 1.0})
+    with pytest.raises(mbd.ModelError, match="ball"):
+        mbd.simulate(model, start, **how, parameters={"ball.mass": wrong})
+
+
+def test_values_are_judged_by_the_model_as_it_is_now():
+    model = mbd.Model("rod")
+    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.2)
+    model.connect(mbd.Revolute("hinge", model.ground.origin, rod.start))
+    how = {"dt": 0.1, "until": 0.1, "backend": "python", "parameters": {"hinge loss.coefficient": 2.0}}
+    with pytest.raises(mbd.MbdError, match="hinge loss"):
+        mbd.simulate(model, mbd.assemble(model, backend="python"), **how)
+    model.joints[0] = replace(model.joints[0], loss=mbd.Viscous(1.0))
+    run = mbd.simulate(model, mbd.assemble(model, backend="python"), **how)
+    assert run.record.parameters[list(run.record.parameter_names).index("hinge loss.coefficient")] == 2.0
+    model.joints[0] = replace(model.joints[0], loss=mbd.Coulomb(0.0))
+    with pytest.raises(mbd.MbdError, match="hinge loss"):
+        mbd.simulate(model, mbd.assemble(model, backend="python"), **how)

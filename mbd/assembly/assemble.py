@@ -106,8 +106,7 @@ def assemble(
     changed, project = dict(parameters or {}), flag(project, "project")
     require_inertia(model, position or {}, changed)
     mechanism = mechanism_of(model, backend, changed)
-    folded = getattr(model, "parameters", {}) if changed else {}
-    equations, values = mechanism.equations, mechanism.parameters(changed, folded)
+    equations, values = mechanism.equations, mechanism.parameters_of(model, changed)
     manager = manager_of(mechanism, values)
     named, faults = _named(model, mechanism, position or {}, velocity or {})
     known = manager.names

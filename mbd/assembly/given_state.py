@@ -56,7 +56,7 @@ def given_state(
         raise ModelError(faults)
     changed = {**state.parameters, **(parameters or {})}
     mechanism = mechanism_of(model, backend, changed, inputs)
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    values = mechanism.parameters_of(model, changed)
     manager = manager_of(mechanism, values)
     fits(state, mechanism.equations, manager)
     return GivenState(mechanism, manager, values, changed)

@@ -31,7 +31,7 @@ def begun_in(model: Any, mechanism: Mechanism, state: State) -> tuple[State, Seq
     machines = mechanism.equations.machines
     if not machines:
         return state, ()
-    own = mechanism.parameters(state.parameters, getattr(model, "parameters", {}))
+    own = mechanism.parameters_of(model, state.parameters)
     if len(state.anchors) != mechanism.layout.n_anchors:
         state = replace(state, anchors=first_anchors(mechanism, own))
         return stored_anew(mechanism, state, own, machines), machines

@@ -175,7 +175,7 @@ def _posture(
 ) -> Posture:
     """Where to look: the state, or the defaults."""
     equations = mechanism.equations
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    values = mechanism.parameters_of(model, changed)
     manager = manager_of(mechanism, values)
     wrong = [name for name in closed or () if name not in manager.names]
     faults = ["closed: " + nearest(name, manager.names, "contact") for name in wrong]

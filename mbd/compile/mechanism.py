@@ -490,8 +490,7 @@ class Mechanism:
         UnknownNameError
             for a name that is not a run-time parameter, with the nearest one.
         """
-        tables = len(self.equations.tables)  # more may follow
-        places, own = self.kept((Mechanism.parameters, tables), self._own_parameters)
+        places, own = self._places_and_values
         p, given = own.copy(), folded or {}
         for name, value in (values or {}).items():
             place = places.get(name)
@@ -506,6 +505,21 @@ class Mechanism:
                 raise UnknownNameError(nearest(name, {*places, *given}, "parameter", "There are"))
             p[place] = float(value)
         return p
+
+    def parameters_of(self, model: Any, values: Mapping[str, float]) -> Vector:
+        """The same for a model of this mechanism, which is asked for what is folded only where it counts."""
+        folded = {} if values.keys() <= self.parameter_places.keys() else getattr(model, "parameters", {})
+        return self.parameters(values, folded)
+
+    @property
+    def parameter_places(self) -> Mapping[str, int]:
+        """Places of run-time parameters in their vector, by name."""
+        return self._places_and_values[0]
+
+    @property
+    def _places_and_values(self) -> tuple[dict[str, int], Vector]:
+        tables = len(self.equations.tables)  # more may follow
+        return self.kept((Mechanism.parameters, tables), self._own_parameters)
 
     def _own_parameters(self) -> tuple[dict[str, int], Vector]:
         """Places of parameters by name, and the parameter vector with the values of the model."""

@@ -12,6 +12,8 @@ from operator import is_
 from typing import Any, overload
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from mbd.compile import remembered
 from mbd.compile.forking import free_in_child
 from mbd.compile.mechanism import Mechanism
@@ -57,7 +59,13 @@ class _Kept:
     """What was made of a model, as long as its words and the named points of its bodies are the same.
 
     So must be what functions refer to: a global value that was set again, or a list whose numbers have changed.
+
+    Attributes
+    ----------
+    allowed : the values of parameters that were asked for last, which its words allow
     """
+
+    allowed: Mapping[str, float] | None = None
 
     def __init__(self, model: Any, described: Any, made: Any) -> None:
         self.described, self.made = described, made
@@ -116,19 +124,34 @@ def mechanism_of(
     require_model(model)
     if not isinstance(backend, str):
         raise ModelError(f"backend must be 'auto', 'llvm' or 'python', not {backend!r}")
-    if changed:
+    key = backend, frozenset[str]()
+    if changed and not _is_allowed(model, key, changed):
         checked = parameter_check(model) if isinstance(model, Description) else model.parameter_check()
         if faults := checked.faults(changed):
             raise ModelError(faults)
-    mechanism = _mechanism(model, backend, frozenset())
-    if not changed and not inputs and not getattr(model, "controllers", ()):
+    mechanism = _mechanism(model, *key)
+    if changed:
+        _KNOWN[model][key].allowed = dict(changed)
+    controllers = getattr(model, "controllers", ())
+    if not changed and not inputs and not controllers:
         return mechanism
-    present = {parameter.name for parameter in mechanism.equations.parameters}
-    values = getattr(model, "parameters", {})
-    wanted = {name for controller in getattr(model, "controllers", ()) for name in controller.writes}
-    wanted |= {name for name, value in (changed or {}).items() if values.get(name) != value}
-    structural = frozenset(name for name in wanted - present if name in values) | (frozenset(inputs) - present)
-    return _mechanism(model, backend, structural) if structural else mechanism
+    present = mechanism.parameter_places
+    written = {name for controller in controllers for name in controller.writes if name not in present}
+    others = {name: value for name, value in (changed or {}).items() if name not in present}
+    structural = {name for name in inputs if name not in present}
+    if written or others:
+        values = getattr(model, "parameters", {})
+        structural |= {name for name in written if name in values}
+        structural |= {name for name, value in others.items() if name in values and values[name] != value}
+    return _mechanism(model, backend, frozenset(structural)) if structural else mechanism
+
+
+def _is_allowed(model: Any, key: tuple[str, frozenset[str]], changed: Mapping[str, float]) -> bool:
+    """Whether these values were allowed when they were asked for last, and the model is the same since."""
+    known = _KNOWN.get(model, {}).get(key)
+    if known is None or known.allowed is None or not set(map(type, changed.values())) <= {float, np.float64, int}:
+        return False  # True is equal to 1, but no number
+    return known.allowed == changed and known.serves(_description(model))
 
 
 def tunable_model(model: Any, names: Collection[str]) -> Any:

@@ -98,7 +98,7 @@ def inverse_kinematics(
     program = marker_program(mechanism, list(points.values()), list(followed), rows, gaps)
     _in_meters(model, recording, points)
     problem = _problem(program, recording, points, followed, size, len(rows), len(gaps))
-    values = mechanism.parameters(parameters, getattr(model, "parameters", {}))
+    values = mechanism.parameters_of(model, parameters or {})
     # the first frame, then all others
     first = _first(problem, recording)
     begin = _begin(model, mechanism, problem, recording, points, first, start, parameters, values)

@@ -365,7 +365,7 @@ def _closed(
         start = assemble(model, position=position, open=contacts, parameters=dict(changed))
         return np.array(start.q), start.anchors
 
-    parameters = mechanism.parameters(changed, getattr(model, "parameters", {}))
+    parameters = mechanism.parameters_of(model, changed)
     known = (motion.q, motion.v, motion.a)
     found = close_loops(mechanism, motion.time, known, missing, assembled, parameters)
     refuse_open_loops(found, mechanism.equations, motion.time, missing)

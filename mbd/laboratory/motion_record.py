@@ -20,7 +20,7 @@ from mbd.results.trajectory import Trajectory
 def parameters_of(mechanism: Mechanism, motion: Motion, changed: Mapping[str, float], model: Any) -> Vector | Matrix:
     """The parameters at the frames: those of the run, if it is one of the very same equations, with changes."""
     run = motion.run
-    values = mechanism.parameters(changed, getattr(model, "parameters", {}) if changed else {})
+    values = mechanism.parameters_of(model, changed)
     if run is None or run.record.equations is not mechanism.equations:
         return values
     own = run.record.parameters_at(np.arange(len(run.time), dtype=np.intp))

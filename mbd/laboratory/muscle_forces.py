@@ -258,7 +258,7 @@ def _crossed(bare: Any, muscles: list[Muscle], moments: InverseDynamics, changed
     equations = mechanism.equations
     state = moments.run.record
     motion = Motion(state.time, state.q, state.v, state.a)
-    parameters = mechanism.parameters(values, getattr(loaded, "parameters", {}))
+    parameters = mechanism.parameters_of(loaded, values)
     columns = ModelColumns(record_of(mechanism, motion, parameters), equations)
     with equations.tape.lock:
         x = [equations.tape.input("x", k) for k in range(equations.n_v)]

@@ -31,7 +31,7 @@ def instant(model: Any, state: State) -> Trajectory:
     ]
     if wrong:
         raise ModelError(f"this state is none of '{equations.name}': {'; '.join(wrong)}")
-    values = mechanism.parameters(dict(state.parameters), getattr(model, "parameters", {}))
+    values = mechanism.parameters_of(model, state.parameters)
     n_v, n_z = equations.n_v, equations.n_z
     closed = np.array([[contact.name in state.mode.closed for contact in equations.contacts]], dtype=np.uint8)
     return Trajectory(

@@ -258,8 +258,7 @@ def laid_out(
 ) -> Run:
     """The same before its start is put into the kernel's arrays."""
     mechanism = mechanism_of(model, options["backend"], changed)
-    folded = getattr(model, "parameters", {}) if changed else {}
-    values = mechanism.parameters(changed, folded)
+    values = mechanism.parameters_of(model, changed)
     manager = manager_of(mechanism, values)
     fits(start, mechanism.equations, manager)
     start = directed(mechanism, start)

@@ -126,7 +126,7 @@ class RunData:
         self.mechanism, self.manager, self.start, self.end, self.stop = mechanism, manager, start, end, stop
         self.asked, self.changed, self.dt = settings, dict(changed), dt
         rows = int(min(self.rows_at_once, (end - start.time) / dt / options.get("store", 1) + 64))
-        parameters = self._parameters()
+        parameters = mechanism.parameters_of(model, self.changed)
         self.first_parameters = parameters.copy()
         compiled_options = {**options, "capacity": rows + 8 + 2 * len(manager.guards), "end": end}
         self.stepper = stepper_of(self.stepper_kind, mechanism, manager, integrator, parameters, dt, compiled_options)
@@ -166,15 +166,10 @@ class RunData:
     def now(self) -> float:
         return float(self.kernel.time)
 
-    def _parameters(self) -> Vector:
-        """The parameter vector; which parameters are folded into the equations is asked only where it counts."""
-        folded = getattr(self.model, "parameters", {}) if self.changed else {}
-        return self.mechanism.parameters(self.changed, folded)
-
     def set_parameters(self, changed: Mapping[str, float]) -> None:
         """Parameters that differ from the model's."""
         self.changed = dict(changed)
-        self.kernel.params[: len(self.first_parameters)] = self._parameters()
+        self.kernel.params[: len(self.first_parameters)] = self.mechanism.parameters_of(self.model, self.changed)
         self._find_breaks(self.now)
 
     def _find_breaks(self, now: float) -> None:

@@ -56,7 +56,7 @@ def parameter_faults(run: RunData, values: Mapping[str, float]) -> list[str]:
     binding = not _in(mechanism, "rows", rows).isdisjoint(values)
     if found or not (inert or binding):
         return found
-    parameters = mechanism.parameters(changed, run.model.parameters)
+    parameters = mechanism.parameters_of(run.model, changed)
     if inert:
         v = run.kernel
         q, y, anchors = v.q[: v.n_q].copy(), v.y[: v.n].copy(), np.array(v.anchors)
