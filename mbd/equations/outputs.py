@@ -74,6 +74,10 @@ class Outputs:
         """Everything that users can ask for."""
         return tuple(name for name in self._makers if name not in self._unlisted)
 
+    def lists(self, name: str) -> bool:
+        """Whether a name is one of `names`."""
+        return name in self._makers and name not in self._unlisted
+
     def __contains__(self, name: str) -> bool:
         return name in self._makers
 

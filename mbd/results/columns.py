@@ -89,6 +89,10 @@ class Columns(ABC):
         stems = [name[:-2] for name in self.names if name.endswith(".x")]
         return tuple(s for s in stems if s not in known and all(s + axis in known for axis in AXES))
 
+    def lists(self, name: str) -> bool:
+        """Whether a name is one of `names`."""
+        return name in self.names
+
     def components(self, name: str) -> tuple[str, ...]:
         """The scalars behind a name: itself, or the components of a vector, a quaternion or Euler angles.
 
@@ -96,7 +100,7 @@ class Columns(ABC):
         """
         if not isinstance(name, str):
             raise TrajectoryError(f"a quantity is asked for by its name, such as 'hip.angle', not {name!r}")
-        if name in self.names:
+        if self.lists(name):
             return (name,)
         if parts := scalars_behind(name, self.knows):
             return parts
@@ -122,11 +126,16 @@ class ModelColumns(StoredStates, Columns):
     def __init__(self, record: Record, equations: Equations) -> None:
         StoredStates.__init__(self, record, equations)
         self._nodes: dict[str, Node] = {}
+        self._waiting: dict[str, Vector] = {}  # coordinates that were evaluated with another one
         self._placed: WeakKeyDictionary[Places, dict[bool, Rows]] = WeakKeyDictionary()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(self.equations.output_names())
+
+    def lists(self, name: str) -> bool:
+        offered = self.equations.output
+        return offered.lists(name) if isinstance(offered, Outputs) else super().lists(name)
 
     @property
     def between_rows(self) -> ModelColumns:
@@ -154,7 +163,26 @@ class ModelColumns(StoredStates, Columns):
         return self._nodes[name]
 
     def at_rows(self, names: Sequence[str]) -> list[Vector]:
-        return self.evaluate_stored([self.node(name) for name in names])
+        group = self._read_together.get(names[0], ()) if len(names) == 1 else ()
+        if not group:
+            return self.evaluate_stored([self.node(name) for name in names])
+        if names[0] not in self._waiting:
+            values = self.evaluate_stored([self.node(name) for name in group])
+            self._waiting |= dict(zip(group, values, strict=True))
+        return [self._waiting.pop(names[0])]
+
+    @property
+    def _read_together(self) -> dict[str, tuple[str, ...]]:
+        """Coordinates of each joint where they do not add, such as a quaternion: one costs as much as all of them."""
+        memory, key = self.equations.memory, "coordinates read together"
+        if key not in memory:
+            names = tuple(each.name for each in self.equations.coordinates)
+            groups = [
+                names[first : first + len(joint.labels)] for joint, first, _ in self.equations.configuration.charts
+            ]
+            memory[key] = {name: group for group in groups for name in group}
+        found: dict[str, tuple[str, ...]] = memory[key]
+        return found
 
     def at_places(self, names: Sequence[str], places: Places) -> list[Vector]:
         nodes = [self.node(name) for name in names]

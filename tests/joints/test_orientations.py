@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 import mbd
 from mbd.joints.euler import SEQUENCES, euler_angles, from_euler
 from mbd.joints.quaternions import rotation_of
+from mbd.results.columns import ModelColumns
 from mbd.view.posture import instant
 
 TURN = Rotation.from_rotvec([0.4, -0.7, 0.3])
@@ -253,3 +254,19 @@ def test_words_for_rotations_that_are_not_there_are_answered_in_one_sentence():
     cross = mbd.Model("cross")
     cross.connect(mbd.Universal("cross", cross.ground.origin, mbd.RigidBody("plate", 1.0, 0.1).origin))
     assert "'cross' turns it out of the plane x–y" in cross.check()[0]
+
+
+def test_parts_of_an_orientation_are_evaluated_together_and_each_is_as_if_read_alone(monkeypatch):
+    model = mbd.Model("top")
+    body = mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.3), center=(0.0, -0.2, 0.1))
+    model.connect(mbd.Spherical("ball", model.ground.origin, body.origin))
+    start = mbd.assemble(model, velocity={"ball.angular_velocity": (0.3, 2.0, 1.0)})
+    run = mbd.simulate(model, start, dt=0.01, until=0.2)
+    names = [f"ball.orientation.{part}" for part in "wxyz"]
+    whole = ModelColumns(run.record, run.record.equations).at_rows(names)
+    asked, evaluate = [], ModelColumns.evaluate
+    monkeypatch.setattr(ModelColumns, "evaluate", lambda self, *given: (asked.append(given), evaluate(self, *given))[1])
+    for name, values in zip(reversed(names), reversed(whole), strict=True):
+        np.testing.assert_array_equal(run[name], values)
+    assert len(asked) == 1
+    np.testing.assert_array_equal(run["ball.orientation"], np.stack(whole, axis=1))
