@@ -17,7 +17,7 @@ import numpy as np
 from mbd.compile import remembered
 from mbd.compile.forking import free_in_child
 from mbd.compile.mechanism import Mechanism
-from mbd.compile.same_words import as_it_is, changing, digest_of_words
+from mbd.compile.same_words import Words, as_it_is, changing, read_words
 from mbd.constraints.base import Constraint
 from mbd.equations.derivation import FrontDoor, derive
 from mbd.errors import ModelError
@@ -67,14 +67,13 @@ class _Kept:
 
     allowed: Mapping[str, float] | None = None
 
-    def __init__(self, model: Any, described: Any, made: Any) -> None:
+    def __init__(self, model: Any, described: Any, made: Any, are_fixed: bool = False) -> None:
         self.described, self.made = described, made
         self._bodies = bodies_of(model)
         self._points = self._present()
         whole = isinstance(model, Description)
-        self._changing = changing(
-            [model.joints, model.forces, model.constraints, model.observations] if whole else [model]
-        )
+        words = [model.joints, model.forces, model.constraints, model.observations] if whole else [model]
+        self._changing = [] if are_fixed else changing(words)
         self._were = as_it_is(self._changing) if self._changing else None
 
     def _present(self) -> list[Any]:
@@ -184,16 +183,17 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str], derived: bool 
     if known is not None and known.serves(now):
         kept: Mechanism = known.made
         return kept
-    key = backend, tunable, _words(model)
+    words = _words(model)
+    key = backend, tunable, words
     with _LOCK:
-        made = _BY_WORDS.get(key) if key[-1] else None
+        made = _BY_WORDS.get(key) if words else None
     if made is None and not derived:
         return None
     if made is None:
         made = _derived(model, backend, tunable)
     with _LOCK:
-        _KNOWN[model][backend, tunable] = _Kept(model, now, made)
-        if key[-1]:
+        _KNOWN[model][backend, tunable] = _Kept(model, now, made, words is not None and words.are_fixed)
+        if words:
             _BY_WORDS[key] = made
             _BY_WORDS.move_to_end(key)
             while len(_BY_WORDS) > MAX_KEPT_BY_WORDS:
@@ -201,8 +201,8 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str], derived: bool 
     return made
 
 
-def _words(model: Any) -> str | None:
-    """What the equations of a model follow from, as a digest; None where they may depend on more."""
+def _words(model: Any) -> Words | None:
+    """What the equations of a model follow from; None where they may depend on more."""
     ordinary = isinstance(model, Description) and type(model).__module__ == "mbd.model" and not model.controllers
     if not ordinary or not remembered.ENABLED:
         return None
@@ -212,7 +212,7 @@ def _words(model: Any) -> str | None:
     if any(getattr(word, "reset", None) is not None for word in model.constraints):
         return None  # a run calls it, or reads it, as it is then
     points = [[*body.points.items()] for body in bodies_of(model)]
-    return digest_of_words(model.name, *_description(model), model.markers, points)
+    return read_words(model.name, *_description(model), model.markers, points)
 
 
 def _derived(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism:

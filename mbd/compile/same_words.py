@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from hashlib import sha256
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,12 +37,25 @@ class CannotTellError(Exception):
     """What something says may change, or is not known."""
 
 
-def digest_of_words(*words: Any) -> str | None:
-    """Equal for two descriptions that say the same; None where none can be given."""
+class Words(NamedTuple):
+    """What a description says.
+
+    digest : equal for two descriptions that say the same
+    are_fixed : whether there are no functions among the words, so that nothing is `changing`
+    """
+
+    digest: str
+    are_fixed: bool
+
+
+def read_words(*words: Any) -> Words | None:
+    """What a description says; None where nobody can tell."""
+    reader = Reader()
     try:
-        return Reader().digest(words)
+        digest = reader.digest(words)
     except (CannotTellError, RecursionError):
         return None
+    return Words(digest, all(type(each) not in CALLABLE for each in reader.kept))
 
 
 class Reader:

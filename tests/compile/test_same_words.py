@@ -16,8 +16,11 @@ import tests.comparisons
 from mbd.assembly import doubtful
 from mbd.compile import mechanisms
 from mbd.compile.mechanisms import mechanism_of
+from mbd.compile.same_words import changing
+from mbd.forces.base import Force
 from mbd.hardcases.shakers import table
 from tests.fuzz.structures import DRIVEN, SPACE, structure
+from tests.instances import CONSTRAINTS, FORCES
 
 made = structure.__wrapped__
 """A random mechanism of a number, described again each time."""
@@ -161,6 +164,22 @@ class Slotted:
 
     def __call__(self, t: Any) -> Any:
         return self.size * mbd.sin(t)
+
+
+def test_words_without_functions_hold_nothing_that_changes():
+    """The digest tells so of random mechanisms, of every kind of word, and of one whose law is a function."""
+    models = [made(number).model for number in NUMBERS]
+    for _, factory in [*FORCES, *CONSTRAINTS]:
+        model = rod(1.0)
+        (hinge,) = model.joints
+        word = factory(hinge.child.body.point(0.1, -0.5, 0.0), model.ground.point(0.2, -0.9, 0.0), hinge)
+        (model.apply if isinstance(word, Force) else model.constrain)(word)
+        models.append(model)
+    models.append(rod(lambda t: 2.0 * t))
+    found = [(mechanisms._words(model), model) for model in models]
+    fixed = [model for words, model in found if words is not None and words.are_fixed]
+    assert not any(changing([model.joints, model.forces, model.constraints, model.observations]) for model in fixed)
+    assert len(fixed) > 20 and not found[-1][0].are_fixed
 
 
 def test_what_may_mean_something_else_later_has_no_digest():
