@@ -47,7 +47,7 @@ motions: equations derived by hand, integrated by DOP853 at 1e-13 with impacts l
   reading of results. `mbd` has two columns: *call* is `mbd.simulate` as you call it, once the model is compiled;
   *loop* is the time inside its kernel.
 - **From words** is the time from the words of a model to the values that are compared, in a process that has done
-  the same before: the model is built anew, run and read each time. Compiled code is there, equations are not.
+  the same before: the model is built again, run and read each time. Compiled code is there, equations are not.
 - **Errors** are the largest absolute difference from the reference at any output time. Each scene says what is
   compared.
 - **A cell** is the time of the fastest setting that reaches the error. A dash means that no setting tried reached it,
