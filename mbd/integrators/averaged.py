@@ -9,8 +9,9 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.integrators.base import Point, StepReport, StepResult, System, Terms, composed
-from mbd.integrators.stepping import MAX_ITERATIONS, SchemeMemory
+from mbd.integrators.stepping import SchemeMemory
 from mbd.kernel.codes import EPS
+from mbd.kernel.schemes.iteration import MAX_ITERATIONS
 from mbd.state import Mode, State
 
 

@@ -24,12 +24,10 @@ from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.state import Mode, State
 
 __all__ = [
-    "MAX_ITERATIONS", "SchemeMemory", "fill_coefficients", "memory_lengths", "own_scheme", "set_numbers", "start_of",
+    "SchemeMemory", "fill_coefficients", "memory_lengths", "own_scheme", "set_numbers", "start_of",
     "step_of",
 ]  # fmt: skip
 
-MAX_ITERATIONS = 50
-"""Newton iterations, halvings included, after which a step counts as failed; one that converges takes one to three."""
 CARRIED = ("aux", "slope", "lam_slope", "shift", "shift_change", "past_stages")
 """Arrays from which a scheme makes its next step."""
 JUDGING = ("scale", "weight", "left", "clock", "detail", "state")
@@ -46,7 +44,7 @@ REASONS = {
 
 
 NOTHING: dict[str, Any] = dict.fromkeys((*TABLE.integers, *TABLE.reals), 0) | {
-    "max_iterations": MAX_ITERATIONS, "beta": 0.25, "gamma": 0.5, "tolerance": 1e-9, "jerk": 1, "rest_speed": 1e-6,
+    "beta": 0.25, "gamma": 0.5, "tolerance": 1e-9, "jerk": 1, "rest_speed": 1e-6,
     "longest": np.inf, "n_substeps": 1, "capacity": 1, "width": 1, "event_capacity": 1, "event_width": 1,
 }  # fmt: skip
 """Numbers of a record without contacts, guards and results."""

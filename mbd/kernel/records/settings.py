@@ -83,8 +83,6 @@ class Settings(Sizes):
     stabilized: int  # 1: velocity level with position correction, 0: index 3
     jerk: int  # 1: a₀ starts from the jerk, 0: a₀ = v̇₀
     exact: int  # 1: iterate until round-off
-    max_iterations: int
-    max_switches: int
     linear: int  # 1: event instants by one linear interpolation
     stride: int  # steps from one stored row to the next
     strategy: int  # 0 located events, 1 non-smooth steps
@@ -92,7 +90,6 @@ class Settings(Sizes):
     impact_law: int  # 0 Newton, 1 Poisson, 2 sequential
     loads_act: int  # 1 where forces follow multipliers: smooth friction of contacts by rows, laws that read them
     loaded: int  # forces follow multipliers other than linearly: 1 pins and laws, 2 friction not at all where one pulls
-    adaptive: int  # 1: steps follow the estimated error, 0: they are all dt
     error_order: int  # power of the step with which the estimated error per second falls
     driven: int  # 1: drives prescribe motion, and multipliers are part of the error or decide about contacts
     n_substeps: int  # substeps of a step at whose ends guards are evaluated; 1: at those of the step only
@@ -103,9 +100,12 @@ class Settings(Sizes):
     tolerance: float
     rest_speed: float
     dt: float  # of all steps, or where they follow the error a time that is short beside the motion
-    allowed: float  # local error in positions [m, rad] per second
+    allowed: float  # local error in positions [m, rad] per second, 0: steps are all dt
     longest: float  # step
     n_clusters: int  # of coordinates that nothing connects to others: see `mbd.equations.clusters`
+
+    adaptive: int = formula(lambda s: int(s.allowed > 0.0))  # 1: steps follow the estimated error
+    max_switches: int = formula(lambda s: 20 + 4 * (s.n_contacts + s.n_guards + s.n_frictions))  # at one instant
 
 
 class SchemeAbilities(Settings):

@@ -13,7 +13,7 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbd.kernel.records import Kernel, SingularSteps, Steps
-from mbd.kernel.schemes.iteration import MAX_RATE_ERROR, MIN_RATE_SHARE, note_fastest
+from mbd.kernel.schemes.iteration import MAX_ITERATIONS, MAX_RATE_ERROR, MIN_RATE_SHARE, note_fastest
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import A2_, A_, BALANCES, CHANGES, E_, MU_REAL, STAGE_RATES, stage_place
 from mbd.kernel.schemes.stage_matrices import factor_stages, tangent_of_stage
@@ -49,7 +49,7 @@ def coupled_step(K: Kernel, h: float, t1: float, m: int) -> int:
     K.failure_time = t1
     K.failure_step = h
     left = 1e300
-    for iteration in range(K.max_iterations):
+    for iteration in range(MAX_ITERATIONS):
         tolerance = 1e-3 * K.tolerance
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, True)
         part = 1.0 if iteration > 0 else 0.0

@@ -12,6 +12,7 @@ from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR, STAGNATED
 from mbd.kernel.hooks import call, call_on
 from mbd.kernel.records import DependentRows, Equations, Kernel, Reals, Report, SingularSteps
 from mbd.kernel.schemes.iteration import (
+    MAX_ITERATIONS,
     MIN_HALVED_RESIDUAL,
     finish,
     is_below_floors,
@@ -84,7 +85,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     moved = 1e300
     last = 0.0
     further = 0
-    for iteration in range(K.max_iterations + further_corrections()):
+    for iteration in range(MAX_ITERATIONS + further_corrections()):
         tangent = not fresh
         if together:
             share_loads(K, m)

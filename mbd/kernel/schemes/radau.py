@@ -21,6 +21,7 @@ from mbd.kernel.schemes.direction_continuation import (
     wants_continuation,
 )
 from mbd.kernel.schemes.iteration import (
+    MAX_ITERATIONS,
     MIN_HALVED_RESIDUAL,
     MIN_RETRY_SHARE,
     roughly,
@@ -161,7 +162,7 @@ def plain_step(K: Kernel, h: float, t1: float, m: int, predicts: bool) -> int:
     first = 0.0  # what the first correction changed, and the last
     moved = 0.0
     further = 0
-    for iteration in range(K.max_iterations):
+    for iteration in range(MAX_ITERATIONS):
         error = evaluate_stages(K, h, t1, m, tolerance, c, c * c, renew)
         # shares that follow loads change it as well
         grown = error > MIN_HALVED_RESIDUAL and error > 0.9 * left and not sharing(K)
@@ -263,7 +264,7 @@ def singular_stages_step(K: Kernel, h: float, t1: float) -> int:
     first = 0.0
     moved = 1e300
     last = 0.0
-    for iteration in range(K.max_iterations):
+    for iteration in range(MAX_ITERATIONS):
         status = solve_singular_stages(K, h, t1, m, iteration == 0)
         if status != 0:
             return status

@@ -13,6 +13,7 @@ from mbd.kernel.codes import EPS, LEFT, NOT_CONVERGED, NOT_FINITE, PASSING, SING
 from mbd.kernel.hooks import call
 from mbd.kernel.records import DependentRows, Equations, Kernel, Motion, SingularSteps
 from mbd.kernel.schemes.iteration import (
+    MAX_ITERATIONS,
     finish,
     is_below_floors,
     overturns,
@@ -153,7 +154,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     before = 1e300
     away = 0.0
     further = 0
-    for iteration in range(K.max_iterations + further_corrections()):
+    for iteration in range(MAX_ITERATIONS + further_corrections()):
         # tangent and residual at the iterate
         if sharing(K):
             share_loads(K, m)

@@ -17,6 +17,7 @@ from mbd.assembly.posture import Posture
 from mbd.dataclass import dataclass
 from mbd.integrators.base import Point
 from mbd.kernel import codes
+from mbd.kernel.schemes.iteration import MAX_ITERATIONS
 from mbd.results.record import EventRecord
 from mbd.simulation.diagnostics.grip import lost_grip
 from mbd.simulation.diagnostics.painleve import consistent_forces
@@ -332,8 +333,8 @@ CAUSES = (
     ),
     Cause(
         (codes.NOT_CONVERGED,),
-        "Newton stalled at {x.residual:.3g} times the tolerance after {x.v.max_iterations} iterations{x.own_message}"
-        "{x.closed}{x.worst}",
+        f"Newton stalled at {{x.residual:.3g}} times the tolerance after {MAX_ITERATIONS} iterations"
+        "{x.own_message}{x.closed}{x.worst}",
         "try a smaller dt or softer stiffness; a force that jumps with the state (mbd.where, sign) must be made "
         "continuous, or be switched by an Event or Controller{x.rushing}",
     ),

@@ -15,7 +15,7 @@ from mbd.equations.equations import Equations
 from mbd.equations.programs import ActiveSet, follows_multipliers
 from mbd.errors import MemoryLimitError, ModelError
 from mbd.integrators.base import Integrator
-from mbd.integrators.stepping import MAX_ITERATIONS, fill_coefficients, memory_lengths, own_scheme, set_numbers
+from mbd.integrators.stepping import fill_coefficients, memory_lengths, own_scheme, set_numbers
 from mbd.kernel import codes
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.contact.contact_log import room_to_log
@@ -186,13 +186,11 @@ class Stepper:
             loaded=follows(self.mechanism.equations), impact_law=LAWS.index(options.get("impact", "newton")),
             strategy=int(options.get("contact") == "nonsmooth"), auto=int(options.get("auto", False)),
             vector=int(self.mechanism.vector), treelike=0,
-            stabilized=int(self.stabilized), max_iterations=MAX_ITERATIONS,
-            max_switches=20 + 4 * (n_contacts + n_guards + layout.n_frictions),
-            linear=int(options.get("locate") == "linear"),
+            stabilized=int(self.stabilized), linear=int(options.get("locate") == "linear"),
             capacity=int(options["capacity"]), stride=int(options.get("store", 1)),
             rest_speed=float(options.get("rest_speed", 1e-6)), dt=dt,
             alpha_m=0.0, alpha_f=0.0, beta=0.25, gamma=0.5, tolerance=1e-9, jerk=1, exact=0,
-            adaptive=int("allowed" in options), allowed=float(options.get("allowed", 0.0)),
+            allowed=float(options.get("allowed", 0.0)),
             driven=int(options.get("driven", False)), longest=float(options.get("longest", np.inf)),
             error_order=self.integrator.error_order(), n_substeps=1,
             n_clusters=1 + max(self.clusters, default=0),
