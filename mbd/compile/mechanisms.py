@@ -9,7 +9,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Collection, Hashable, Mapping
 from operator import is_
-from typing import Any, overload
+from typing import Any, Generic, TypeVar, overload
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -30,13 +30,14 @@ from mbd.topology.description import Description
 
 __all__ = ["is_known", "mechanism_of", "require_model", "tunable_model"]
 
-_KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept]] = WeakKeyDictionary()
-_TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept[Mechanism]]] = WeakKeyDictionary()
+_TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept[Any]]] = WeakKeyDictionary()
 _BY_WORDS: OrderedDict[Hashable, Mechanism] = OrderedDict()
 """The mechanisms that were asked for last, by what their models say."""
 MAX_KEPT_BY_WORDS = 4
 """How many of them: each may hold arrays of 32 MB for the runs that follow."""
 _LOCK = threading.Lock()
+Made = TypeVar("Made")
 free_in_child(_LOCK)
 
 
@@ -55,7 +56,7 @@ def _same(old: Any, new: Any) -> bool:
     return alike and old[1:] == new[1:]
 
 
-class _Kept:
+class _Kept(Generic[Made]):
     """What was made of a model, as long as its words and the named points of its bodies are the same.
 
     So must be what functions refer to: a global value that was set again, or a list whose numbers have changed.
@@ -65,10 +66,9 @@ class _Kept:
     allowed : the values of parameters that were asked for last, which its words allow
     """
 
-    allowed: Mapping[str, float] | None = None
-
-    def __init__(self, model: Any, described: Any, made: Any, are_fixed: bool = False) -> None:
+    def __init__(self, model: Any, described: Any, made: Made, are_fixed: bool = False) -> None:
         self.described, self.made = described, made
+        self.allowed: Mapping[str, float] = {}
         self._bodies = bodies_of(model)
         self._points = self._present()
         whole = isinstance(model, Description)
@@ -87,6 +87,10 @@ class _Kept:
         if len(points) != len(self._points) or not all(map(is_, points, self._points)):
             return False
         return self._were is None or as_it_is(self._changing)[0] == self._were[0]
+
+    def allows(self, changed: Mapping[str, float]) -> bool:
+        """Whether these are the values that were allowed last; True is equal to 1, but no number."""
+        return self.allowed == changed if set(map(type, changed.values())) <= {float, np.float64, int} else False
 
 
 def bodies_of(model: Any) -> list[Any]:
@@ -123,14 +127,13 @@ def mechanism_of(
     require_model(model)
     if not isinstance(backend, str):
         raise ModelError(f"backend must be 'auto', 'llvm' or 'python', not {backend!r}")
-    key = backend, frozenset[str]()
-    if changed and not _is_allowed(model, key, changed):
+    kept = _kept(model, backend, frozenset(), derived=False)
+    if changed and (kept is None or not kept.allows(changed)):
         checked = parameter_check(model) if isinstance(model, Description) else model.parameter_check()
         if faults := checked.faults(changed):
             raise ModelError(faults)
-    mechanism = _mechanism(model, *key)
-    if changed:
-        _KNOWN[model][key].allowed = dict(changed)
+    kept = _kept(model, backend, frozenset()) if kept is None else kept
+    kept.allowed, mechanism = dict(changed or {}), kept.made
     controllers = getattr(model, "controllers", ())
     if not changed and not inputs and not controllers:
         return mechanism
@@ -142,15 +145,7 @@ def mechanism_of(
         values = getattr(model, "parameters", {})
         structural |= {name for name in written if name in values}
         structural |= {name for name, value in others.items() if name in values and values[name] != value}
-    return _mechanism(model, backend, frozenset(structural)) if structural else mechanism
-
-
-def _is_allowed(model: Any, key: tuple[str, frozenset[str]], changed: Mapping[str, float]) -> bool:
-    """Whether these values were allowed when they were asked for last, and the model is the same since."""
-    known = _KNOWN.get(model, {}).get(key)
-    if known is None or known.allowed is None or not set(map(type, changed.values())) <= {float, np.float64, int}:
-        return False  # True is equal to 1, but no number
-    return known.allowed == changed and known.serves(_description(model))
+    return _kept(model, backend, frozenset(structural)).made if structural else mechanism
 
 
 def tunable_model(model: Any, names: Collection[str]) -> Any:
@@ -168,21 +163,20 @@ def tunable_model(model: Any, names: Collection[str]) -> Any:
 
 def is_known(model: Any, backend: str = "auto") -> bool:
     """Whether the mechanism of a model is there already, so that nothing can be wrong with its words."""
-    return _mechanism(model, backend, frozenset(), derived=False) is not None
+    return _kept(model, backend, frozenset(), derived=False) is not None
 
 
 @overload
-def _mechanism(model: Any, backend: str, tunable: frozenset[str]) -> Mechanism: ...
+def _kept(model: Any, backend: str, tunable: frozenset[str]) -> _Kept[Mechanism]: ...
 @overload
-def _mechanism(model: Any, backend: str, tunable: frozenset[str], derived: bool) -> Mechanism | None: ...
-def _mechanism(model: Any, backend: str, tunable: frozenset[str], derived: bool = True) -> Mechanism | None:
+def _kept(model: Any, backend: str, tunable: frozenset[str], derived: bool) -> _Kept[Mechanism] | None: ...
+def _kept(model: Any, backend: str, tunable: frozenset[str], derived: bool = True) -> _Kept[Mechanism] | None:
     """The mechanism that is known, or else is `derived`."""
     now = _description(model)
     with _LOCK:
         known = _KNOWN.setdefault(model, {}).get((backend, tunable))
     if known is not None and known.serves(now):
-        kept: Mechanism = known.made
-        return kept
+        return known
     words = _words(model)
     key = backend, tunable, words
     with _LOCK:
@@ -191,14 +185,15 @@ def _mechanism(model: Any, backend: str, tunable: frozenset[str], derived: bool 
         return None
     if made is None:
         made = _derived(model, backend, tunable)
+    found = _Kept(model, now, made, words is not None and words.are_fixed)
     with _LOCK:
-        _KNOWN[model][backend, tunable] = _Kept(model, now, made, words is not None and words.are_fixed)
+        _KNOWN[model][backend, tunable] = found
         if words:
             _BY_WORDS[key] = made
             _BY_WORDS.move_to_end(key)
             while len(_BY_WORDS) > MAX_KEPT_BY_WORDS:
                 _BY_WORDS.popitem(last=False)
-    return made
+    return found
 
 
 def _words(model: Any) -> Words | None:

@@ -239,9 +239,16 @@ def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any
     single, grouped = names_in(wrt)
     _check_controllers(getattr(model, "controllers", ()), controllers, {*single, *grouped})
     mechanism = mechanism_of(model, backend, {k: v for k, v in changed.items() if is_number(v)})
-    equations = mechanism.equations
-    if mechanism.kept(with_inputs, lambda: _names_of(equations)).issuperset((*single, *grouped)):
-        return model
+    more = mechanism.kept(
+        (with_inputs, *single, *grouped), lambda: _folded_of(mechanism.equations, model, single, grouped)
+    )
+    return tunable_model(model, more) if more else model
+
+
+def _folded_of(equations: Equations, model: Any, single: Sequence[str], grouped: Sequence[str]) -> list[str]:
+    """Which of these names are parameters of the model that its equations do not have as inputs."""
+    if _names_of(equations).issuperset((*single, *grouped)):
+        return []
     folded, own = getattr(model, "parameters", {}), _names_of(equations)
     known = {*own, *folded, *restitution_names(equations)}
     whole = whole_names(equations)
@@ -252,8 +259,7 @@ def with_inputs(model: Any, backend: str, changed: Mapping[str, float], wrt: Any
                 "wrt: " + nearest(name, known, "coordinate, rate of the start or parameter", "There are")
             )
     inputs = _inputs_of(equations)
-    more = [name for name in (*single, *grouped) if name in folded and name not in inputs]
-    return tunable_model(model, more) if more else model
+    return [name for name in (*single, *grouped) if name in folded and name not in inputs]
 
 
 def _names_of(equations: Equations) -> frozenset[str]:
