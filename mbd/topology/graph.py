@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mbd.joints.base import Joint
 
@@ -30,6 +30,19 @@ def links_of(model: Description, without: Collection[str] = ()) -> Links:
             links.setdefault(child, {})[parent] = between
             between[joint.name] = joint
     return links
+
+
+def graph_of(model: Description, without: Collection[str] = ()) -> Any:
+    """The same as a `networkx.MultiGraph` of body names, for questions of one's own; edges carry their `joint`."""
+    import networkx as nx  # takes longer to load than a walker takes to derive
+
+    graph: Any = nx.MultiGraph(name=model.name)
+    links = links_of(model, without)
+    graph.add_nodes_from(links)
+    for joint in model.joints:
+        if joint.name not in without:
+            graph.add_edge(joint.parent.body.name, joint.child.body.name, key=joint.name, joint=joint)
+    return graph
 
 
 def disconnected(model: Description) -> list[str]:

@@ -29,7 +29,7 @@ __all__ = ["draw", "machine", "made_with", "record", "versions", "write"]
 FORMAT, VERSION = "mbd record", 1
 """Of the record, see docs/files.md."""
 
-LIBRARIES = ("numpy", "scipy", "sympy", "llvmlite", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "sympy", "networkx", "llvmlite", "matplotlib")
 
 
 def versions() -> dict[str, str | None]:

@@ -6,7 +6,7 @@ import pytest
 import mbd
 from mbd.errors import ModelError
 from mbd.model import Model
-from mbd.topology import mobility, plan
+from mbd.topology import disconnected, graph_of, mobility, plan
 from tests.topology.mechanisms import bricard, chain, four_bar, kneed_walker
 
 
@@ -154,6 +154,13 @@ def test_an_unknown_cut_offers_the_nearest_joint():
         plan(chain(3, ["joint1"]))
     with pytest.raises(ModelError, match="'auto', 'loops', 'all'"):
         plan(chain(3, "some"))
+
+
+def test_the_graph_can_be_asked():
+    graph = graph_of(four_bar())
+    assert list(graph) == ["ground", "crank", "coupler", "rocker"]
+    assert graph.number_of_edges() == 4
+    assert disconnected(four_bar()) == []
 
 
 def test_long_chains_are_planned_in_proportion():
