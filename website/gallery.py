@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from mbd.cli import Script, examples
 from mbd.view.camera import camera
 from mbd.view.geometry import first_view
+from mbd.view.instants import Instants
 from mbd.view.page import html
 from mbd.view.plots import drawing
 from mbd.view.posture import draw_in_space
-from mbd.view.scene import Instants, Scene, scene
+from mbd.view.scene import Scene, scene
 
 __all__ = ["Example", "index", "read"]
 

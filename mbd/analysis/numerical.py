@@ -19,8 +19,9 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL, ROUND_OFF_RTOL
 from mbd.errors import CapabilityError, ModelError
+from mbd.integrators.averaged import Coefficients
 from mbd.integrators.base import Integrator
-from mbd.integrators.family import Coefficients, NewmarkFamily
+from mbd.integrators.family import NewmarkFamily
 from mbd.later import later
 
 if TYPE_CHECKING:

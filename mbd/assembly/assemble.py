@@ -21,7 +21,8 @@ from mbd.assembly.initial_pose import opening
 from mbd.assembly.machines import first_anchors, hold, store_first, without_held
 from mbd.assembly.manager import manager_of
 from mbd.assembly.named_projection import nearest_positions, nearest_velocities
-from mbd.assembly.posture import Posture, capture, close_nearby, close_positions, close_velocities, position_rows
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import capture, close_nearby, close_positions, close_velocities, position_rows
 from mbd.assembly.turns import choose_turns, name_wrapped, nearest_turns
 from mbd.assembly.whole_values import as_given, spelled_out, three_of_four
 from mbd.bodies.values import flag, named_number_faults, names_given

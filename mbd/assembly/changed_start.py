@@ -9,7 +9,8 @@ import numpy as np
 from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.given_state import given_state
 from mbd.assembly.machines import begun_in, stored_anew
-from mbd.assembly.posture import Posture, capture, close_nearby, close_velocities, position_rows
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import capture, close_nearby, close_velocities, position_rows
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.errors import AssemblyError
 from mbd.state import State, of_model

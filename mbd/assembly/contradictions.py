@@ -8,7 +8,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.assembly.conflicts import loops_of
 from mbd.assembly.infeasibility import MAX_CONFLICTING_SETS, Held, named_conflict, position_conflicts, velocity_conflict
-from mbd.assembly.posture import Posture
+from mbd.assembly.pose import Posture
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.assembly.posture import Posture
+from mbd.assembly.pose import Posture
 from mbd.bodies.values import is_finite_number, shown
 from mbd.constraints.touchdown import Touchdown
 from mbd.dataclass import dataclass

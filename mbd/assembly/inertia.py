@@ -11,7 +11,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.islands import alike_islands, islands_of_rows
 from mbd.assembly.not_finite import first_cause, tape_inputs
-from mbd.assembly.posture import Posture
+from mbd.assembly.pose import Posture
 from mbd.compile.orders import MIN_UNKNOWNS
 from mbd.equal import ROUND_OFF_RTOL
 

@@ -10,7 +10,8 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
 from mbd.assembly.conflicts import HELD_ROW_WEIGHT, Conflict, Member, irreducible, linear_conflict, member_of, solvable
-from mbd.assembly.posture import Posture, close_positions, descend, descents
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import close_positions, descend, descents
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 

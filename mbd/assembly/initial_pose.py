@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mbd.arrays import Vector
-from mbd.assembly.posture import Posture
+from mbd.assembly.pose import Posture
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.python import ScalarFunction, scalar_function
 from mbd.dataclass import dataclass

@@ -11,7 +11,8 @@ from mbd.assembly.conflicts import Conflict, loops_of
 from mbd.assembly.dependence import Dependence, dependences, rank_of
 from mbd.assembly.infeasibility import acceleration_conflict, position_conflicts, velocity_conflict
 from mbd.assembly.manager import manager_of
-from mbd.assembly.posture import Posture, capture, close_nearby, close_positions, close_velocities, move, position_rows
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import capture, close_nearby, close_positions, close_velocities, move, position_rows
 from mbd.bodies.values import named_number_faults, names_given
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.mechanisms import mechanism_of

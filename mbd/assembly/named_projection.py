@@ -14,7 +14,8 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
-from mbd.assembly.posture import Posture, close_nearby, close_positions, move
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import close_nearby, close_positions, move
 from mbd.equal import EQUAL_RTOL, RANK_RTOL
 
 

@@ -12,11 +12,6 @@ from mbd.assembly.turns import choose_turns, hold_directions
 from mbd.compile.orders import MIN_UNKNOWNS
 from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, SMALL_SUM_RTOL
 
-__all__ = [
-    "Posture", "capture", "close_nearby", "close_positions", "close_velocities", "damped_step",
-    "descend", "descents", "move", "position_rows",
-]  # fmt: skip
-
 REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
 MAX_LEVER = 2.0

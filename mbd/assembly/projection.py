@@ -13,7 +13,8 @@ from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.given_state import given_state
 from mbd.assembly.machines import begun_in, stored_anew
 from mbd.assembly.orientation import reversed_joints
-from mbd.assembly.posture import Posture, capture, close_nearby, close_velocities, position_rows
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import capture, close_nearby, close_velocities, position_rows
 from mbd.assembly.turns import keep_wrapped
 from mbd.equal import EQUAL_RTOL
 from mbd.errors import AssemblyError

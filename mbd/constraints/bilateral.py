@@ -15,7 +15,8 @@ from mbd.constraints.user_measure import measure
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import joint_of
-from mbd.forces.quantities import Mention, OfQuantities, Quantity, Samples, arguments_of, mentioned, quantity_of, scalar
+from mbd.forces.quantities import Mention, OfQuantities, Quantity, arguments_of, mentioned, quantity_of, scalar
+from mbd.forces.samples import Samples
 from mbd.joints.base import Joint
 from mbd.tape.derivatives import live
 from mbd.tape.functions import atan2, cos, sin

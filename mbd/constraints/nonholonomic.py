@@ -14,13 +14,13 @@ from mbd.forces.quantities import (
     Mention,
     OfQuantities,
     Quantity,
-    Samples,
     arguments_of,
     mentioned,
     quantity_of,
     resolved,
     scalar,
 )
+from mbd.forces.samples import Samples
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import traced_scalar
 

@@ -22,12 +22,6 @@ from mbd.joints.base import Joint
 from mbd.tape.node import Scalar
 from mbd.tape.tracing import Argument, traced, traced_scalar
 
-__all__ = [
-    "INCREMENT_PREFIX", "ArgumentSpec", "Mention", "OfQuantities", "Quantity", "QuantityTriple", "Samples",
-    "arguments_of", "is_single", "law_names", "mentioned", "quantity_of", "resolved", "scalar", "triple_at",
-    "triple_of", "value_parameters",
-]  # fmt: skip
-
 INCREMENT_PREFIX = "+"
 """Before the name of a law among the tunable parameters: what is added to it is an input, see `law_names`."""
 

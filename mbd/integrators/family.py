@@ -19,8 +19,6 @@ from mbd.errors import CapabilityError
 from mbd.integrators.averaged import Coefficients
 from mbd.integrators.base import CompiledIntegrator, System
 
-__all__ = ["DEFAULT_TOLERANCE", "Coefficients", "Formulation", "NewmarkFamily", "Starting"]
-
 DEFAULT_TOLERANCE = 1e-9
 """Largest residual of the balance, relative to the sum of its terms, at which Newton stops.
 

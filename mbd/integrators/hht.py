@@ -4,15 +4,9 @@ from typing import ClassVar, Literal
 
 from mbd.bodies.values import among, is_number, shown
 from mbd.errors import CapabilityError
-from mbd.integrators.averaged import AveragedStep
+from mbd.integrators.averaged import AveragedStep, Coefficients
 from mbd.integrators.base import Integrator, StepResult, System, completed
-from mbd.integrators.family import (
-    DEFAULT_TOLERANCE,
-    Coefficients,
-    Formulation,
-    NewmarkFamily,
-    Starting,
-)
+from mbd.integrators.family import DEFAULT_TOLERANCE, Formulation, NewmarkFamily, Starting
 from mbd.integrators.stepping import SchemeMemory
 from mbd.state import Mode, State
 

@@ -2,8 +2,9 @@
 
 from mbd.bodies.values import is_number, shown
 from mbd.errors import CapabilityError
+from mbd.integrators.averaged import Coefficients
 from mbd.integrators.base import Integrator
-from mbd.integrators.family import DEFAULT_TOLERANCE, Coefficients, Formulation, NewmarkFamily, Starting
+from mbd.integrators.family import DEFAULT_TOLERANCE, Formulation, NewmarkFamily, Starting
 
 MAX_COEFFICIENT = 10.0
 """Coefficient above which the scheme is none: published ones have γ ≤ 3/2 and β ≤ 1 [-]."""

@@ -11,7 +11,8 @@ import numpy as np
 
 from mbd.assembly.conflicts import Conflict, loops_of
 from mbd.assembly.infeasibility import position_conflicts
-from mbd.assembly.posture import Posture, close_positions, position_rows
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import close_positions, position_rows
 from mbd.dataclass import found_late
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Guard

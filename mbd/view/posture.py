@@ -26,8 +26,6 @@ from mbd.view.style import FAINT, INK, NEUTRAL, PALE, as_label, color, tone
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_in_space", "drawn", "instant"]
-
 FORCE_COLOR = "#009E73"
 
 GROUND_COLOR = "#B9C0C9"

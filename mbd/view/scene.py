@@ -22,7 +22,7 @@ from mbd.view.solids import Hinge, Solid, Stop, hinges, limbs, rotations, solids
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Instants", "Push", "Scene", "Touch", "scene"]
+__all__ = ["Scene", "Touch", "scene"]
 
 RADIUS_RTOL = 0.02
 """Radii that differ less, over the radius, are one [-]."""

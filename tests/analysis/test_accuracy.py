@@ -12,11 +12,11 @@ import mbd.analysis.accuracy.lab as lab
 from mbd import cli
 from mbd.analysis.accuracy import Point, choices, points
 from mbd.analysis.accuracy.advice import advice, cheapest
-from mbd.analysis.accuracy.compare import aligned
 from mbd.analysis.accuracy.lab import folds, retimed, with_orders
 from mbd.analysis.accuracy.reference import RungeKuttaReference
 from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
+from mbd.results.matching import aligned
 from mbd.view.accuracy import clear, frontier
 from tests.simulation.test_energy import chain
 

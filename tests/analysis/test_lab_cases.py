@@ -9,7 +9,7 @@ import pytest
 
 import mbd
 from mbd.analysis.accuracy import choices, lab as laboratory, points
-from mbd.analysis.accuracy.points import MIN_REPORTED_OVER_BOUND
+from mbd.analysis.accuracy.truth import MIN_REPORTED_OVER_BOUND
 from mbd.cli import Script
 from mbd.hardcases.knees import leg as knee_leg
 from tests.analysis.test_numerical import ALL as OSCILLATING, DISCRETE, Unsquared, spring_and_dashpot

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.assembly.posture import Posture, close_nearby, close_velocities, position_rows
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import close_nearby, close_velocities, position_rows
 from mbd.compile.mechanisms import mechanism_of
 from mbd.integrators.base import Point
 from mbd.kernel.contact.active_set import ActiveSetManager

@@ -12,8 +12,9 @@ import mbd
 from mbd.analysis.amplification import amplification_matrix
 from mbd.analysis.numerical import _closed_form, criteria, plot, spectrum
 from mbd.integrators import Integrator, StepReport, StepResult
+from mbd.integrators.averaged import Coefficients
 from mbd.integrators.base import consistent_rates
-from mbd.integrators.family import Coefficients, NewmarkFamily
+from mbd.integrators.family import NewmarkFamily
 from tests.cases.schemes import name_of
 from tests.problems import case
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from mbd.assembly.posture import Posture, close_nearby, close_velocities
+from mbd.assembly.pose import Posture
+from mbd.assembly.posture import close_nearby, close_velocities
 from mbd.testing.mechanisms import random_loop, random_tree
 from tests.cases.small_motions import PLAIN, four_bar
 from tests.joints.quaternion_ball import QuaternionBall

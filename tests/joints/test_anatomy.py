@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import mbd
 from mbd.analysis.gait_report.curves import curves_of
 from mbd.joints.anatomy import ANATOMY, angles_of, measured
-from mbd.view.posture import instant
+from mbd.results.at_state import instant
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
 ORIENTATIONS = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 import mbd
 from mbd.joints.euler import SEQUENCES, euler_angles, from_euler
 from mbd.joints.quaternions import rotation_of
+from mbd.results.at_state import instant
 from mbd.results.columns import ModelColumns
-from mbd.view.posture import instant
 
 TURN = Rotation.from_rotvec([0.4, -0.7, 0.3])
 W = float(TURN.as_quat()[3])

@@ -16,8 +16,8 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.bodies.values import printable
 from mbd.results import archive
+from mbd.results.at_state import instant
 from mbd.view.page import html
-from mbd.view.posture import instant
 from tests.comparisons import at_least, compared
 
 ODD = ("_left", "$m", "$a$ b_c^{", r"50 \frac", "a & b < c", "колено", "膝")

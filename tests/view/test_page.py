@@ -10,8 +10,9 @@ import pytest
 
 import mbd
 from mbd.results.trajectory import Trajectory
+from mbd.view.instants import Instants
 from mbd.view.page import packed
-from mbd.view.scene import Instants, scene, upright
+from mbd.view.scene import scene, upright
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 from tests.view.handmade_runs import Sheet, ball, oscillator, record, walker
 

@@ -8,8 +8,8 @@ import pytest
 
 import mbd
 from mbd.errors import ModelError
+from mbd.results.at_state import instant
 from mbd.view.camera import FIRST, camera
-from mbd.view.posture import instant
 from mbd.view.scene import scene
 
 pytest.importorskip("matplotlib")

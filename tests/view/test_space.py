@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
+from mbd.results.at_state import instant
 from mbd.view import page as pages
 from mbd.view.camera import FIRST, VIEWS, angles_of, camera
 from mbd.view.forms import equal_inertia, mesh
 from mbd.view.page import kept
-from mbd.view.posture import instant
 from mbd.view.scene import scene
 from mbd.view.solids import quaternions, rotations
 from tests.view.test_page import CHROMIUM, Elements, unpacked

@@ -10,12 +10,10 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL, ROUND_OFF_RTOL
-from mbd.results.matching import Matches, aligned, apart, matched
+from mbd.results.matching import apart, matched
 
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
-
-__all__ = ["Difference", "Matches", "aligned", "apart", "differences", "gaps", "matched", "ranges"]
 
 
 @dataclass(frozen=True)

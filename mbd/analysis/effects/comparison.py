@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbd.analysis.accuracy.compare import apart, gaps
+from mbd.analysis.accuracy.compare import gaps
 from mbd.analysis.effects.contribution import Change
 from mbd.arrays import Vector
 from mbd.equal import INSTANT_RTOL
+from mbd.results.matching import apart
 
 if TYPE_CHECKING:
     from mbd.equations.equations import Equations

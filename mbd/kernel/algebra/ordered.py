@@ -12,8 +12,8 @@ from mbd.kernel.records import Equations, Model, Motion, Reals
 from mbd.kernel.tangent_rules import is_differentiated, solve_plain, takes_part
 
 __all__ = [
-    "HEADER_SIZE", "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "clear_tangent", "columns_at", "factor_ordered",
-    "order_at", "solve_held", "solve_kkt", "solve_ordered", "weakest_pivot",
+    "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "clear_tangent", "columns_at", "factor_ordered", "order_at",
+    "solve_held", "solve_kkt", "solve_ordered", "weakest_pivot",
 ]  # fmt: skip
 
 OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)

@@ -1,6 +1,7 @@
 """LU factors of a complex matrix in an order chosen beforehand: `algebra.ordered` with real and imaginary parts."""
 
-from mbd.kernel.algebra.ordered import HEADER_SIZE, is_sound
+from mbd.compile.orders import HEADER_SIZE
+from mbd.kernel.algebra.ordered import is_sound
 from mbd.kernel.records import Steps
 from mbd.kernel.tangent_rules import takes_part
 

@@ -4,7 +4,8 @@ from mbd.kernel.algebra.redundancy import sharing, spread
 from mbd.kernel.algebra.saddle import solve_at
 from mbd.kernel.contact.cone_loads import keep_in_cones
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Frictions, Reals
-from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, active_rows, evaluate_loaded, limit_of, load_accelerations
+from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
+from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, active_rows, load_accelerations
 from mbd.kernel.tangent_rules import takes_part
 
 

@@ -16,12 +16,8 @@ from mbd.kernel.algebra.saddle import solve_at
 from mbd.kernel.contact.cone_problem import CONE_RTOL, EQUAL, PUSH, STEADY, cone_faults, cone_limit, cone_solve
 from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, ContactForces, Frictions
-from mbd.kernel.stepping.restart import (
-    active_rows,
-    evaluate_loaded,
-    limit_of,
-    load_accelerations,
-)
+from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
+from mbd.kernel.stepping.restart import active_rows, load_accelerations
 from mbd.kernel.tangent_rules import takes_part
 
 __all__ = ["keep_branches", "solve_cones"]

@@ -5,7 +5,8 @@ from mbd.kernel.contact.complementarity import complementarity
 from mbd.kernel.contact.cones import hold_directions
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Balance, Complementarity, ContactForces, Contacts, Frictions, Guards, Mechanism
-from mbd.kernel.stepping.restart import capture, evaluate, evaluate_loaded, limit_of, row_speed
+from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
+from mbd.kernel.stepping.restart import capture, evaluate, row_speed
 from mbd.kernel.tangent_rules import note_edges
 
 __all__ = [

@@ -41,14 +41,8 @@ from mbd.kernel.records import (
     Reals,
     Switching,
 )
-from mbd.kernel.stepping.restart import (
-    consistent,
-    evaluate,
-    evaluate_loaded,
-    fill_block,
-    largest_force,
-    limit_of,
-)
+from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
+from mbd.kernel.stepping.restart import consistent, evaluate, fill_block, largest_force
 from mbd.kernel.stepping.scales import FORCE_ULPS, speed_round_off, unseen_force
 
 __all__ = [

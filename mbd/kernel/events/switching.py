@@ -22,15 +22,8 @@ from mbd.kernel.events.guards import gap_scale, is_watched
 from mbd.kernel.events.impulses import AFTER, BEFORE, BESIDE, push
 from mbd.kernel.records import Balance, Frictions, Guards, Mechanism, Switching
 from mbd.kernel.stepping.accept_restart import project_velocity
-from mbd.kernel.stepping.restart import (
-    active_rows,
-    capture,
-    consistent,
-    evaluate,
-    evaluate_loaded,
-    largest_force,
-    limit_of,
-)
+from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
+from mbd.kernel.stepping.restart import active_rows, capture, consistent, evaluate, largest_force
 
 __all__ = ["switch"]
 

@@ -5,9 +5,7 @@ from collections.abc import Sequence
 
 from mbd.kernel.records import TABLE
 from mbd.trees import llvm, tree
-from mbd.trees.llvm import HEAD, LLVM, Value
-
-__all__ = ["HEAD", "LLVM", "TAGS", "Body", "Value", "llvm_text", "tags"]
+from mbd.trees.llvm import HEAD
 
 PLACES = {field: place for place, field in enumerate(TABLE.addresses)}
 TAGS = {

@@ -18,8 +18,9 @@ from collections import Counter
 from collections.abc import Collection, Sequence
 
 from mbd.kernel.records import TABLE
-from mbd.kernel.translation.llvm import HEAD, LLVM, TAGS, Body, Value, tags
+from mbd.kernel.translation.llvm import TAGS, Body, tags
 from mbd.trees import tree
+from mbd.trees.llvm import HEAD, LLVM, Value
 
 __all__ = ["LANES", "TangentBody", "is_called_plain", "tangent_text"]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mbd.assembly.inertia import lost_inertia
 from mbd.assembly.not_finite import first_cause, tape_inputs
-from mbd.assembly.posture import Posture
+from mbd.assembly.pose import Posture
 from mbd.dataclass import dataclass
 from mbd.integrators.base import Point
 from mbd.kernel import codes

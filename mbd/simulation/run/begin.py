@@ -9,7 +9,7 @@ from mbd.assembly.consistency import residuals
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.machines import first_anchors, store_first
 from mbd.assembly.orientation import reversed_joints
-from mbd.assembly.posture import Posture
+from mbd.assembly.pose import Posture
 from mbd.errors import ModelError
 from mbd.kernel.events.guards import is_watched
 from mbd.kernel.stepping.begin_run import MAX_START_DEPTH

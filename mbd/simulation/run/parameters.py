@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mbd.arrays import Vector
 from mbd.assembly.consistency import residuals, violations
 from mbd.assembly.inertia import undetermined
-from mbd.assembly.posture import Posture
+from mbd.assembly.pose import Posture
 from mbd.compile.mechanism import Mechanism
 from mbd.compile.trivial_rows import trivial_rows
 from mbd.errors import ModelError, SimulationError

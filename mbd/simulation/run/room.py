@@ -8,8 +8,6 @@ from mbd.free_memory import available, size_in_words as memory
 from mbd.notes import doubt
 from mbd.simulation.run.data import RoomFindings, RunData
 
-__all__ = ["Room", "available", "memory"]
-
 EARLIEST, NOTABLE = 1 << 16, 1 << 25
 """Rows, and bytes of them, before which nothing is expected."""
 

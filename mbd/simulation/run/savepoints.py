@@ -11,8 +11,6 @@ from mbd.kernel import codes
 from mbd.results.record import EventRecord
 from mbd.simulation.run.data import RunData, Savepoint
 
-__all__ = ["Savepoint", "called", "restore", "rewind", "save"]
-
 SETTLED = (codes.DONE, codes.FULL, codes.NEW_MODE, codes.PAUSE, codes.LAST)
 """What the kernel returns with an accepted state that nobody has to react to."""
 FAILED = -1
