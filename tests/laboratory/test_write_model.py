@@ -177,7 +177,7 @@ def test_surfaces_of_paths_come_back(surface, tmp_path):
     again.model.apply(*again.muscles.values())
     for turn, angle in (0.3, 1.1), (-0.2, 1.6), (0.1, -0.9):
         lengths = [
-            mbd.assemble(each, {"turn.angle": turn, "elbow.angle": angle})["triceps.length"]
+            mbd.assemble(each, {"turn.angle": turn, "elbow.angle": angle}, backend="python")["triceps.length"]
             for each in (model, again.model)
         ]
         assert lengths[1] == pytest.approx(lengths[0], abs=1e-14)

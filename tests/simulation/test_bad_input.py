@@ -20,24 +20,9 @@ def simulate(model=None, start=None, integrator=None, **settings):
 
 @pytest.mark.parametrize(
     "dt",
-    [
-        0,
-        0.0,
-        -1e-3,
-        math.nan,
-        math.inf,
-        -math.inf,
-        "1e-3",
-        None,
-        True,
-        1j,
-        [1e-3],
-        np.array([1e-3, 2e-3]),
-        1e-17,
-        1e-300,
-    ],
+    [0, 0.0, -1e-3, math.nan, math.inf, -math.inf, "1e-3", None, True, 1j, [1e-3], np.ones(2), 1e-17, 1e-300],
     ids=repr,
-)
+)  # fmt: skip
 def test_a_step_that_is_no_positive_number_of_seconds_is_refused(dt):
     with pytest.raises(mbd.ModelError, match="dt"):
         simulate(dt=dt)
@@ -107,14 +92,6 @@ def test_all_wrong_arguments_are_told_at_once():
     with pytest.raises(mbd.ModelError) as refused:
         simulate(dt=-1.0, until=math.nan, locate="x", store=0)
     assert len(refused.value.faults) == 4
-
-
-@pytest.mark.parametrize("model", ["ball", None, 3, mbd.Model])
-def test_what_is_no_model_is_refused(model):
-    with pytest.raises(mbd.ModelError, match="Model"):
-        mbd.assemble(model)
-    with pytest.raises(mbd.ModelError, match="Model"):
-        mbd.simulate(model, mbd.assemble(MODEL), mbd.HHT(), dt=0.1, until=1.0)
 
 
 # states -------------------------------------------------------------------------------------------------------------
@@ -213,22 +190,12 @@ def test_values_that_are_not_finite_are_refused_where_they_are_given(value):
 
 
 HUGE = (10**400, -(10**400), 10**5000)
-"""Integers that no float holds; the last is not even written out."""
+"""Integers that no float holds; the last is not even written out. Arguments of words: `test_bad_input_corpus`."""
 PLACES = {
-    "dt": lambda model, start, x: mbd.simulate(model, start, dt=x, until=0.1),
-    "tol": lambda model, start, x: mbd.simulate(model, start, tol=x, until=0.1),
-    "until": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=x),
-    "store": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, store=x),
-    "rest_speed": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, rest_speed=x),
     "a parameter": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1, parameters={"rod.length": x}),
     "a start": lambda model, start, x: mbd.assemble(model, {"hinge.angle": x}),
     "the time of a state": lambda model, start, x: mbd.simulate(model, replace(start, time=x), dt=0.01, until=0.1),
     "q of a state": lambda model, start, x: mbd.simulate(model, replace(start, q=[x]), dt=0.01, until=0.1),
-    "Newmark": lambda model, start, x: mbd.Newmark(x, x),
-    "HHT": lambda model, start, x: mbd.HHT(x),
-    "GeneralizedAlpha": lambda model, start, x: mbd.GeneralizedAlpha(x),
-    "a tolerance": lambda model, start, x: mbd.RadauIIA(tolerance=x),
-    "a mass": lambda model, start, x: mbd.PointMass("body", mass=x),
     "samples": lambda model, start, x: mbd.Samples([0.0, 1.0], [0.0, x]),
     "a time of a run": lambda model, start, x: mbd.simulate(model, start, dt=0.01, until=0.1).at(x),
 }
