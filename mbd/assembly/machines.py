@@ -9,6 +9,7 @@ import numpy as np
 from mbd.arrays import Vector
 from mbd.bodies.values import number
 from mbd.compile.mechanism import Mechanism
+from mbd.dataclass import makes_late
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.equations.equations import Machine
 from mbd.errors import ModelError, nearest
@@ -23,13 +24,22 @@ def first_anchors(mechanism: Mechanism, parameters: Vector) -> Vector:
     return anchors
 
 
+def is_end(state: State) -> bool:
+    """Whether a run has ended in a state as it is, with what contacts and machines hold."""
+    unseen = makes_late(state, "memory")
+    memory = state.memory if unseen is None else unseen.memory
+    if memory is None or memory.time != state.time or not np.array_equal(memory.anchors, state.anchors):
+        return False
+    return np.array_equal(memory.place, np.concatenate([state.q, state.v, state.z]))
+
+
 def begun_in(model: Any, mechanism: Mechanism, state: State) -> tuple[State, Sequence[Machine]]:
     """A state, and the machines that begin in it: they hold what they store there at a start, with its parameters.
 
-    The anchors of one that has none are those of a start.
+    None begins where a run has ended. The anchors of a state that has none are those of a start.
     """
     machines = mechanism.equations.machines
-    if not machines:
+    if not machines or is_end(state):
         return state, ()
     own = mechanism.parameters_of(model, state.parameters)
     if len(state.anchors) != mechanism.layout.n_anchors:

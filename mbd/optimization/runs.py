@@ -1,7 +1,6 @@
 """Numbers of runs with their exact derivatives."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from mbd.assembly.changed_start import changed_start, start_names
@@ -74,7 +73,7 @@ class RunSource(Source):
             bound = self.start.mode.closed or mechanism_of(self.model, self.backend, plain).equations.rows
             start = changed_start(self.model, self.start, own, plain, self.backend) if own or bound else self.start
             found = sensitivities(
-                self.model, replace(start, memory=None), self.integrator, self.dt, self.tol, until=self.until, wrt=wrt,
+                self.model, start, self.integrator, self.dt, self.tol, until=self.until, wrt=wrt,
                 of=[*wanted, "time"] if "time" not in wanted else list(wanted), hold=self.of_start, parameters=plain,
                 backend=self.backend,
             )  # fmt: skip

@@ -1,7 +1,7 @@
 """What a run is asked to be differentiated by, and what is made of the derivatives that it carries."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from mbd.sensitivity.run_data import ADVICE, Source, refused
 from mbd.sensitivity.starts import Direction, restitution_names
 from mbd.sensitivity.tangent_names import refuse_parts, start_names, whole_names
 from mbd.simulation.marching import Run
+from mbd.simulation.run.memory import without_memory
 from mbd.state import State
 from mbd.tape.derivatives import jvp
 from mbd.tape.evaluate import evaluate
@@ -160,7 +161,7 @@ class Carried(Table):
             raise ModelError(
                 "wrt takes rates of parameters here, such as 9.8; mbd.sensitivities(…, at=…) takes functions"
             )
-        return model, replace(start, memory=None)
+        return model, without_memory(start)
 
     def take(self, run: Trajectory, found: Differentiated, wanted: Sequence[Direction]) -> None:
         fields = self.fields(found, wanted)

@@ -5,6 +5,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from mbd.assembly.machines import is_end
 from mbd.dataclass import dataclass
 from mbd.equations.switching_times import switches_of
 from mbd.integrators.stepping import own_scheme
@@ -74,7 +75,9 @@ class MadeRun(TangentRun):
         row = {name: part[0] for name, part in columns_of(self, self.table[:1]).items()}
         mode = mode_of(self.manager, row["closed"].astype(np.uint8), row["phase"].astype(np.int8))
         y = np.concatenate([row["v"], row["z"]])
-        return First(float(row["time"]), row["q"].copy(), y, held_at(self.start, self.mechanism), mode)
+        return First(
+            float(row["time"]), row["q"].copy(), y, held_at(self.start, self.mechanism), mode, is_end(self.start)
+        )
 
 
 def made_with(ways: Ways, *given: Any) -> Run:

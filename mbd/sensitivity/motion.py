@@ -27,13 +27,14 @@ class Mode:
 
 @dataclass(frozen=True)
 class First:
-    """The first row: t, q, y = (v, z), what contacts hold there, and what acts."""
+    """The first row: t, q, y = (v, z), what contacts hold there, what acts, and whether a run has ended there."""
 
     t: float
     q: Vector
     y: Vector
     anchors: Vector
     mode: Mode
+    is_end: bool = False
 
 
 @dataclass(frozen=True)

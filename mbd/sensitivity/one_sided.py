@@ -22,6 +22,7 @@ from mbd.sensitivity.passed import Instant
 from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, sided
 from mbd.sensitivity.starts import directions, programs_of, start_tangent
+from mbd.simulation.run.memory import without_memory
 from mbd.state import State
 from mbd.tape.node import Node
 
@@ -233,8 +234,8 @@ def _side(
     parts, results = 0.5 ** np.arange(LEVELS), []
     for part in size * parts:
         changed = {name: float(values[name] + part * rate) for name, rate in parameters.items()}
-        moved = replace(state, q=compose(state.q, part * of_q), v=state.v + part * of_y[:n_v],
-                        z=state.z + part * of_y[n_v:], memory=None)  # fmt: skip
+        moved = replace(without_memory(state), q=compose(state.q, part * of_q), v=state.v + part * of_y[:n_v],
+                        z=state.z + part * of_y[n_v:])  # fmt: skip
         try:
             run = again(project(model, moved, {**state.parameters, **changed}, backend), changed)
         except MbdError:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
@@ -28,6 +27,7 @@ from mbd.sensitivity.tangent.margins import refuse_edge, refuse_turning_points
 from mbd.sensitivity.tangent_run import DIRECTIONS, TangentRun
 from mbd.simulation.arguments import end_of
 from mbd.simulation.run.idle import keep_idle
+from mbd.simulation.run.memory import without_memory
 from mbd.simulation.simulate import BRIEF_TIME_SHARE
 
 OWN = ("contact", "impact", "locate", "store", "rest_speed")
@@ -185,7 +185,7 @@ def _again(rows: RunRows) -> TangentRun:
         rows.mechanism,
         rows.manager,
         rows.integrator,
-        replace(start, memory=None),
+        without_memory(start),
         dt,
         end,
         stop,

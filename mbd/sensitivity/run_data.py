@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mbd import integrators
 from mbd.arrays import Matrix, Vector
+from mbd.assembly.machines import is_end
 from mbd.assembly.manager import manager_of
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass, makes_late
@@ -171,7 +172,8 @@ class RunRows:
     def first(self) -> First:
         """The first row."""
         anchors = held_at(self.record.start, self.mechanism)
-        return First(float(self.ends[0]), np.array(self.record.q[0]), self.y(0), anchors, self.mode(0))
+        ended = self.record.start is not None and is_end(self.record.start)
+        return First(float(self.ends[0]), np.array(self.record.q[0]), self.y(0), anchors, self.mode(0), ended)
 
 
 def mode_of(manager: ActiveSetManager, closed: NDArray[Any], phase: NDArray[Any]) -> Mode:

@@ -19,6 +19,7 @@ from mbd.sensitivity.result import Sensitivities
 from mbd.sensitivity.run_data import RunRows, refused
 from mbd.sensitivity.starts import directions, programs_of, start_tangent
 from mbd.sensitivity.tangent_names import expanded
+from mbd.simulation.run.memory import without_memory
 from mbd.simulation.simulate import REST_SPEED, simulate
 from mbd.state import State
 
@@ -117,7 +118,7 @@ def sensitivities(
 
     def made(start: State, more: Mapping[str, float], asked: Any = None) -> Trajectory:
         return simulate(
-            model, replace(start, memory=None), integrator, dt, tol, until=until, contact=contact, impact=impact,
+            model, without_memory(start), integrator, dt, tol, until=until, contact=contact, impact=impact,
             parameters={**(parameters or {}), **more} if more else parameters, rest_speed=rest_speed, backend=backend,
             wrt=asked,
         )  # fmt: skip
@@ -204,8 +205,8 @@ def _changed_sequences(
             changed = {name: values[name] + part * rate for name, rate in (way.parameters or {}).items()}
             n_v = len(start.q)
             moved = replace(
-                state, q=compose(state.q, part * start.q[:, k]), v=state.v + part * start.y[:n_v, k],
-                z=state.z + part * start.y[n_v:, k], memory=None,
+                without_memory(state), q=compose(state.q, part * start.q[:, k]), v=state.v + part * start.y[:n_v, k],
+                z=state.z + part * start.y[n_v:, k],
             )  # fmt: skip
             name = f"{way.name} {'+' if part > 0 else '−'} {size:g}"
             try:

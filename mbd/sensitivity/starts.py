@@ -172,13 +172,14 @@ def start_tangent(first: First, programs: Programs, wanted: Sequence[Direction],
     free_q, free_v = np.ones(c.n_v, dtype=bool), np.ones(c.n_v, dtype=bool)
     free_q[[each.q for each in fixed if each.q >= 0]] = False
     free_v[[each.y for each in fixed if 0 <= each.y < c.n_v]] = False
-    return _completed(programs, motion, first.mode, (free_q, free_v)).tangent
+    motion = _completed(programs, motion, first.mode, (free_q, free_v))
+    return (motion if first.is_end else stored_at_start(programs, motion, first.mode)).tangent
 
 
 def _completed(programs: Programs, motion: Motion, mode: Mode, free: tuple[Flags, Flags]) -> Motion:
-    """The motion with positions and velocities on the rows, and contacts and machines that hold what is now."""
+    """The motion with positions and velocities on the rows, and contacts that hold what is now."""
     if not mode.held:
-        return stored_at_start(programs, motion, mode)
+        return motion
     c, equations = programs.columns, programs.equations
     normals = {contact.rows[0] for contact in equations.contacts if contact.rows}
     zero = np.zeros(c.n), np.zeros(c.rows)
@@ -198,7 +199,7 @@ def _completed(programs: Programs, motion: Motion, mode: Mode, free: tuple[Flags
         completion = Completion(M, B, free[1])
     y = motion.tangent.y.copy()
     y[: c.n_v] += completion.change(rates @ motion.tangent.stacked(c))
-    return stored_at_start(programs, motion.with_tangent(y=y), mode)
+    return motion.with_tangent(y=y)
 
 
 class Completion:

@@ -159,6 +159,35 @@ def test_the_first_sample_is_that_of_the_start_and_parameters_of_the_run(delay: 
         assert rate == pytest.approx(500.0 * change, rel=1e-5) != 0.0
 
 
+@pytest.mark.parametrize("has_state", [False, True])
+@pytest.mark.parametrize("instant", [0.02, 0.023])
+def test_a_sample_at_the_end_of_a_run_is_not_taken_again_with_other_parameters(instant: float, has_state: bool) -> None:
+    """Nor do derivatives, and runs in other forms, take it again; a state without its memory may be a start."""
+    model = mbd.Model("arm")
+    hinge = mbd.Revolute("hinge", model.ground.origin, mbd.Link("rod", 2.0, 0.4, 0.2, 0.03).start)
+    model.connect(hinge)
+    states = {"n": lambda q, n, k: n + 1.0} if has_state else {}
+    own = ("hinge.angle", "law.n", ("gain", 20.0)) if has_state else ("hinge.angle", ("gain", 20.0))
+    model.apply(
+        mbd.Motor("motor", hinge, torque=lambda u: u, arguments=["law.u"]),
+        mbd.SampledLaw("law", PERIOD, {"u": lambda q, *more: -more[-1] * q}, arguments=own, states=states),
+    )
+    options: dict[str, Any] = {"integrator": mbd.RungeKutta853(), "dt": 2e-3}
+    first = mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 0.3}), until=instant, **options)
+
+    def end(gain: float) -> float:
+        run = mbd.simulate(model, first.final, until=0.0525, parameters={"law.gain": gain}, **options)
+        assert run["law.u"][0] == first["law.u"][-1]
+        return float(run["hinge.angle"][-1])
+
+    gains = {"law.gain": [15.0, 20.0]}
+    many = mbd.batch(model, first.final, until=0.0525, parameters=gains, results=["hinge.angle"], **options)
+    assert many["hinge.angle"] == pytest.approx([end(15.0), end(20.0)], abs=1e-14)
+    wanted = (8.0 * (end(20.01) - end(19.99)) - (end(20.02) - end(19.98))) / 0.12
+    found = mbd.sensitivities(model, first.final, until=0.0525, wrt=["law.gain"], of=["hinge.angle"], **options)
+    assert found["hinge.angle", "law.gain"] == pytest.approx(wanted, rel=1e-7)
+
+
 def test_an_output_of_its_own_is_a_quantity_and_samples_restart_with_a_contact() -> None:
     model = mbd.Model("ball")
     ball = mbd.PointMass("ball", mass=1.0)

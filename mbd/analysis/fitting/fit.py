@@ -25,6 +25,7 @@ from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.along import along
 from mbd.sensitivity.starts import unknown_name
 from mbd.simulation.interrupted import stopped
+from mbd.simulation.run.memory import without_memory
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
@@ -299,7 +300,7 @@ class _Search:
             own = {name: given.pop(name) for name in self.of_start}
             start = changed_start(self.model, self.start, own, given, self.backend) if own else self.start
             self.run = simulate(
-                self.model, replace(start, memory=None), self.integrator, self.dt, self.tol, until=self.until,
+                self.model, without_memory(start), self.integrator, self.dt, self.tol, until=self.until,
                 contact="events", parameters=given, on_failure="return", backend=self.backend,
             )  # fmt: skip
         except MbdError as error:
