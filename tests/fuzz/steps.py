@@ -159,7 +159,7 @@ def crossings(found: Faults, bodies: Bodies) -> None:
 
 
 def impacts(found: Faults, bodies: Bodies, run: mbd.Trajectory, T: Array) -> None:
-    """A single contact that strikes rebounds with its restitution; no impact makes energy."""
+    """A single contact that strikes rebounds with its restitution; no impact makes energy, unless ground moves."""
     told, settings = bodies.told, run.settings
     words = {word.name: word for word in bodies.model.contacts if isinstance(word, mbd.Unilateral)}
     times = np.array([event.time for event in run.events])
@@ -175,7 +175,9 @@ def impacts(found: Faults, bodies: Bodies, run: mbd.Trajectory, T: Array) -> Non
         k = event.row
         there = found.at(told.time[k : k + 1])
         gap = gap_of(word.measure, bodies)
-        moving = driven or bool(np.any(gap.drift)) or bool(np.any(gap.carried))
+        met = [each for name, each in words.items() if told.closed[name][k - 1] or told.closed[name][k]]
+        grounds = [gap, *(gap_of(each.measure, bodies) for each in met)]
+        moving = driven or any(bool(np.any(each.drift)) or bool(np.any(each.carried)) for each in grounds)
         if not moving and not any(e.time == event.time and e.kind == "event" for e in run.events):
             scale = float(np.max(T))
             there.small("an impact makes no energy", event.name, max(T[k] - T[k - 1], 0.0), 1e-8 * scale + 1e-12)

@@ -113,6 +113,11 @@ def test_fuzzed_scenes_are_judged_sound(number):
     assert told["kind"] == "ok", told
 
 
+def test_an_impact_beside_a_foot_that_sticks_to_a_belt_may_take_energy_from_it():
+    told = verdict(24824, 100_000)
+    assert told["kind"] == "ok", told
+
+
 def test_the_rows_of_a_run_that_ends_at_a_contact_without_a_force_keep_the_laws():
     """A foot that sticks whatever its force, in index 3: neither closed nor open; the row before has its forces."""
     told = verdict(24029)
