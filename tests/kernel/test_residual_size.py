@@ -20,7 +20,7 @@ def balanced(seed, level=0, stabilized=1):
     scale = 10.0 ** chance.uniform(-3.0, 1.0, n + 2 * m)
     return SimpleNamespace(
         n=n, n_v=n, n_rows=m, o_v=0, o_a=n, block=block, out=np.zeros(n + 2 * m), weight=1.0 / scale[:n], scale=scale,
-        rows=np.arange(m), row_level=np.full(m, level), stabilized=stabilized, blur=0.0,
+        rows=np.arange(m), row_level=np.full(m, level), stabilized=stabilized, blur=0.0, n_clusters=1,
     )  # fmt: skip
 
 

@@ -85,7 +85,7 @@ class Singular(SchemeAbilities):
     shares: Reals = reals(lambda s: s.n_rows * s.n_rows)  # of the loads that they bear
     support: Integers = integers(lambda s: s.n_rows * (s.n + 2))  # of each row of the basis: entries that are not zero
     left: Reals = reals(lambda s: s.n_rows + 1, kept=True)  # of each row beside the earlier ones, at the accepted state
-    left1: Reals = reals(lambda s: s.n_rows + 1)  # and at the candidate; not of the Newmark family
+    left1: Reals = reals(lambda s: 2 * s.n_rows)  # and at the candidate, √(2 T) behind them; not of the Newmark family
     near_singular: int = place("state")  # 1: within a few steps of a singular configuration, 2: just beyond it
     singular_time: float = place("clock")  # when the constraint Jacobian will lose rank
     inverse_pivot: float = place("detail")  # the largest of rows in the last step

@@ -30,7 +30,7 @@ class Model(SchemeAbilities):
     weight: Reals = reals(lambda s: s.n, kept=True)  # the inverse of those of r
     blurs: Reals = reals()
     blur: float = place("blurs")  # part of the forces up to which friction in a plane is known in a step
-    typical: Reals = reals(lambda s: s.n)  # of velocities or accelerations without rows
+    typical: Reals = reals(lambda s: s.n)  # of velocities or accelerations without rows, or of each cluster
     row_contact: Integers = integers()  # contact of each row
     row_trivial: Integers = integers()  # 1: a row that holds whatever the motion, and never acts
     row_level: Integers = integers()  # of each row: 0 holds positions, 1 velocities only

@@ -6,7 +6,7 @@ from mbd.kernel.algebra.redundancy import clear_dependent
 from mbd.kernel.codes import EPS
 from mbd.kernel.contact.cones import fill_slips
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Equations, Model, Motion, Settings, SingularSteps, Steps
+from mbd.kernel.records import Equations, Model, Motion, Reals, Settings, SingularSteps, Steps
 from mbd.kernel.stepping.restart import compose, note_scales
 from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 
@@ -83,7 +83,7 @@ def soundness_at(K: Settings, m: int) -> int:
 def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance: float, both: int) -> float:
     """Largest residual over its tolerance: balance, h and, with `both`, ḣ, each block apart; −1 if not finite.
 
-    That of the balance is K.blur at least.
+    That of the balance is K.blur at least. Rows are held as closely as the motion of their own cluster asks for.
     """
     size = 0.0
     finite = 0.0
@@ -97,9 +97,15 @@ def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance
     for i in range(K.n_v):
         fastest = max(fastest, abs(K.block[K.o_a + i]))
         speed = max(speed, abs(K.block[K.o_v + i]))
+    if K.n_clusters > 1:
+        note_largest(K, K.o_a, K.fastest)
+        note_largest(K, K.o_v, K.typical)
     o_h = o_r + K.n
     for k in range(m):
         row = K.rows[k]
+        if K.n_clusters > 1:
+            fastest = K.fastest[K.cluster[K.n + row]]
+            speed = K.typical[K.cluster[K.n + row]]
         h = abs(K.out[o_h + k])
         finite += h
         limit = tolerance * min(c_K * fastest, K.scale[K.n + row])
@@ -120,6 +126,15 @@ def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance
     if not finite < 1e300:
         return -1.0
     return size
+
+
+def note_largest(K: Motion, first: int, largest: Reals) -> None:
+    """The largest of the numbers of the block, from `first` on, of the coordinates of each cluster."""
+    for c in range(K.n_clusters):
+        largest[c] = 0.0
+    for i in range(K.n_v):
+        c = K.cluster[i]
+        largest[c] = max(largest[c], abs(K.block[first + i]))
 
 
 def roughly(K: Model) -> float:

@@ -6,6 +6,7 @@ from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import EPS, NOT_CONVERGED, NOT_FINITE, SINGULAR
 from mbd.kernel.hooks import call_on
 from mbd.kernel.records import DependentRows, Equations
+from mbd.kernel.schemes.iteration import note_fastest
 from mbd.kernel.singular.newmark_step import VELOCITY_RTOL
 from mbd.kernel.stepping.restart import displace, evaluate, raise_scales
 from mbd.kernel.tangent_rules import follow_factors, follow_solution, is_differentiated
@@ -59,18 +60,14 @@ def return_to_rows(K: DependentRows, t1: float) -> int:
         for k in range(m):
             K.rhs[n + k] = -K.acc[o_h + K.n_rows + K.rows[k]]
         solve_returns(K, m)
-    fastest = 0.0
-    change = 0.0
+    note_fastest(K, True)
+    for i in range(K.n_v):
+        limit = max(VELOCITY_RTOL * K.fastest[K.cluster[i]], K.rest_speed + REST_SPEED)
+        if abs(K.rhs[i]) > limit:  # rows near a singular configuration take the branch for another
+            K.failure_size = 0.0
+            return NOT_CONVERGED
     for i in range(n):
-        if i < K.n_v:
-            change = max(change, abs(K.rhs[i]))
-            fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
         K.y1[i] += K.rhs[i]
-    if change > max(
-        VELOCITY_RTOL * fastest, K.rest_speed + REST_SPEED
-    ):  # rows near a singular configuration take the branch for another
-        K.failure_size = 0.0
-        return NOT_CONVERGED
     return 0
 
 

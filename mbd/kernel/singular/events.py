@@ -13,7 +13,7 @@ from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.events.guard_substeps import copy_candidate, copy_ends, interpolate_candidate
 from mbd.kernel.events.guards import judge_user
 from mbd.kernel.records import DependentRows, Kernel, SingularSteps, Switching
-from mbd.kernel.singular.step_size import MAX_NOISE, NOISE_RTOL, motion, noise_coefficient, row_norms
+from mbd.kernel.singular.step_size import MAX_NOISE, NOISE_RTOL, larger_motion, noise_coefficient, row_norms
 from mbd.kernel.stepping.candidate import accept_guards
 from mbd.kernel.stepping.observe import store_state
 from mbd.kernel.stepping.restart import evaluate
@@ -161,7 +161,6 @@ def keep_parts(K: SingularSteps, m: int) -> None:
 def largest_noise_share(K: SingularSteps, m: int, apart: float) -> float:
     """c/τ² of the parts kept, from those in K.basis at a time `apart` from them; K.failure_index names the row."""
     n = K.n
-    speed = max(motion(K, K.y), motion(K, K.y1))
     largest = 0.0
     for k in range(m):
         here = K.work[2 * m + k]
@@ -169,7 +168,11 @@ def largest_noise_share(K: SingularSteps, m: int, apart: float) -> float:
             K.basis[k * n + j] = K.work[k] * K.basis[k * n + j] - here * K.turning[k * n + j]
         change = square(K.basis, k * n, n)
         fall = sqrt(change) / (apart + 1e-300)
-        share = noise_coefficient(K, k, fall, speed) * fall * fall / (here * here + 1e-300) if fall > 0.0 else 0.0
+        share = (
+            noise_coefficient(K, k, fall, larger_motion(K, k)) * fall * fall / (here * here + 1e-300)
+            if fall > 0.0
+            else 0.0
+        )
         if share > largest:
             largest = share
             K.failure_index = K.n + k

@@ -79,7 +79,7 @@ def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, strai
 
     K.out holds the diagonal of S and H = B + ratio ∂ḣ/∂x, in the tangent or, of straight-line code, behind the shift;
     K.turning holds ∂ḣ/∂x, which is the rate of B. K.velocity_noise tells what round-off of that row makes of
-    velocities, over the speed, in a whole step that holds positions.
+    velocities, over the speed of its cluster, in a whole step that holds positions.
     """
     size = K.n + m
     o_S = 0
@@ -94,9 +94,6 @@ def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, strai
     pivoted_gram_norms(K, m, h, ratio, 0.0, 0, o_S, stride, o_H, width)
     pivoted_gram_norms(K, m, h, ratio, -h, m, o_S, stride, o_H, width)
     pivoted_gram_norms(K, m, h, ratio, h, 2 * m, o_S, stride, o_H, width)
-    speed = 0.0
-    for j in range(K.n_v):
-        speed += abs(K.out[o_S + stride * j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
     fewest = 1e300
     nearest = 0
     for k in range(m):
@@ -105,8 +102,14 @@ def steps_to_singularity(K: SingularSteps, m: int, h: float, ratio: float, strai
         if here < fewest * change:
             fewest = here / change
             nearest = k
-            across = 4.0 * EPS * K.scale[K.n + K.rows[K.columns[k]]] / (here * K.spare[3 * m + k] + 1e-300)
-            K.velocity_noise = across / (K.step * sqrt(speed) + 1e-300)
+    if fewest < 1e300:
+        row = K.rows[K.columns[nearest]]
+        speed = 0.0
+        for j in range(K.n_v):
+            if K.cluster[j] == K.cluster[K.n + row]:
+                speed += abs(K.out[o_S + stride * j]) * K.block[K.o_v + j] * K.block[K.o_v + j]
+        across = 4.0 * EPS * K.scale[K.n + row] / (K.spare[nearest] * K.spare[3 * m + nearest] + 1e-300)
+        K.velocity_noise = across / (K.step * sqrt(speed) + 1e-300)
     if (
         MIN_STEPS_AWAY < fewest < MAX_STEPS_AWAY + 2.0
     ):  # a row that turns, beside others that turn with it, changes but does not vanish
@@ -277,10 +280,17 @@ def factor_positions(K: DependentRows, m: int) -> bool:
 
 
 def leaves_branch(K: Motion, h: float) -> bool:
-    """Whether velocities are no continuation of those before the step (the predicted ones are in K.y1)."""
-    fastest = 0.0
-    change = 0.0
+    """Whether velocities are no continuation of those before the step (the predicted ones are in K.y1).
+
+    Those of one cluster are compared with the fastest of it.
+    """
+    for c in range(K.n_clusters):
+        K.fastest[c] = 0.0
     for i in range(K.n_v):
-        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])) + h * abs(K.rate[i]))
-        change = max(change, abs(K.block[K.o_v + i] - K.y1[i]) - still_speed(K, i))
-    return change > VELOCITY_RTOL * fastest
+        c = K.cluster[i]
+        K.fastest[c] = max(K.fastest[c], max(abs(K.y[i]), abs(K.y1[i])) + h * abs(K.rate[i]))
+    for i in range(K.n_v):
+        change = abs(K.block[K.o_v + i] - K.y1[i]) - still_speed(K, i)
+        if change > VELOCITY_RTOL * K.fastest[K.cluster[i]]:
+            return True
+    return False

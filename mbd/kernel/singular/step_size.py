@@ -18,18 +18,18 @@ from mbd.kernel.records import (
     Equations,
     LinearAlgebra,
     Mechanism,
-    Model,
     Motion,
     Reals,
     SchemeAbilities,
     SingularSteps,
     Steps,
 )
+from mbd.kernel.schemes.iteration import note_fastest
 from mbd.kernel.singular.gram_norms import gram_norms
 from mbd.kernel.stepping.restart import compose, evaluate, fill_block
 
 __all__ = [
-    "NOISE_RTOL", "MAX_NOISE", "forget_row_norms", "is_resolved", "accept_row_norms", "row_norms", "motion",
+    "NOISE_RTOL", "MAX_NOISE", "forget_row_norms", "is_resolved", "accept_row_norms", "row_norms", "larger_motion",
     "note_row_norms", "singular_step_size", "noise_share", "noise_coefficient", "is_too_noisy",
 ]  # fmt: skip
 
@@ -74,7 +74,7 @@ def forget_row_norms(K: DependentRows) -> None:
 
 
 def note_row_norms(K: DependentRows) -> None:
-    """|w| of each row at the candidate, at which K.acc is, and √(2 T): accepted with it by `accept_row_norms`.
+    """|w| of each row at the candidate, at which K.acc is, and the motion beside it, for `accept_row_norms`.
 
     What rows that depend on others miss there counts like round-off of these: a leg that does not fit quite.
     """
@@ -84,8 +84,9 @@ def note_row_norms(K: DependentRows) -> None:
         if K.dropped[k] == 1 and K.row_level[k] == 0:
             K.misfit = max(K.misfit, abs(K.acc[K.acc_h + k]))
     row_norms_alone(K, m)
-    K.left1[:m] = K.work[:m]
-    K.left1[m] = motion(K, K.y1)
+    for k in range(m):
+        K.left1[k] = K.work[k]
+        K.left1[m + k] = motion(K, K.y1, k)
 
 
 def accept_row_norms(K: DependentRows, h: float) -> None:
@@ -100,19 +101,25 @@ def accept_row_norms(K: DependentRows, h: float) -> None:
         if K.left[k] < 0.0 or K.left1[k] < MAX_STEPS_CHECKED * fall:
             near = 1.0
         elif K.left1[k] < K.far_look * fall and K.adaptive == 0 and may_take_long_step(K):
-            reach = sqrt(noise_coefficient(K, k, fall / h, K.left1[m]) / NOISE_RTOL)
+            reach = sqrt(noise_coefficient(K, k, fall / h, K.left1[m + k]) / NOISE_RTOL)
             if reach > K.middle * h and K.left1[k] * h < (2.0 * reach + MAX_STEPS_CHECKED * h) * fall:
                 near = 1.0
         K.left[k] = K.left1[k]
     K.left[m] = near
 
 
-def motion(K: Model, y: Reals) -> float:
-    """√(Σ M_jj v_j²), of the size of √(2 T), with M in K.acc."""
+def motion(K: DependentRows, y: Reals, k: int) -> float:
+    """√(Σ M_jj v_j²) of the cluster of row k of those in K.rows, of the size of √(2 T), with M in K.acc."""
     size = 0.0
     for j in range(K.n_v):
-        size += abs(K.acc[j * K.n + j]) * y[j] * y[j]
+        if K.cluster[j] == K.cluster[K.n + K.rows[k]]:
+            size += abs(K.acc[j * K.n + j]) * y[j] * y[j]
     return float(sqrt(size) + 1e-300)
+
+
+def larger_motion(K: SingularSteps, k: int) -> float:
+    """The larger one of that in K.y and that in K.y1: it may start from rest."""
+    return max(motion(K, K.y, k), motion(K, K.y1, k))
 
 
 def noise_coefficient(K: Motion, k: int, fall: float, speed: float) -> float:
@@ -123,7 +130,7 @@ def noise_coefficient(K: Motion, k: int, fall: float, speed: float) -> float:
     """
     turned = 1.0
     for i in range(K.n_v if K.vector == 1 else 0):  # quaternions do not grow
-        if K.unit[i] == 1:
+        if K.unit[i] == 1 and K.cluster[i] == K.cluster[K.n + K.rows[k]]:
             turned = max(turned, abs(K.q[i]))
     noise = NOISE_GROWTH * EPS * turned * K.scale[K.n + K.rows[k]]
     return float(max(noise, K.misfit) / (fall * speed + 1e-300))
@@ -226,21 +233,20 @@ def times_to_singularities(K: SingularSteps, m: int, unit: float) -> float:
             break
         ahead = first
     K.velocity_noise = 0.0
-    speed = max(motion(K, K.y), motion(K, K.y1))  # it may start from rest
     for k in range(m):
         if K.work[m + k] < 1.1 * first and first < NEVER:
-            K.velocity_noise += noise_coefficient(K, k, K.work[2 * m + k] / K.work[m + k], speed)
+            K.velocity_noise += noise_coefficient(K, k, K.work[2 * m + k] / K.work[m + k], larger_motion(K, k))
     return first
 
 
-def horizon(K: Equations, m: int, unit: float, first: float) -> float:
+def horizon(K: SingularSteps, m: int, unit: float, first: float) -> float:
     """Time beyond which none is looked for: nothing is arranged so early, and the motion is not known so far."""
     limit = 4.0 * MAX_NOISY_STEPS * unit
     if K.stretches == 1 and first < NEVER:
-        speed = max(motion(K, K.y), motion(K, K.y1))
         for k in range(m):
             if K.work[m + k] == first:
-                reach = sqrt(noise_coefficient(K, k, K.work[2 * m + k] / first, speed) / NOISE_RTOL)
+                noise = noise_coefficient(K, k, K.work[2 * m + k] / first, larger_motion(K, k))
+                reach = sqrt(noise / NOISE_RTOL)
                 limit = max(limit, 4.0 * min(reach, K.longest_over * unit))
     return limit
 
@@ -301,11 +307,11 @@ def is_too_noisy(K: SingularSteps, h: float) -> bool:
 
 def is_resolved(K: Steps, h: float) -> bool:
     """Whether the candidate errs little enough after a step over a singularity that was longer than others."""
-    fastest = 0.0
-    for i in range(K.n_v):
-        fastest = max(fastest, max(abs(K.y[i]), abs(K.y1[i])))
+    note_fastest(K, True)
     for i in range(K.n):
-        size = fastest if i < K.n_v else max(max(abs(K.y[i]), abs(K.y1[i])), h * abs(K.rate[i]))
+        size = max(max(abs(K.y[i]), abs(K.y1[i])), h * abs(K.rate[i]))
+        if i < K.n_v:
+            size = K.fastest[K.cluster[i]]
         if not abs(K.error[K.n_v + i]) <= MAX_LONG_STEP_ERROR * size:
             return False
     return True

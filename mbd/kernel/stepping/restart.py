@@ -99,7 +99,7 @@ def refresh_scales(K: Model) -> None:
         size = far
         speed = 1e-3
         for i in range(K.n_v):
-            if K.unit[i] == K.row_unit[k]:
+            if K.unit[i] == K.row_unit[k] and K.cluster[i] == K.cluster[K.n + k]:
                 speed = max(speed, abs(K.block[K.o_v + i]))
                 if K.vector == 1:
                     size = max(size, abs(K.block[K.o_q + i]))

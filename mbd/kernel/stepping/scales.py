@@ -8,7 +8,8 @@ balance or nothing acts. So each quantity has a floor that follows from the mech
     speed           ε′ X_i/Δt, ε′ = 10⁻¹²: a motion so slow takes 10¹² steps to go its own size
     energy          Σ ½ M_ii speed_i², each coordinate with its own mass: a ton says nothing of a gram
     force           the largest of E/X_i, E = ½ v·M v, of M_ii (|v_i|/Δt + X_i/(1000 Δt)²), and of the torques over L
-                    or the forces times L: what elimination, which mixes all of these, leaves of one in another
+                    or the forces times L, all of its cluster: what elimination, which mixes these, leaves of one in
+                    another
 
 Who asks: `still_speed`, `still_energy` bound speeds and energies below which a mechanism is at rest (M must be in
 K.acc, as `evaluate` leaves it): no ratio to a smaller one is a judgement of a step. `add_force_floors` is for residuals
@@ -142,29 +143,37 @@ def add_force_floors(K: Equations, part: float) -> None:
     call(K, ACCELERATIONS, K.acc)
     restore_iterate(K)
     note_way(K)
+    for c in range(K.n_clusters):
+        add_floors_of_cluster(K, part, c)
+    for i in range(K.n):
+        K.weight[i] = 1.0 / K.scale[i]
+
+
+def add_floors_of_cluster(K: Equations, part: float, c: int) -> None:
+    """The same of the coordinates of one cluster: elimination mixes no others into them."""
     n = K.n
     energy = 0.0
     force = 0.0
     torque = 0.0
     for i in range(K.n_v):
-        momentum = 0.0
-        for j in range(K.n_v):
-            momentum += K.acc[i * n + j] * K.y[j]
-        energy += 0.5 * momentum * K.y[i]
-        if K.unit[i] == 0:
-            force = max(force, K.known[i])
-        else:
-            torque = max(torque, K.known[i])
+        if K.cluster[i] == c:
+            momentum = 0.0
+            for j in range(K.n_v):
+                momentum += K.acc[i * n + j] * K.y[j]
+            energy += 0.5 * momentum * K.y[i]
+            if K.unit[i] == 0:
+                force = max(force, K.known[i])
+            else:
+                torque = max(torque, K.known[i])
     slowly = 1.0 / (HORIZON_STEPS * K.dt * HORIZON_STEPS * K.dt)
     for i in range(K.n_v):
-        size = size_of(K, i)
-        mass = abs(K.acc[i * n + i])
-        floor = mass * (abs(K.y[i]) / K.dt + size * slowly)
-        if K.unit[i] == 1:
-            floor = max(floor, max(energy, force * K.extent))
-        elif size > 0.0:
-            floor = max(floor, max(energy, torque) / size)
-        if floor < 1e300:
-            K.scale[i] = max(K.scale[i], part * floor)
-    for i in range(n):
-        K.weight[i] = 1.0 / K.scale[i]
+        if K.cluster[i] == c:
+            size = size_of(K, i)
+            mass = abs(K.acc[i * n + i])
+            floor = mass * (abs(K.y[i]) / K.dt + size * slowly)
+            if K.unit[i] == 1:
+                floor = max(floor, max(energy, force * K.extent))
+            elif size > 0.0:
+                floor = max(floor, max(energy, torque) / size)
+            if floor < 1e300:
+                K.scale[i] = max(K.scale[i], part * floor)
