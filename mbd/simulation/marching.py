@@ -34,6 +34,7 @@ from mbd.simulation.run.control import apply_reset, arrive, begin_controllers, c
 from mbd.simulation.run.data import RunData
 from mbd.simulation.run.ends import advance, call, close
 from mbd.simulation.run.memory import carry_on, take_up
+from mbd.simulation.run.pace import Pace
 from mbd.simulation.run.room import Room
 from mbd.simulation.run.savepoints import rewind, save
 from mbd.simulation.run.stored import ended_record, whole_record
@@ -84,7 +85,7 @@ class Run(RunData):
     def at_start(self) -> Self:
         """The run with its start in the kernel's arrays, or with what that remembers of an earlier run."""
         start = self.start
-        self.energy, self.room = EnergyWatch(), Room(self.kernel.width)
+        self.energy, self.room, self.pace = EnergyWatch(), Room(self.kernel.width), Pace()
         self.resumed = take_up(self, start)
         notify(self)
         self.carried = self.resumed  # so do controllers
@@ -119,7 +120,7 @@ class Run(RunData):
         self.collect()
         settled, tried = True, attempt(self) if problem else None
         if problem:
-            settled = rewind(self, failed=problem not in (INTERRUPTED, self.energy.problem, self.room.problem))
+            settled = rewind(self, failed=problem not in self._no_failures)
         final = close(self, settled)
         problem, fed = self._in_words(problem), self._in_words(self._guarded(self._judge_energy)[0])
         if self.stop and not problem and not self.ended:
@@ -137,6 +138,11 @@ class Run(RunData):
         if problem and not self.interrupted and self.stored:
             problem += stability(self, whole_record(self))
         return _trajectory_of(self, problem, message, final), problem
+
+    @property
+    def _no_failures(self) -> tuple[str, ...]:
+        """Reasons to end between two steps, neither of which failed."""
+        return INTERRUPTED, self.energy.problem, self.room.problem, self.pace.problem
 
     def march(self) -> tuple[str, str]:
         """Run until the end or a failure, of which nothing is taken back yet; (problem, message)."""
@@ -198,7 +204,7 @@ class Run(RunData):
             elif status not in (codes.FULL, codes.PAUSE) and not self._goes_on_unlocated(status):
                 return self._explained(status), ""
             save(self)
-            problem = crowded(self.events, self.now, self.dt) or self.room.check(self)
+            problem = crowded(self.events, self.now, self.dt) or self.room.check(self) or self.pace.check(self)
             if not problem and (circular := circular_laws(self.stepper)):
                 problem = f"t = {self.now:.9g} s: {circular}"
             if not problem and self.limit is None and self.energy.is_due(self):
