@@ -84,9 +84,13 @@ def note_row_norms(K: DependentRows) -> None:
         if K.dropped[k] == 1 and K.row_level[k] == 0:
             K.misfit = max(K.misfit, abs(K.acc[K.acc_h + k]))
     row_norms_alone(K, m)
+    for c in range(K.n_clusters):
+        K.fastest[c] = 0.0  # the motion of each cluster, once for all of its rows: see `motion`
+    for j in range(K.n_v):
+        K.fastest[K.cluster[j]] += abs(K.acc[j * K.n + j]) * K.y1[j] * K.y1[j]
     for k in range(m):
         K.left1[k] = K.work[k]
-        K.left1[m + k] = motion(K, K.y1, k)
+        K.left1[m + k] = sqrt(K.fastest[K.cluster[K.n + K.rows[k]]]) + 1e-300
 
 
 def accept_row_norms(K: DependentRows, h: float) -> None:
