@@ -22,7 +22,7 @@ def cells(line: str) -> list[str]:
 
 
 def tables(text: str) -> dict[str, dict[str, str]]:
-    """Cells of all tables by the first word of their row's label in brackets or its label, then by column."""
+    """Cells of the first row of each label, in brackets or not, by the label, then by column."""
     found: dict[str, dict[str, str]] = {}
     head: list[str] = []
     for line in text.splitlines():
@@ -31,7 +31,7 @@ def tables(text: str) -> dict[str, dict[str, str]]:
         elif not head:
             head = cells(line)
         elif (label := re.search(r"S\w+ ≤ [\d.e-]+", line)) is not None:
-            found[label[0]] = dict(zip(head, cells(line), strict=True))
+            found.setdefault(label[0], dict(zip(head, cells(line), strict=True)))
     return found
 
 

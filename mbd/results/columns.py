@@ -176,10 +176,9 @@ class ModelColumns(StoredStates, Columns):
         """Coordinates of each joint where they do not add, such as a quaternion: one costs as much as all of them."""
         memory, key = self.equations.memory, "coordinates read together"
         if key not in memory:
-            names = tuple(each.name for each in self.equations.coordinates)
-            groups = [
-                names[first : first + len(joint.labels)] for joint, first, _ in self.equations.configuration.charts
-            ]
+            names = tuple(each.name for each in getattr(self.equations, "coordinates", ()))  # a file has none
+            charts = self.equations.configuration.charts if names else ()
+            groups = [names[first : first + len(joint.labels)] for joint, first, _ in charts]
             memory[key] = {name: group for group in groups for name in group}
         found: dict[str, tuple[str, ...]] = memory[key]
         return found
