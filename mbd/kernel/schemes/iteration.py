@@ -128,7 +128,7 @@ def residual_size(K: Motion, o_r: int, m: int, c_C: float, c_K: float, tolerance
     return size
 
 
-def note_largest(K: Motion, first: int, largest: Reals) -> None:
+def note_largest(K: Model, first: int, largest: Reals) -> None:
     """The largest of the numbers of the block, from `first` on, of the coordinates of each cluster."""
     for c in range(K.n_clusters):
         largest[c] = 0.0

@@ -112,7 +112,7 @@ def accept_row_norms(K: DependentRows, h: float) -> None:
     K.left[m] = near
 
 
-def motion(K: DependentRows, y: Reals, k: int) -> float:
+def motion(K: Motion, y: Reals, k: int) -> float:
     """√(Σ M_jj v_j²) of the cluster of row k of those in K.rows, of the size of √(2 T), with M in K.acc."""
     size = 0.0
     for j in range(K.n_v):
@@ -121,7 +121,7 @@ def motion(K: DependentRows, y: Reals, k: int) -> float:
     return float(sqrt(size) + 1e-300)
 
 
-def larger_motion(K: SingularSteps, k: int) -> float:
+def larger_motion(K: Motion, k: int) -> float:
     """The larger one of that in K.y and that in K.y1: it may start from rest."""
     return max(motion(K, K.y, k), motion(K, K.y1, k))
 
@@ -243,7 +243,7 @@ def times_to_singularities(K: SingularSteps, m: int, unit: float) -> float:
     return first
 
 
-def horizon(K: SingularSteps, m: int, unit: float, first: float) -> float:
+def horizon(K: Equations, m: int, unit: float, first: float) -> float:
     """Time beyond which none is looked for: nothing is arranged so early, and the motion is not known so far."""
     limit = 4.0 * MAX_NOISY_STEPS * unit
     if K.stretches == 1 and first < NEVER:

@@ -149,7 +149,7 @@ def add_force_floors(K: Equations, part: float) -> None:
         K.weight[i] = 1.0 / K.scale[i]
 
 
-def add_floors_of_cluster(K: Equations, part: float, c: int) -> None:
+def add_floors_of_cluster(K: Motion, part: float, c: int) -> None:
     """The same of the coordinates of one cluster: elimination mixes no others into them."""
     n = K.n
     energy = 0.0
