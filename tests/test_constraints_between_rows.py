@@ -56,6 +56,14 @@ def test_between_rows_constraints_hold_as_at_rows(kind, seed, name):
     assert_rows_hold(mbd.simulate(model, start, SCHEMES[name](), dt=0.01, until=0.2), seed)
 
 
+@pytest.mark.parametrize("name", [name for name in SCHEMES if "index3" in name])
+@pytest.mark.parametrize("seed", [0, 1, 4])
+def test_between_rows_of_long_steps_constraints_hold_as_at_rows(seed, name):
+    """Polynomials are off by 0.1 rad there, which takes Newton's method five corrections."""
+    model, start = KINDS["loop"](seed)
+    assert_rows_hold(mbd.simulate(model, start, SCHEMES[name](), dt=0.1, until=1.0, on_failure="return"))
+
+
 @pytest.mark.parametrize("lightest", [1e-3, 1e-6, 1e-8])
 def test_between_rows_constraints_hold_at_both_ends_of_a_light_link(lightest):
     """In the metric of inertia the rows at its two ends depend on each other along it, in no singular pose."""

@@ -89,17 +89,19 @@ class Projection:
             parts = np.abs(own[:, :, : found.v.shape[1]]) @ np.abs(found.v[mine])[:, :, None]
             hold = np.all(np.abs(aim_rate[mine][:, mode.kept]) <= EQUAL_RTOL * parts[:, :, 0], axis=1)
             good[mine] = least > np.where(hold, DIRECT_PIVOT_RTOL, MIN_SINGULAR_VALUE)
-        led, before, moving = found, np.full(len(found), np.inf), modes
-        for _ in range(3):  # an error of 0.01 is round-off after the third
-            x, sound = self._corrections(moving, terms, aim)
-            size = np.max(np.abs(x), axis=1, initial=0.0)
-            asked = np.concatenate([mode.mine for mode in moving])
-            good[asked] &= (sound & ((size < 0.5 * before) | (size <= ROUND_OFF_RTOL)))[asked]
-            led, before = replace(led, q=put(led.q, asked, self._moved(led.q, x)[asked])), size
-            terms = self.balance.terms_at(led)
-            moving = [mode for mode in moving if not np.all((size <= ROUND_OFF_RTOL)[mode.mine] | ~good[mode.mine])]
-            if not moving:
+        led, before, moving = found, np.full(len(found), np.inf), good.copy()
+        for _ in range(40):  # halved as often, 1 is round-off
+            asked = [mode for mode in modes if np.any(moving[mode.mine])]
+            if not asked:
                 break
+            x, sound = self._corrections(asked, terms, aim)
+            size = np.max(np.abs(x), axis=1, initial=0.0)
+            good &= ~moving | sound & ((size < 0.5 * before) | (size <= ROUND_OFF_RTOL))
+            moving &= good
+            led = replace(led, q=np.where(moving[:, None], self._moved(led.q, x), led.q))
+            following = np.where(np.isfinite(before), size * (size / before) ** 2, size)  # of Newton's method
+            moving &= following > ROUND_OFF_RTOL
+            before, terms = size, self.balance.terms_at(led)
         change, sound = self._corrections(modes, terms, aim_rate, rates=True)
         good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)
         q = np.where(good[:, None], led.q, found.q)
