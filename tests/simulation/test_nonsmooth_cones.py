@@ -180,7 +180,7 @@ def test_feet_of_all_kinds_and_dry_joints_are_solved_together():
         model, position={"float.z": 0.05}, closed=feet,
         velocity={"float.x.rate": 1.5, "float.y.rate": 0.3, "float.angular_velocity.z": 2.0},
     )  # fmt: skip
-    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=2e-3, until=2.0, **STEPS)
+    run = mbd.simulate(model, start, mbd.HHT(0.05), dt=1e-3, until=2.0, **STEPS)
     assert np.max(np.abs(np.diff(run.energy["total"]).clip(0.0))) < 1e-6
     speed = 3.0 * run["rail.rate"] + 2.0 * run["float.x.rate"]
     early = (run.time > 0.01) & (run.time < 0.1)

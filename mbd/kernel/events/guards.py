@@ -5,7 +5,7 @@ the step (cubic Hermite interpolant; `locate` then steps to the dip itself). A c
 armed is ignored until its gap has risen above zero. Closed contacts fire by their release rule.
 """
 
-from mbd.equal import NOMINAL_RTOL, ROUND_OFF_RTOL
+from mbd.equal import NOMINAL_RTOL, REST_SPEED, ROUND_OFF_RTOL
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import (
     ALWAYS,
@@ -233,10 +233,16 @@ def judge(K: Switching, h: float) -> bool:
                 )
     for e in range(K.n_guards):
         judge_user(K, e, h)
-    if K.strategy == 0:
-        for f in range(K.n_frictions):
+    for f in range(K.n_frictions):
+        if K.strategy == 0 or comes_to_rest(K, f):
             judge_friction(K, f, h)
     return bool(K.event_kind >= 0)
+
+
+def comes_to_rest(K: Guards, f: int) -> bool:
+    """Whether friction f is that of a joint in motion: non-smooth steps end where it rests, before they drive it back."""
+    alone = K.friction_contact[f] < 0 and K.group_size[f] == 1
+    return bool(alone and K.slip[f] * K.guards0[K.at_slip + f] > REST_SPEED)
 
 
 def rises(g0: float, g1: float, d0: float, d1: float, lost: float, reach: float) -> bool:
