@@ -220,7 +220,7 @@ def test_a_dry_joint_comes_to_rest_within_a_step_as_where_events_are_located(see
         assert part.kind != "friction" or np.max(np.diff(part.energy)) < 1e-9
 
 
-@pytest.mark.parametrize("seed", [0, 116, 420, 672, 1201])
+@pytest.mark.parametrize("seed", [0, 116, 420, 672])
 def test_a_dry_joint_of_a_wild_scene_gives_no_energy(seed):
     assert complaints(wild_scene(seed, interpreted=()).run()) == []
 

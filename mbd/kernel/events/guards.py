@@ -240,7 +240,7 @@ def judge(K: Switching, h: float) -> bool:
 
 
 def comes_to_rest(K: Guards, f: int) -> bool:
-    """Whether friction f is that of a joint in motion: non-smooth steps end where it rests, before they drive it back."""
+    """Whether friction f is that of a joint in motion: a non-smooth step ends where it rests, or drives it back."""
     alone = K.friction_contact[f] < 0 and K.group_size[f] == 1
     return bool(alone and K.slip[f] * K.guards0[K.at_slip + f] > REST_SPEED)
 
