@@ -98,6 +98,8 @@ class State(LateFields):
     parameters : parameter values that differ from the model's
     memory : what a run needs beside this to go on exactly; None: it is started from the state alone. A state changed
         by ``dataclasses.replace`` may keep it: a memory of other values is never used
+    begins : names of the modes and sampled laws that begin with this state: what they store at a start follows it where
+        ``dataclasses.replace`` changes it, but for a later time, to which they last; others hold their `anchors`
     """
 
     time: float
@@ -112,6 +114,7 @@ class State(LateFields):
     moved: Mapping[str, float] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     memory: Memory | None = field(default_factory=_nothing, repr=False)
+    begins: frozenset[str] = frozenset()
 
     def __getitem__(self, name: str) -> Any:
         """A coordinate ('left hip.angle') or a rate ('left hip.angle.rate', 'left hip.rate').
@@ -260,6 +263,8 @@ def malformed(state: State) -> list[str]:
         faults.append(f"the mode of the start must be a Mode(frozenset of names of contacts), not {_shown(state.mode)}")
     if state.armed is not None and not are_names(state.armed):
         faults.append(f"armed of the start must be None or a frozenset of names of contacts, not {_shown(state.armed)}")
+    if not are_names(state.begins):
+        faults.append(f"begins of the start must be a frozenset of names of modes and laws, not {_shown(state.begins)}")
     for name in ("names", "velocity_names"):
         value = getattr(state, name)
         if not isinstance(value, tuple) or not _are_words(value):

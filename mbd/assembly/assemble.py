@@ -18,7 +18,7 @@ from mbd.assembly.foreseen import require_inertia
 from mbd.assembly.inertia import undetermined
 from mbd.assembly.infeasibility import Held
 from mbd.assembly.initial_pose import opening
-from mbd.assembly.machines import first_anchors, hold, store_first, without_held
+from mbd.assembly.machines import beginning, first_anchors, hold, store_first, without_held
 from mbd.assembly.manager import manager_of
 from mbd.assembly.named_projection import nearest_positions, nearest_velocities
 from mbd.assembly.pose import Posture
@@ -139,7 +139,7 @@ def assemble(
     assembled = State(
         0.0, work.q, work.y[: equations.n_v].copy(), work.y[equations.n_v :].copy(), manager.mode(work.flags),
         _armed(work, set(opened)), work.anchors, tuple(coordinate.name for coordinate in equations.coordinates),
-        equations.velocity_names, _moved(work, q, y, named), changed,
+        equations.velocity_names, _moved(work, q, y, named), changed, begins=beginning(mechanism, held),
     )  # fmt: skip
     assembled = of_model(assembled, model)
     feet.require_heights(assembled)

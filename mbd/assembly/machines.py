@@ -10,7 +10,7 @@ from mbd.arrays import Vector
 from mbd.bodies.values import number
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import makes_late
-from mbd.equal import ROUND_OFF_RTOL
+from mbd.equal import INSTANT_RTOL, ROUND_OFF_RTOL
 from mbd.equations.equations import Machine
 from mbd.errors import ModelError, nearest
 from mbd.state import State
@@ -36,7 +36,8 @@ def is_end(state: State) -> bool:
 def begun_in(model: Any, mechanism: Mechanism, state: State) -> tuple[State, Sequence[Machine]]:
     """A state, and the machines that begin in it: they hold what they store there at a start, with its parameters.
 
-    None begins where a run has ended. The anchors of a state that has none are those of a start.
+    None begins where a run has ended, nor, in a start whose time was moved on, what has begun before. The anchors of a
+    state that has none are those of a start.
     """
     machines = mechanism.equations.machines
     if not machines or is_end(state):
@@ -47,7 +48,33 @@ def begun_in(model: Any, mechanism: Mechanism, state: State) -> tuple[State, Seq
         return stored_anew(mechanism, state, own, machines), machines
     fresh = stored_anew(mechanism, state, own, machines).anchors
     off = np.abs(fresh - state.anchors) > ROUND_OFF_RTOL * np.maximum(1.0, np.abs(fresh))
-    return state, [each for each in machines if not np.any(off[list(each.anchors[1:])])]
+    later = fresh > state.anchors
+    return state, [
+        m for m in machines
+        if not np.any((off & later)[list(m.times)] if m.name in state.begins else off[list(m.anchors[1:])])
+    ]  # fmt: skip
+
+
+def require_past(model: Any, mechanism: Mechanism, state: State) -> None:
+    """What machines hold since before a state must not be of an instant after it.
+
+    Raises
+    ------
+    ModelError
+        for a mode that is entered, or a law that takes its last sample, later.
+    """
+    held = [machine for machine in mechanism.equations.machines if machine.name not in state.begins]
+    if not held or is_end(state) or len(state.anchors) != mechanism.layout.n_anchors:
+        return
+    latest = stored_anew(mechanism, state, mechanism.parameters_of(model, state.parameters), held).anchors
+    late = [
+        f"the start is at t = {state.time:g} s, where '{m.name}.{m.fields[m.anchors.index(k)]}' is at most "
+        f"{latest[k]:g} s, got {state.anchors[k]:g} s; move the anchors of its time too, or let all begin there, as "
+        "in dataclasses.replace(start, time=…, anchors=())"
+        for m in held for k in m.times if state.anchors[k] > latest[k] + INSTANT_RTOL * max(1.0, abs(latest[k]))
+    ]  # fmt: skip
+    if late:
+        raise ModelError(late)
 
 
 def stored_anew(mechanism: Mechanism, state: State, parameters: Vector, machines: Sequence[Machine]) -> State:
@@ -109,3 +136,9 @@ def hold(mechanism: Mechanism, held: Mapping[str, float], anchors: Vector) -> No
             name = machine.name if anchor == machine.anchors[0] else f"{machine.name}.{field}"
             if name in held:
                 anchors[anchor] = held[name]
+
+
+def beginning(mechanism: Mechanism, held: Mapping[str, float]) -> frozenset[str]:
+    """Names of the machines of which nothing is held but the state they are in."""
+    machines = mechanism.equations.machines
+    return frozenset(m.name for m in machines if not any(name.startswith(f"{m.name}.") for name in held))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mbd.assembly.given_state import fits
-from mbd.assembly.machines import begun_in, stored_anew
+from mbd.assembly.machines import begun_in, require_past, stored_anew
 from mbd.assembly.manager import manager_of
 from mbd.assembly.turns import directed
 from mbd.compile.mechanism import Mechanism
@@ -185,7 +185,9 @@ class _Motion:
         options = {**self.options, **(more or {})}
         run = laid_out(
             self.model, self.start, self.scheme, float(step), self.until, self.changed, options, kind=self.kind
-        ).at_start()
+        )
+        require_past(self.model, run.mechanism, self.start)
+        run = run.at_start()
         run.room.patience = most
         with run_bar(self.progress, run.mechanism.backend.name == "python", self.start.time, run.end) as bar:
             run.observe(self.observers, bar)
@@ -262,7 +264,7 @@ def laid_out(
     manager = manager_of(mechanism, values)
     fits(start, mechanism.equations, manager)
     start = directed(mechanism, start)
-    if changed != start.parameters or len(start.anchors) != mechanism.layout.n_anchors:
+    if changed != start.parameters or start.begins or len(start.anchors) != mechanism.layout.n_anchors:
         start, begun = begun_in(model, mechanism, start)
         start = stored_anew(mechanism, start, values, begun)
     end, stop = end_of(until, manager, dt, start.time)

@@ -1,5 +1,7 @@
 """Random machines: machine code and plain Python agree, and each state's law is what acts in it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,6 +72,26 @@ def test_machine_code_and_plain_python_take_the_same_transitions(seed: int) -> N
                       if name.startswith(f"{which} drive.torque.")}  # fmt: skip
             np.testing.assert_array_equal(torque[one[which] == state], pushes.get(state, 0.0))
     assert np.all(np.diff(one.time) >= 0.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_modes_begin_with_a_start_that_was_replaced_and_hold_no_instant_after_one(seed: int) -> None:
+    model, start = scene(seed)
+    angles = {name: float(q) + 0.1 for name, q in zip(start.names, start.q, strict=True)}
+    wanted, moved = (
+        mbd.simulate(model, begun, mbd.RungeKutta853(), dt=0.01, until=begun.time + 0.5)
+        for begun in (mbd.assemble(model, angles), replace(start, time=-1.0, q=start.q + 0.1))
+    )
+    assert [event.name for event in moved.events] == [event.name for event in wanted.events]
+    times = [event.time for event in moved.events]
+    np.testing.assert_allclose(times, [event.time - 1.0 for event in wanted.events], atol=1e-9)
+    for name in ("one.angle", "two.angle", "one.time", "two.time"):
+        np.testing.assert_allclose(moved[name][0], wanted[name][0], atol=1e-15)
+    for change in ({"time": -2.0}, {"time": 0.5 * min(moved["one.time"][-1], moved["two.time"][-1]) - 1.5}):
+        with pytest.raises(mbd.ModelError, match="'(one|two).since' is at most .* anchors="):
+            mbd.simulate(model, replace(moved.final, **change), dt=0.01, until=0.1)
+        with pytest.raises(mbd.ModelError, match="'(one|two).since' is at most .* anchors="):
+            mbd.batch(model, [replace(moved.final, **change)], dt=0.01, until=0.1, results=["joint 0.angle"])
 
 
 def _anchor(run: mbd.Trajectory, mode: str, field: str) -> int:

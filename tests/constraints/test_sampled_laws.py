@@ -146,6 +146,7 @@ def test_the_first_sample_is_that_of_the_start_and_parameters_of_the_run(delay: 
     wanted = [end(mbd.assemble(model, {"hinge.angle": angle}, parameters=values), {}) for angle in (0.2, 0.9)]
     assert end(start, values) == wanted[0] == end(mbd.project(model, start, values), {})
     assert end(replace(start, anchors=np.zeros(0)), values) == wanted[0]
+    assert end(replace(start, q=np.array([0.9])), values) == wanted[1]
     starts = start, {"hinge.angle": [0.2, 0.9]}
     found = mbd.batch(
         model, starts, mbd.RungeKutta853(), dt=0.004, until=until, parameters=values, results=["hinge.angle"]

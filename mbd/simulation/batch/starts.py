@@ -8,7 +8,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.given_state import MAX_ANGLE, fits
-from mbd.assembly.machines import begun_in, stored_anew
+from mbd.assembly.machines import begun_in, require_past, stored_anew
 from mbd.bodies.values import shown
 from mbd.compile.mechanism import Mechanism, rate_names
 from mbd.dataclass import dataclass
@@ -178,6 +178,8 @@ def starts_of(
     whole = {name: np.broadcast_to(column, count) for name, column in columns.items()}
     if not mechanism.equations.machines:
         return Starts(base, states, whole, count)
+    for each in states or [base]:
+        require_past(model, mechanism, each)
     known = [begun_in(model, mechanism, each) for each in states or [base]]
     found = Starts(known[0][0], [start for start, _ in known] if states else (), whole, count)
     made = (
