@@ -280,3 +280,23 @@ def test_a_growth_that_is_not_known_is_not_told():
     assert summary.accuracy(known | {"growth": float("nan")}) == (
         "estimated error of coordinates 2e-15, asked for 1e-06; runs of 11 + 17 steps"
     )
+
+
+def test_two_threads_may_read_one_run():
+    """Parts of a quaternion are evaluated together: another thread may take one between a look and the reading."""
+    model, body = mbd.Model("top"), mbd.RigidBody("top", 1.0, (0.1, 0.2, 0.25))
+    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    start = mbd.assemble(model, velocity={"float.angular_velocity": (1.0, 2.0, 0.3)})
+    columns = mbd.simulate(model, start, dt=0.05, until=0.2).columns
+    names = [f"float.orientation.{part}" for part in "wxyz"]
+    wanted = [columns.at_rows([name])[0] for name in names]
+
+    class Shared(dict):
+        def __contains__(self, name):
+            found = super().__contains__(name)
+            self.pop(name, None)  # the other thread
+            return found
+
+    columns._waiting = Shared()
+    for name, values in list(zip(names, wanted, strict=True)) * 3:
+        np.testing.assert_array_equal(columns.at_rows([name])[0], values)

@@ -166,10 +166,12 @@ class ModelColumns(StoredStates, Columns):
         group = self._read_together.get(names[0], ()) if len(names) == 1 else ()
         if not group:
             return self.evaluate_stored([self.node(name) for name in names])
-        if names[0] not in self._waiting:
-            values = self.evaluate_stored([self.node(name) for name in group])
-            self._waiting |= dict(zip(group, values, strict=True))
-        return [self._waiting.pop(names[0])]
+        value = self._waiting.pop(names[0], None)  # one call, as other threads may read the same run
+        if value is None:
+            values = dict(zip(group, self.evaluate_stored([self.node(name) for name in group]), strict=True))
+            value = values.pop(names[0])
+            self._waiting.update(values)
+        return [value]
 
     @property
     def _read_together(self) -> dict[str, tuple[str, ...]]:
