@@ -16,6 +16,7 @@ from mbd.results.interpolation import Grid
 from mbd.results.polynomials import quintic
 from mbd.simulation.simulate import prepared
 from tests.integrators.test_order import double_pendulum
+from tests.simulation.judging import explains
 from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum, run
 from tests.simulation.wild import wild_scene
 
@@ -173,6 +174,12 @@ def test_a_step_that_is_refused_excuses_no_other():
     """A block thrown hard, with steps of more than a second: rows hold at every row until the run ends."""
     wild = replace(wild_scene(388), integrator=SCHEME).run()
     assert wild.violation.length < 1e-9
+
+
+@pytest.mark.parametrize("seed", [69, 121, 182, 278, 422])
+def test_an_explicit_step_that_fails_names_what_moves_and_what_to_try(seed):
+    message = replace(wild_scene(seed), integrator=SCHEME).run().message
+    assert explains(message) and "'" in message.partition(";")[0]
 
 
 def test_a_flat_pose_does_not_hold_a_linkage():

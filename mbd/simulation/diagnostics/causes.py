@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.assembly.inertia import lost_inertia
 from mbd.assembly.not_finite import first_cause, tape_inputs
 from mbd.assembly.pose import Posture
@@ -209,10 +210,10 @@ class Words:
 
     @property
     def worst(self) -> str:
-        """Where the residual of the step that failed is largest, in words; '' where that is not known."""
+        """Where the residual of the step that failed is largest, in words; without one the largest acceleration."""
         values = self.v
         if values.block_time != values.failure_time:
-            return ""
+            return f", with the largest acceleration at {self._largest(values.rate)}" if values.n_v else ""
         sizes = {
             name: abs(size) for name, size in residuals_of(self.stepper, values.block).items() if np.isfinite(size)
         }
@@ -280,11 +281,17 @@ class Words:
         inputs = tape_inputs(self.stepper.mechanism, values.block, values.params)
         cause = first_cause(equations, inputs, self.places)
         if cause is None and not np.isfinite(evaluate(list(equations.balance), inputs)).all():
-            return "the inertia forces are not finite (velocities have run away)"
+            fastest = self._largest(values.block[self.stepper.mechanism.layout.v :])
+            return f"the inertia forces are not finite: {fastest} has run away; use a smaller dt or a weaker force"
         for impulse in equations.impulses if cause is None else ():
             if not np.isfinite(evaluate(list(impulse.vector), inputs)).all():
                 return f"the size of impulse {impulse.name!r} is not finite; check its roots, logarithms, divisions"
         return cause or "a derivative of a force or constraint is not finite"
+
+    def _largest(self, values: Vector) -> str:
+        """The name of the rate that has the largest of these values, or the first one that is none."""
+        sizes = np.nan_to_num(np.abs(values[: self.v.n_v]), nan=np.inf)
+        return repr(self.stepper.mechanism.equations.velocity_names[int(np.argmax(sizes))])
 
     @cached_property
     def rushing(self) -> str:
