@@ -87,7 +87,8 @@ def _motion(found: Faults, run: mbd.Trajectory, told: Readings, smooth: bool) ->
     uncertain, share = int(run.stats["singular_steps"]) + jumps, steps.error_share(scheme)
     warned = any("estimated errors of velocities add up" in str(note) for note in run.stats["notes"])
     err = float(run.stats["local_errors"]) if warned else 0.0
-    steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share, tol, err)
+    left = steps.fading(scheme)
+    steps.motion(found, told, smooth, "index3" not in scheme, uncertain, tied, share, tol, err, left)
 
 
 def _unresolved(run: mbd.Trajectory, times: Array) -> Array:

@@ -1,6 +1,7 @@
 """Laws along rows: positions and velocities are integrals, guards that cross make events, passive parts only take."""
 
 import ast
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from tests.fuzz.quantities import gap_of
 from tests.fuzz.readings import Readings
 from tests.fuzz.turning import rotation_vector
 
-__all__ = ["crossings", "error_share", "impacts", "motion", "openings", "passive"]
+__all__ = ["crossings", "error_share", "fading", "impacts", "motion", "openings", "passive"]
 
 PASSIVE = ("joint loss", "damper", "friction", "penalty", "impact")
 """Kinds of parts of the ledger that only take energy."""
@@ -28,15 +29,26 @@ def error_share(integrator: str) -> float:
 
     ``|γ − 1/2 + α_m − α_f|``, 0 for order 2, and ``|1/6 − β − (α_m − α_f)/2|/3``.
     """
-    call = ast.parse(integrator, mode="eval").body
-    assert isinstance(call, ast.Call)
-    assert isinstance(call.func, ast.Name)
-    given = {str(word.arg): ast.literal_eval(word.value) for word in call.keywords}
-    c = getattr(getattr(mbd, call.func.id)(**given), "coefficients", None)
+    c = _coefficients(integrator)
     if c is None:
         return 0.0
     shift = c.alpha_m - c.alpha_f
     return float(max(abs(c.gamma - 0.5 + shift), abs(1.0 / 6.0 - c.beta - 0.5 * shift) / 3.0))
+
+
+def fading(integrator: str) -> float:
+    """What is left after a step of an error of auxiliary accelerations, ``|α_m/(1 − α_m)|``; 0 without them."""
+    c = _coefficients(integrator)
+    return 0.0 if c is None else float(abs(c.alpha_m / (1.0 - c.alpha_m)))
+
+
+def _coefficients(integrator: str) -> Any:
+    """Those of a scheme of the Newmark family, None of others."""
+    call = ast.parse(integrator, mode="eval").body
+    assert isinstance(call, ast.Call)
+    assert isinstance(call.func, ast.Name)
+    given = {str(word.arg): ast.literal_eval(word.value) for word in call.keywords}
+    return getattr(getattr(mbd, call.func.id)(**given), "coefficients", None)
 
 
 def motion(
@@ -49,11 +61,13 @@ def motion(
     share: float = 0.0,
     tol: float = 0.0,
     err: float = 0.0,
+    left: float = 0.0,
 ) -> None:
     """Each coordinate is the integral of its rate, and that of its acceleration, from one row to the next.
 
     ``Δq = h (v₀+v₁)/2 − h² (a₁−a₀)/12`` and ``Δv = h (a₀+a₁)/2`` but for what accelerations change meanwhile: h² and
-    h times the largest change of a of the steps around; one step alone between two events has none around.
+    h times the largest change of a of the steps around, and what schemes with a memory keep of earlier ones; one step
+    alone between two events has none around.
 
     Parameters
     ----------
@@ -64,6 +78,7 @@ def motion(
     share : error of a step over the change of its acceleration, see `error_share` [-]
     tol : what positions may err by in the whole run [m, rad]: long steps pass more than these laws see
     err : what a note of the run says that velocities err [m/s, rad/s]
+    left : see `fading` [-]
     """
     h = np.diff(told.time)
     steps = np.flatnonzero(h > 0.0)
@@ -76,12 +91,12 @@ def motion(
     spins = [name for name in told.values if ".angular_velocity." in name and f"{name}.acceleration" in told]
     rated = [told[name] for name in told.values if name.endswith(".rate") or name in spins]
     fastest = 3.0 * np.max(np.abs(rated)) if rated else 0.0
-    accelerations = [_around(np.abs(np.diff(told[n]))[steps]) for n in told.values if n.endswith(".acceleration")]
+    accelerations = [_around(np.abs(np.diff(told[n]))[steps], left) for n in told.values if n.endswith(".acceleration")]
     part = max(0.05, share)  # corrections onto rows move everything by twice what one of them errs
     jumps = part * np.max(accelerations, axis=0) if accelerations else 0.0
     for name in [name for name in told.values if f"{name}.rate" in told and f"{name}.acceleration" in told]:
         q, v, a = told.coordinate(name)
-        change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
+        change = _around(np.abs(np.diff(a))[steps], left) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
         fast = np.maximum(np.abs(v[steps]), np.abs(v[steps + 1]))
         off = np.diff(q)[steps] - h * (v[steps] + v[steps + 1]) / 2.0
         if smooth:
@@ -99,7 +114,7 @@ def motion(
 
     for name in spins if smooth and rates else []:
         v, a = told[name], told[f"{name}.acceleration"]
-        change = _around(np.abs(np.diff(a))[steps]) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
+        change = _around(np.abs(np.diff(a))[steps], left) + 1e-3 * (np.abs(a[steps]) + np.abs(a[steps + 1]))
         fast = np.maximum(np.abs(v[steps]), np.abs(v[steps + 1]))
         off = np.diff(v)[steps] - h * (a[steps] + a[steps + 1]) / 2.0
         limit = 2.0 * h * (change + tied * jumps) + 1e-7 * (1.0 + fast) + tol / h + err
@@ -114,7 +129,7 @@ def motion(
         turned = rotation_vector(between)
         if smooth:
             step = step - h[:, None] ** 2 * (a[steps + 1] - a[steps]) / 12.0
-        change = np.linalg.norm(_around(np.abs(np.diff(a, axis=0)).max(axis=1)[steps])[:, None], axis=1)
+        change = np.linalg.norm(_around(np.abs(np.diff(a, axis=0)).max(axis=1)[steps], left)[:, None], axis=1)
         fast = np.maximum(np.linalg.norm(v[steps], axis=1), np.linalg.norm(v[steps + 1], axis=1))
         limit = 6.0 * h**2 * (change + jumps) + 2.0 * bend + 1e-8 * (1.0 + h * fast) + tol
         if not smooth:
@@ -125,10 +140,13 @@ def motion(
         there.small("an orientation is the integral of its angular velocity", owner, off, limit, h * fast < 1.5)
 
 
-def _around(values: Array) -> Array:
-    """The largest of each value and its two neighbours on either side."""
+def _around(values: Array, left: float) -> Array:
+    """The largest of each value and its two neighbours on either side, and what is left of those before."""
     wide = np.pad(values, 2, mode="edge")
-    return np.asarray(np.max(np.stack([wide[k : k + len(values)] for k in range(5)]), axis=0))
+    found = np.asarray(np.max(np.stack([wide[k : k + len(values)] for k in range(5)]), axis=0))
+    for k in range(1, len(found)):
+        found[k] = max(found[k], left * found[k - 1])
+    return found
 
 
 def _range(values: Array) -> Array:

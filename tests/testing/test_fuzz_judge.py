@@ -118,6 +118,11 @@ def test_an_impact_beside_a_foot_that_sticks_to_a_belt_may_take_energy_from_it()
     assert told["kind"] == "ok", told
 
 
+def test_auxiliary_accelerations_fade_after_a_disk_has_turned_over():
+    """Its lowest point jumps across within a step, of which GeneralizedAlpha(0) keeps a half, a quarter, … later."""
+    assert verdict(1025213, 100000)["reasons"] == []
+
+
 def test_the_rows_of_a_run_that_ends_at_a_contact_without_a_force_keep_the_laws():
     """A foot that sticks whatever its force, in index 3: neither closed nor open; the row before has its forces."""
     told = verdict(24029)
