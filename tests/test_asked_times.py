@@ -17,6 +17,7 @@ import pytest
 import mbd
 from mbd.hardcases.redundant_rows import bricard
 from mbd.hardcases.schemes import SCHEMES
+from mbd.results.columns import ModelColumns
 from tests.fuzz import judge
 from tests.fuzz.structures import SPACE, structure
 from tests.mechanisms_between_rows import KINDS
@@ -244,3 +245,24 @@ def test_between_rows_a_light_link_moves_as_one_without_mass():
             run = mbd.simulate(model, start, mbd.RungeKutta853(), tol=1e-8, until=1.0)
             angles.append(run.at(t)["pivot.angle"])
         assert np.max(np.abs(np.array(angles) - angles[0])) < 1e-7
+
+
+@pytest.mark.parametrize("name", ["HHT", "RadauIIA", "RungeKutta853"])
+def test_states_at_times_that_are_asked_for_again_are_found_once(name, monkeypatch):
+    """Also where the array of times has changed in the meantime, then those at the new ones."""
+    model, start = mechanism(sorted(KINDS)[0], 1)
+    once, again = (mbd.simulate(model, start, SCHEMES[name](), dt=STEPS.get(name, USUAL), until=0.1) for _ in range(2))
+    found, between = [], ModelColumns._between
+
+    def counted(columns, places, forces):
+        found.append(places)
+        return between(columns, places, forces)
+
+    monkeypatch.setattr(ModelColumns, "_between", counted)
+    times, (one, other) = np.array([0.0123, 0.0456, 0.0789]), start.names[:1] + start.velocity_names[:1]
+    first = once.at(times)[one]
+    assert np.any(once.at(times.copy())[other] != first) and len(found) == 1
+    times += 1e-3
+    moved = once.at(times)[one]
+    assert len(found) == 2 and np.all(moved != first)
+    np.testing.assert_array_equal(moved, again.at([0.0133, 0.0466, 0.0799])[one])

@@ -7,6 +7,7 @@ other. Their multipliers are those of least norm among all that give the same fo
 """
 
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -87,6 +88,7 @@ class Balance:
         self.terms, self.follows = _terms(self.equations)
         self.loads_act = any(getattr(contact, "drags", ()) and contact.rows for contact in self.equations.contacts)
         self._held: dict[bytes, Held] = {}
+        self._grouped: tuple[Any, Any, list[tuple[NDArray[np.int8], Any]]] = None, None, []
 
     @staticmethod
     def serves(equations: Equations) -> bool:
@@ -101,14 +103,23 @@ class Balance:
             np.zeros((count, n)), np.zeros((count, m)), np.zeros(count), np.zeros(count, dtype=bool),
             np.ones(count, dtype=bool), np.zeros((count, n, n)), np.zeros((count, n)),
         )  # fmt: skip
-        modes = np.hstack([rows.closed.astype(np.int8), rows.phase])
-        patterns, group = np.unique(modes, axis=0, return_inverse=True)
-        for number, mode in enumerate(patterns):
-            mine = group.ravel() == number
-            self._solve_in(mode, rows.part(mine), mine, found)
+        groups = self._groups(rows)
+        for mode, mine in groups:
+            self._solve_in(mode, rows if len(groups) == 1 else rows.part(mine), mine, found)
         return found
 
-    def _solve_in(self, mode: NDArray[np.int8], rows: Rows, mine: Flags, found: Solved) -> None:
+    def _groups(self, rows: Rows) -> list[tuple[NDArray[np.int8], Any]]:
+        """The modes of states, and where each holds; found once for states that share their flags, as stages do."""
+        closed, phase, groups = self._grouped
+        if closed is not rows.closed or phase is not rows.phase:
+            modes = np.hstack([rows.closed.astype(np.int8), rows.phase])
+            patterns, group = np.unique(modes, axis=0, return_inverse=True)
+            alone, group = len(patterns) == 1, group.ravel()
+            groups = [(mode, slice(None) if alone else np.flatnonzero(group == k)) for k, mode in enumerate(patterns)]
+            self._grouped = rows.closed, rows.phase, groups
+        return groups
+
+    def _solve_in(self, mode: NDArray[np.int8], rows: Rows, mine: Any, found: Solved) -> None:
         """The same in one mode; `mine` are the places of the results."""
         held = self.rows_in(mode)
         slides = bool(np.any(np.abs(rows.phase) == 1)) or self.loads_act
@@ -125,6 +136,8 @@ class Balance:
             rate, force, size, sound = saddle(M, f, forces, B[:, held.kept], bias[:, held.kept])
             before, lam = lam, np.zeros_like(rows.lam)
             lam[:, held.every] = force if spread is None else (spread @ force[:, :, None])[:, :, 0]
+            if turns == 1:
+                break
             change = np.max(np.abs(lam - before), axis=1, initial=0.0)
             if np.all((change <= 1e-13 * np.max(np.abs(lam), axis=1, initial=0.0)) | ~sound):
                 break
@@ -175,8 +188,8 @@ class Balance:
         """
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
         flat = self.terms.lines(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source)).T
-        cuts = np.cumsum([n * n, n, n * m, m * n, m, m, m])
-        M, f, R, B, h, rates, bias, rest = np.split(flat.reshape(count, -1), cuts, axis=1)
+        ends = accumulate((n * n, n, n * m, m * n, m, m, m, flat.shape[1]), initial=0)
+        M, f, R, B, h, rates, bias, rest = (flat[:, first:end] for first, end in pairwise(ends))
         last = rest.shape[1] - len(self.equations.frictions)
         R, B = R.reshape(count, n, m), B.reshape(count, m, n)
         return M.reshape(count, n, n), f, R, B, h, rates, bias, rest[:, last:], rest[:, : last - 1]
@@ -273,10 +286,12 @@ def saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Mat
     matrix[:, :n, :n], matrix[:, :n, n:], matrix[:, n:, :n] = M, R, B
     right = -np.hstack([f, bias])
     finite = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
-    matrix[~finite] = np.eye(n + m)
+    if not finite.all():
+        matrix[~finite] = np.eye(n + m)
     sign, size = np.linalg.slogdet(matrix)
     sound = finite & (sign != 0.0)
-    matrix[~sound] = np.eye(n + m)
+    if not sound.all():
+        matrix[~sound] = np.eye(n + m)
     solved = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
     size = (
         np.where(sound, np.maximum(size, SINGULAR_LOG_DETERMINANT), SINGULAR_LOG_DETERMINANT) if m else np.zeros(count)

@@ -27,6 +27,8 @@ class Grid:
     time: Vector
     _slopes: dict[int, tuple[Matrix, Matrix]] = field(default_factory=dict, repr=False)
     """Slopes of whole columns that are asked for again and again, by the identity of the columns, which are kept."""
+    _last: dict[bool, Places] = field(default_factory=dict, repr=False)
+    """The places that were asked for last, of either side: what is known of states there is known by them."""
 
     @property
     def cuts(self) -> Index:
@@ -45,8 +47,11 @@ class Grid:
         if outside.any():
             bad = wanted[outside][0]
             raise TrajectoryError(f"t = {bad:g} s is outside the run, which covers {first:g} s to {last:g} s")
-        wanted = np.clip(wanted, first, last)
-        if side in ("right", "after"):
+        wanted, behind = np.clip(wanted, first, last), side in ("right", "after")
+        known = self._last.get(behind)
+        if known is not None and np.array_equal(known.time, wanted):
+            return known
+        if behind:
             lower = np.searchsorted(self.time, wanted, side="right") - 1
             upper = np.minimum(lower + 1, len(self.time) - 1)
             lower = np.where(upper == lower, upper, lower)
@@ -59,7 +64,8 @@ class Grid:
             lower = np.where(exact, upper, lower)
         step = self.time[upper] - self.time[lower]
         theta = np.divide(wanted - self.time[lower], step, out=np.zeros_like(wanted), where=step > 0)
-        return Places(wanted, lower.astype(np.intp), upper.astype(np.intp), theta, step)
+        found = self._last[behind] = Places(wanted, lower.astype(np.intp), upper.astype(np.intp), theta, step)
+        return found
 
     def middles(self) -> tuple[Index, Places]:
         """The rows that begin an interval of positive length, and the middles of these intervals."""
