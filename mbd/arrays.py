@@ -26,9 +26,8 @@ def address_of(array: Any) -> int:
 
 def read_only(array: Any) -> Any:
     """The same numbers as an array that cannot be written to; where they came from they still can be."""
-    array = np.asarray(array)
-    if not array.flags.writeable:
-        return array
-    view = array.view()
-    view.setflags(write=False)
+    view = np.asarray(array)
+    if view.flags.writeable:
+        view = view.view()
+        view.flags.writeable = False
     return view

@@ -58,15 +58,19 @@ def given_state(
     mechanism = mechanism_of(model, backend, changed, inputs)
     values = mechanism.parameters_of(model, changed)
     manager = manager_of(mechanism, values)
-    fits(state, mechanism.equations, manager)
+    belongs(state, mechanism.equations, manager)
     return GivenState(mechanism, manager, values, changed)
 
 
 def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
-    """The state must be one of this model, of finite numbers."""
-    faults = malformed(start)
-    if faults:
+    """The state must be a state, and one of this model, of finite numbers."""
+    if faults := malformed(start):
         raise ModelError(faults)
+    belongs(start, equations, manager)
+
+
+def belongs(start: State, equations: Equations, manager: ActiveSetManager) -> None:
+    """The same of what is known to be a state."""
     names, anchors = equations.configuration.names, equations.n_anchors
     sizes = (len(start.q), len(start.v), len(start.z)) == (equations.n_q, equations.n_v, equations.n_z)
     if start.names != names or not sizes:
@@ -75,9 +79,10 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
             f"the model has {', '.join(names)} and {equations.n_z} states; assemble it from this model"
         )
     known = manager.names
-    contacts = dict.fromkeys([*sorted(start.mode.closed), *sorted(start.armed or ())])
-    if unknown := [nearest(name, known, "contact") for name in contacts if name not in known]:
-        raise UnknownNameError(unknown)
+    if start.mode.closed or start.armed:
+        contacts = dict.fromkeys([*sorted(start.mode.closed), *sorted(start.armed or ())])
+        if unknown := [nearest(name, known, "contact") for name in contacts if name not in known]:
+            raise UnknownNameError(unknown)
     if len(start.anchors) != anchors and (start.mode.closed or (len(start.anchors) and equations.turns)):
         raise ModelError(
             f"the start holds {len(start.anchors)} anchors of contacts and turns of cut joints, but the model has "
@@ -89,11 +94,8 @@ def fits(start: State, equations: Equations, manager: ActiveSetManager) -> None:
 
 def _bad_values(start: State, equations: Equations) -> list[str]:
     """Numbers of a state that are not finite, or that no posture has."""
-    bad = (
-        []
-        if all(map(math.isfinite, np.concatenate([start.q, start.v, start.z, start.anchors]).tolist()))
-        else _not_finite(start, equations)
-    )
+    values = np.concatenate([start.q, start.v, start.z, start.anchors])
+    bad = [] if all(map(math.isfinite, values.tolist())) else _not_finite(start, equations)
     bad += [f"the start has {fault}; take whole turns away" for fault in beyond_angles(equations, start.q)]
     return bad or [f"the start has {fault}" for fault in equations.configuration.misplaced(start.q, EQUAL_RTOL)]
 

@@ -86,13 +86,12 @@ def at_blocks(function: Function, blocks: Matrix, parameters: Vector | Matrix, o
 def at_inputs(function: Function, layout: Layout, inputs: Mapping[str, Any], parameters: Vector | Matrix) -> Matrix:
     """The same from arrays by kind: {'t': (R,), 'q': (R, n_q), …}; kinds that are absent are zero."""
     rows = len(inputs["t"])
-    columns = {layout.place(kind, 0): np.asarray(values).reshape(rows, -1) for kind, values in inputs.items()}
-    columns = {place: values for place, values in columns.items() if values.shape[1]}
+    columns = [(layout.place(kind, 0), np.asarray(values).reshape(rows, -1)) for kind, values in inputs.items()]
     blocks, out = np.zeros((min(rows, CHUNK), layout.size)), np.zeros((rows, function.size))
     for first in range(0, rows, CHUNK):
         part = slice(first, min(first + CHUNK, rows))
         count = part.stop - first
-        for place, values in columns.items():
+        for place, values in columns:
             blocks[:count, place : place + values.shape[1]] = values[part]
         at_blocks(function, blocks[:count], parameters[part] if parameters.ndim == 2 else parameters, out[part])
     return out

@@ -508,8 +508,10 @@ class Mechanism:
 
     def parameters_of(self, model: Any, values: Mapping[str, float]) -> Vector:
         """The same for a model of this mechanism, which is asked for what is folded only where it counts."""
-        folded = {} if values.keys() <= self.parameter_places.keys() else getattr(model, "parameters", {})
-        return self.parameters(values, folded)
+        places, own = self._places_and_values
+        if not values:
+            return own.copy()
+        return self.parameters(values, {} if values.keys() <= places.keys() else getattr(model, "parameters", {}))
 
     @property
     def parameter_places(self) -> Mapping[str, int]:

@@ -66,7 +66,7 @@ class NewmarkFamily(CompiledIntegrator):
         return type(self) is type(other) and vars(self) == vars(other)
 
     def __hash__(self) -> int:
-        return hash((type(self), *sorted(vars(self).items())))
+        return hash((type(self), frozenset(vars(self).items())))
 
     def __repr__(self) -> str:
         defaults = {"formulation": "ggl", "starting": "jerk", "tolerance": DEFAULT_TOLERANCE, "form": "endpoint"}

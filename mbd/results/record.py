@@ -182,16 +182,14 @@ class Record(LateFields):
         return extension_of(self.settings.get("between", HERMITE))
 
     def __post_init__(self) -> None:
-        count = len(self.time)
+        count, own = len(self.time), vars(self)
         if not self.phase.size:
-            object.__setattr__(self, "phase", np.zeros((count, self.phase.shape[1]), dtype=np.int8))
-        for name in ("q", "v", "z", "a", "s", "lam", "closed", "phase"):
-            shape = getattr(self, name).shape
-            if len(shape) != 2 or shape[0] != count:
+            own["phase"] = np.zeros((count, self.phase.shape[1]), dtype=np.int8)
+        for name in ("q", "v", "z", "a", "s", "lam", "closed", "phase", "time", "parameters"):
+            shape = own[name].shape
+            if (len(shape) != 2 or shape[0] != count) and name not in ("time", "parameters"):
                 raise ValueError(f"a record of {count} rows needs {name} of shape ({count}, n), got {shape}")
-
-        for name in ("time", "q", "v", "z", "a", "s", "lam", "closed", "phase", "parameters"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+            own[name] = read_only(own[name])
 
     def concluded(self, **verdict: Any) -> Record:
         """The same rows, which have been judged already, with other words: success, message, stats."""

@@ -111,7 +111,6 @@ class ManyRuns:
         v.noted_counts = v.counts.copy()
         v.n_whole_reals, v.n_whole_integers = len(stepper.reals), len(stepper.integers)
         v.n_counts = len(v.counts)
-        v.last_time, v.near_end = run.end, run.boundaries.near
         v.chunk_of_runs = v.chunk
 
     def __call__(self, starts: Matrix, parameters: Matrix | None = None, lines: int = 0) -> Ends:

@@ -192,12 +192,14 @@ class Run(RunData):
             if status == codes.NEW_MODE:
                 self.stepper.add_mode()
             elif status == codes.DONE:
-                save(self)
-                if circular := circular_laws(self.stepper):
-                    return f"t = {self.now:.9g} s: {circular}", ""
-                if not arrive(self, target):
+                circular = circular_laws(self.stepper)
+                if not circular and self.boundaries.is_end(target, self.end):  # what is there is left to who goes on
                     self.label = self.end
                     return "", f"reached t = {self.end:g} s"
+                save(self)
+                if circular:
+                    return f"t = {self.now:.9g} s: {circular}", ""
+                arrive(self, target)
             elif status == codes.EVENT:
                 save(self, self.events[known:])
                 self.ended = self._react(self.events[known:])
@@ -322,7 +324,7 @@ def _statistics(run: RunData, notes: Sequence[Note]) -> Callable[[], dict[str, A
         numbers["local_errors"] = float(run.kernel.error_sum)
     if run.kernel.n_cones > 0 and run.kernel.strategy == 1:
         numbers["cone_residual"] = float(run.kernel.cone_residual)
-    numbers["modes"] = len(run.stepper.modes)
+    numbers["modes"] = int(run.kernel.n_modes)
     numbers["compiled"] = run.stepper.compiled
     numbers["optimized"] = run.stepper.compiled and not run.stepper.provisional
     numbers["derive_and_compile_seconds"] = run.mechanism.seconds

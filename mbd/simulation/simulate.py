@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mbd.assembly.given_state import fits
+from mbd.assembly.given_state import belongs
 from mbd.assembly.machines import begun_in, require_past, stored_anew
 from mbd.assembly.manager import manager_of
 from mbd.assembly.turns import directed
@@ -262,7 +262,7 @@ def laid_out(
     mechanism = mechanism_of(model, options["backend"], changed)
     values = mechanism.parameters_of(model, changed)
     manager = manager_of(mechanism, values)
-    fits(start, mechanism.equations, manager)
+    belongs(start, mechanism.equations, manager)
     start = directed(mechanism, start)
     if changed != start.parameters or start.begins or len(start.anchors) != mechanism.layout.n_anchors:
         start, begun = begun_in(model, mechanism, start)

@@ -47,8 +47,8 @@ def kernel(A, n, m):
     places = {(int(i), int(j)) for i, j in np.argwhere(A != 0.0)}
     flat = flat_order(order(places, set(), n, size), places, n, n_rows, rows)
     return Kernel(
-        n=n, state=np.zeros(24, dtype=np.int64), n_modes=1, mode_order=np.array([1]),
-        orders=np.append(0, flat),
+        n=n, state=np.zeros(24, dtype=np.int64), limits=np.zeros(24, dtype=np.int64), n_modes=1,
+        mode_order=np.array([1]), orders=np.append(0, flat),
         rows=np.array([*rows, 0]), kkt=np.zeros(size * size), spare=np.full(2 * size * size + size, np.nan),
         pivots=np.zeros(size, dtype=np.int64),
     )  # fmt: skip

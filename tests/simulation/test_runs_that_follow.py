@@ -55,7 +55,7 @@ def test_a_run_after_others_is_the_same(seed, scheme, contact):
 
 
 def test_a_mechanism_with_one_mode_is_not_asked_for_it(monkeypatch):
-    """Its start is judged, then come the steps, and the last one: nothing else enters the kernel."""
+    """Its start is judged, then come the steps to the end on their grid: nothing else enters the kernel."""
     model = mbd.Model("pendulum")
     rod = mbd.Link("rod", 1.0, 1.0, 0.5, 0.1)
     model.connect(mbd.Revolute("hinge", model.ground.origin, rod.start))
@@ -69,7 +69,24 @@ def test_a_mechanism_with_one_mode_is_not_asked_for_it(monkeypatch):
     for _ in range(2):
         calls.clear()
         run = mbd.simulate(model, start, dt=1e-3, until=0.1)
-        assert (len(calls), run.stats["modes"], run.stats["steps"]) == (3, 1, 100)
+        assert (len(calls), run.stats["modes"], run.stats["steps"]) == (2, 1, 100)
+
+
+def test_a_run_is_not_asked_for_modes_that_earlier_ones_have_met(monkeypatch):
+    model, asked = kneed_walker(), []
+    start, add_mode = kneed_walker_start(model), stepper.Stepper.add_mode
+
+    def counted(self):
+        asked.append(self)
+        add_mode(self)
+
+    monkeypatch.setattr(stepper.Stepper, "add_mode", counted)
+    brief = mbd.simulate(model, start, dt=1e-3, until=1.0)
+    first = mbd.simulate(model, start, dt=1e-3, until=("right foot", 1.0))
+    assert len(asked) == max(brief.stats["modes"], first.stats["modes"]) > 1
+    asked.clear()
+    assert_same(mbd.simulate(model, start, dt=1e-3, until=1.0), brief)
+    assert not asked
 
 
 def test_arrays_are_taken_and_given_back():

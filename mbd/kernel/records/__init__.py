@@ -26,7 +26,7 @@ row_contact, row_friction, friction_row, friction_contact, normal, while_target,
 rows, columns, pivots, support, cone_rows, members, own_columns, event_kind, event_index
     by the kernel, in the loop that counts them, before they are read.
 mode_code, mode_order, orders
-    by `Stepper.add_mode`, for the mode whose number is below n_modes.
+    by `Stepper.add_mode`, for the mode whose number is below n_known.
 n_stored, n_logged
     compared with `capacity` and `event_capacity` before every step and once more where a row or a line is written.
 

@@ -13,7 +13,7 @@ class Runs(SchemeAbilities):
     until: float = place("calls")
     end: float = place("calls")
     next_jump: float = place("calls")  # when the equations jump next; NaN: they do not
-    last_time: float = place("calls")  # of the runs
+    last_time: float = place("calls")  # of the run, or the runs
     near_end: float = place("calls")  # two instants nearer than this are one there [s]
     before_time: float = place("calls")  # that `closed_before` belongs to
     limits: Integers = integers()

@@ -19,7 +19,6 @@ class Sizes(Record):
     n_machines: int  # discrete states with transitions
     n_impulses: int  # of the user, as contacts close
     n_cones: int  # groups of frictions that slide together, those of contacts in space and of ball joints
-    n_modes: int  # known ones
     capacity: int  # stored rows
     event_capacity: int
 

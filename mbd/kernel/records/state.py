@@ -42,7 +42,9 @@ class Model(SchemeAbilities):
     chart: Reals = reals()  # what programs of charts are called with
     chart_end: Reals = reals(lambda s: 3 * s.n_v)  # x, ẋ and ẍ of the candidate in the chart of the step
     chart_motion: Reals = reals(lambda s: 2 * s.n_v)  # v and v̇ of the interpolant
-    mode_key: Integers = integers(lambda s: MODE_CAPACITY * (s.n_contacts + s.n_rows + s.n_frictions))  # known modes
+    n_known: int = place("limits")  # modes with code, of which those that the run has met come first
+    n_modes: int = place("limits")  # how many these are
+    mode_key: Integers = integers(lambda s: MODE_CAPACITY * (s.n_contacts + s.n_rows + s.n_frictions))  # of each
     mode_code: Integers = integers(lambda s: PROGRAMS * MODE_CAPACITY)
     mode_order: Integers = integers(lambda s: MODE_CAPACITY)  # where the order of elimination begins, 0 for none
     orders: Integers = integers(lambda s: 1)  # all of them

@@ -40,7 +40,10 @@ def begin(K: Kernel) -> int:
             status = start_again(K)
     if status >= 0:
         return status
-    if K.time >= K.until - 1e-12 * K.dt:
+    near = 1e-12 * K.dt
+    if K.until >= K.end:
+        near = max(near, K.near_end)
+    if K.time >= K.until - near:
         return DONE
     if K.mode_id < 0:
         K.mode_id = find_mode(K)
@@ -101,8 +104,10 @@ def take_step(K: Kernel) -> int:
     t1 = part_end(K, on_grid)
     within = t1 < on_grid  # the step ends inside one of the grid, where guards are looked at
     cut = t1 > K.until - 1e-6 * K.step
-    if cut and K.until >= K.end:  # the caller decides: a step of the grid as in a longer run, or one cut
-        return LAST
+    if cut and K.until >= K.end:
+        if abs(t1 - K.until) > K.near_end:  # the caller decides: a step of the grid as in a longer run, or one cut
+            return LAST
+        cut = False
     t1 = K.until if cut else held_at_end(K, t1)
     # shorter where a joint turns far, sliding comes to rest or a timer is due
     wanted = t1

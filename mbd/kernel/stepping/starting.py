@@ -7,7 +7,7 @@ from mbd.kernel.contact.contact_log import NO_IMPULSE, log_event
 from mbd.kernel.contact.contact_modes import resolve_contact_modes
 from mbd.kernel.events.guards import update_armed, watch
 from mbd.kernel.hooks import scheme_start
-from mbd.kernel.records import Balance, DependentRows, Kernel, Switching
+from mbd.kernel.records import PROGRAMS, Balance, DependentRows, Integers, Kernel, Switching
 from mbd.kernel.stepping.conditioning import is_ill_conditioned, refine_accelerations
 from mbd.kernel.stepping.contact_step import find_pace
 from mbd.kernel.stepping.control import first_step
@@ -25,9 +25,12 @@ __all__ = ["find_mode", "restart", "restart_after_event", "still_dependent"]
 
 
 def find_mode(K: DependentRows) -> int:
-    """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet."""
+    """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet.
+
+    The run meets modes in an order of its own, whatever others there are from earlier runs.
+    """
     width = K.n_contacts + K.n_rows + K.n_frictions
-    for mode in range(K.n_modes):
+    for mode in range(K.n_known):
         same = True
         for c in range(K.n_contacts):
             same = same and K.mode_key[mode * width + c] == K.closed[c]
@@ -36,9 +39,23 @@ def find_mode(K: DependentRows) -> int:
         for f in range(K.n_frictions):
             phase = 2 if K.sticks[f] == 1 else (1 if K.slip[f] != 0.0 else 0)
             same = same and K.mode_key[mode * width + K.n_contacts + K.n_rows + f] == phase
+        if same and mode >= K.n_modes:
+            exchange(K.mode_key, mode, K.n_modes, width)
+            exchange(K.mode_code, mode, K.n_modes, PROGRAMS)
+            exchange(K.mode_order, mode, K.n_modes, 1)
+            K.n_modes += 1
+            return int(K.n_modes - 1)
         if same:
             return mode
     return -1
+
+
+def exchange(A: Integers, one: int, other: int, count: int) -> None:
+    """Let two parts of so many numbers change places."""
+    for i in range(count):
+        number = A[one * count + i]
+        A[one * count + i] = A[other * count + i]
+        A[other * count + i] = number
 
 
 def restart(K: Kernel) -> int:

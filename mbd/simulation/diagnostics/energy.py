@@ -236,10 +236,12 @@ class EnergyWatch(EnergyFindings):
         if np.maximum.reduce(way) <= MIN_MOTION:
             return False
         total = kinetic + potential
-        fallen = np.maximum.accumulate(potential[0] - potential)
         noise = EQUAL_RTOL * np.maximum.reduce(np.abs(self._seen[:, :2]), axis=None)
-        owned = kinetic[0] + fallen
         rise = total - total[0]
+        if run.kernel.strategy == 0 and np.maximum.reduce(np.abs(rise)) <= noise:
+            return False
+        fallen = np.maximum.accumulate(potential[0] - potential)
+        owned = kinetic[0] + fallen
         risen = ~(rise <= np.maximum(_telling_gain(run) * owned + noise, 2.0 * self._cleared))  # NaN is strange too
         sunk = rise < -REPORTED_SHARE * owned[-1] - noise
         if run.kernel.strategy == 1 and self._lifted(run) > REPORTED_NONSMOOTH_GAIN * float(np.max(owned)) + noise:

@@ -13,7 +13,7 @@ def residuals_of(stepper: Stepper, block: Vector) -> dict[str, float]:
     mode = int(stepper.kernel.mode_id)
     if mode < 0:
         return {}
-    code, n = stepper.modes[mode], stepper.kernel.n
+    code, n = stepper.code_of(mode), stepper.kernel.n
     out = np.zeros(n + 2 * len(code.active.rows) + 1)
     with np.errstate(all="ignore"):
         program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step

@@ -39,7 +39,7 @@ def remainder(stepper: Stepper) -> Remainder:
 
 def _balance(stepper: Stepper, block: Vector) -> Vector:
     """M v̇ + f + Bᵀλ and ż − s at the inputs in a block."""
-    code, n = stepper.modes[int(stepper.kernel.mode_id)], int(stepper.kernel.n)
+    code, n = stepper.code_of(int(stepper.kernel.mode_id)), int(stepper.kernel.n)
     out = np.zeros(n + 2 * len(code.active.rows) + 1)
     with np.errstate(all="ignore"):
         program = getattr(code.residual, "program", code.residual)  # a replay watches that of the step

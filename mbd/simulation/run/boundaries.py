@@ -59,11 +59,11 @@ class Boundaries:
 
     def break_at(self, jumps: Sequence[Jump], now: float, dt: float, follows_tolerance: bool) -> None:
         """End steps at these jumps from now on, but for those about as dense as the steps."""
-        self.breaks = _ends_of_steps(jumps, dt, follows_tolerance)
+        self.breaks = _ends_of_steps(jumps, dt, follows_tolerance) if jumps else ()
         self._find_place(now)
 
     def _find_place(self, now: float) -> None:
-        self.place = bisect_right(self.breaks, now, key=lambda jump: jump.right)
+        self.place = bisect_right(self.breaks, now, key=lambda jump: jump.right) if self.breaks else 0
 
     # what a run keeps of it -----------------------------------------------------------------------------------------
     def kept(self) -> tuple[Any, ...]:

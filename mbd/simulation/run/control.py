@@ -190,11 +190,9 @@ def begin_controllers(run: RunData) -> None:
             boundaries.count(controller)
 
 
-def arrive(run: RunData, target: float) -> bool:
-    """Do what is due at a boundary; False at the end of the run, where it is left to a run that goes on."""
+def arrive(run: RunData, target: float) -> None:
+    """Do what is due at a boundary before the end of the run."""
     boundaries = run.boundaries
-    if boundaries.is_end(target, run.end):
-        return False
     jump = boundaries.ahead
     if jump is not None and jump.left <= target:
         boundaries.place += 1
@@ -209,7 +207,6 @@ def arrive(run: RunData, target: float) -> bool:
         if controller.period is not None and boundaries.sample(controller) <= target:
             _call(run, controller)
             boundaries.count(controller)
-    return True
 
 
 def call_controllers(run: RunData, name: str) -> None:

@@ -151,6 +151,7 @@ class RunData:
         self.turns = _TurnCounter()
         self.integrator = integrator
         self.boundaries = Boundaries(controllers, start.time, dt, end)
+        self.kernel.last_time, self.kernel.near_end = end, self.boundaries.near
         self.begins_behind_jump = False
         self._find_breaks(start.time)
         self.damage = ""  # of the memory of the start

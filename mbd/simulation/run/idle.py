@@ -23,7 +23,10 @@ def stepper_of(
 ) -> Stepper:
     """A stepper for a run, as if it were new: one that an earlier run of this kind has left, where there is one."""
     key = _key(kind, manager, integrator, dt, options)
-    found: Stepper | None = None if key is None else mechanism.idle.pop(key, None)
+    try:
+        found: Stepper | None = None if key is None else mechanism.idle.pop(key, None)
+    except TypeError:  # it has no hash
+        found = key = None
     if found is None:
         found = kind(mechanism, manager, integrator, parameters, dt, options)
         found.key = key
@@ -51,9 +54,4 @@ def _key(
     if own_scheme(integrator) is NO_SCHEME:
         return None
     own = tuple(item for item in options.items() if item[0] != "end")
-    key = (kind, integrator, *integrator.numbers().items(), manager.trivial, dt, *own)
-    try:
-        hash(key)
-    except TypeError:
-        return None
-    return key
+    return (kind, integrator, *integrator.numbers().items(), manager.trivial, dt, *own)

@@ -1,6 +1,7 @@
 """What lets a run go on as if it had never been cut: written into its final state, read by the run that goes on."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from operator import itemgetter
 
@@ -28,12 +29,14 @@ class Unseen:
     Until then nobody can have changed it, so that a run of the same mechanism takes it up unexamined.
     """
 
-    def __init__(self, memory: Memory, mechanism: Mechanism, block: Vector) -> None:
-        self.memory, self.mechanism, self.block = memory, mechanism, block
+    def __init__(self, memory: Memory, mechanism: Mechanism, now: float, acting: Sequence[int]) -> None:
+        self.memory, self.mechanism, self.now, self.acting = memory, mechanism, now, acting
 
     def __call__(self) -> Memory:
-        vars(self.memory)["digest"] = _digest(self.mechanism, self.block, self.memory.parameters)
-        return sealed(self.memory)
+        memory, (q, y) = self.memory, np.split(self.memory.place, [self.mechanism.layout.n_q])
+        block = self.mechanism.block(self.now, q, y, memory.anchors, self.acting)
+        vars(memory)["digest"] = _digest(self.mechanism, block, memory.parameters)
+        return sealed(memory)
 
 
 def memory_of(run: RunData, time: float) -> Unseen:
@@ -50,7 +53,7 @@ def memory_of(run: RunData, time: float) -> Unseen:
         run.manager.mode(run.kernel.closed[: run.kernel.n_contacts]),
         run.kernel.anchors[: run.kernel.n_anchors].copy(),
     )  # fmt: skip
-    return Unseen(memory, run.mechanism, _block(run))
+    return Unseen(memory, run.mechanism, run.now, run.manager.penalties(run.kernel.closed[: run.kernel.n_contacts]))
 
 
 def _place(run: RunData) -> Vector:

@@ -1,6 +1,6 @@
 """The kernel's arrays for one run, and the call into the kernel, compiled or interpreted."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,7 @@ from mbd.integrators.stepping import fill_coefficients, memory_lengths, own_sche
 from mbd.kernel import codes
 from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.contact.contact_log import room_to_log
-from mbd.kernel.records import PROGRAMS, Kernel
+from mbd.kernel.records import PROGRAMS, TABLE, Kernel
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.results.driving import driving_rows
@@ -68,6 +68,16 @@ class InitialArrays:
             self._places = [np.flatnonzero(room) for room in rooms]
             self._numbers = [room[places] for room, places in zip(rooms, self._places, strict=True)]
 
+    def keep(self, rooms: list[Any], shelf: int, places: Iterable[slice], arrays: Mapping[str, Any]) -> None:
+        """From now on some of the numbers as they are, and arrays in the place of others."""
+        self._values |= arrays
+        numbers = np.zeros_like(rooms[shelf])
+        numbers[self._places[shelf]] = self._numbers[shelf]
+        for place in places:
+            numbers[place] = rooms[shelf][place]
+        self._places[shelf] = np.flatnonzero(numbers)
+        self._numbers[shelf] = numbers[self._places[shelf]]
+
     def let_go(self, kernel: Kernel, renewed: Iterable[str] = ()) -> None:
         """Put the record back, without whatever arrays a run has put into it, some of those with names in `renewed`."""
         values = vars(kernel)
@@ -75,9 +85,8 @@ class InitialArrays:
         values.clear()
         values.update(self._values)
 
-    def restore(self, kernel: Kernel, rooms: list[Any]) -> None:
-        """Put everything back."""
-        self.let_go(kernel)
+    def restore(self, rooms: list[Any]) -> None:
+        """Put the numbers back."""
         for room, places, numbers in zip(rooms, self._places, self._numbers, strict=True):
             room[:] = 0
             room[places] = numbers
@@ -132,8 +141,9 @@ class Stepper:
         self.functions.append(mechanism.free_rates() if without_rows else None)
         self.kernel.treelike = int(self.functions[-1] is not None)
         self.kernel.code = self.functions
-        self.modes: list[Any] = []
+        self.modes: list[Any] = []  # in the order in which their code was made
         self._n_of_modes = 0  # functions of these
+        self._kept = 0, 0  # modes that runs begin with, and functions of these
         self.dependent: dict[int, tuple[int, ...]] = {}
         self._table: CallTable | None = None
         self._provisional = False  # whether addresses in the table may have changed
@@ -152,17 +162,30 @@ class Stepper:
         return sum(map(len, self.shelves.rooms))
 
     def let_go(self) -> None:
-        """Keep no arrays but those of its own while nobody runs."""
+        """Keep no arrays but those of its own, and what modes are known, while nobody runs."""
         assert self._fresh is not None
+        self._keep_modes(self._fresh)
         self._fresh.let_go(self.kernel, () if self._table is None else self._table.renewed)
+
+    def _keep_modes(self, fresh: InitialArrays) -> None:
+        """Let the next run know the modes of this one, where nothing of them belongs to this run alone."""
+        v, own, known = self.kernel, self.shelves.arrays, len(self.modes)
+        alone = not (v.n_rows or v.n_contacts or v.n_frictions)  # the only one has the only order
+        same = v.mode_code is own["mode_code"] and (v.orders is own["orders"] or alone)
+        if type(self) is Stepper and known != self._kept[0] and known == v.n_known and same and not self.dependent:
+            number = self.place_of("limits").start + TABLE.places["n_known"][1]
+            places = [*map(self.place_of, ("mode_key", "mode_code", "mode_order")), slice(number, number + 1)]
+            fresh.keep(self.shelves.rooms, 3, places, {"orders": v.orders})
+            self._kept = known, self._n_of_modes
 
     def begin_again(self, parameters: Vector, end: float) -> None:
         """Make everything as it was before the run that is over, but for parameters and the end of the next one."""
         assert self._fresh is not None
         v = self.kernel
-        self._fresh.restore(v, self.shelves.rooms)
-        del self.functions[len(self.functions) - self._n_of_modes :]
-        self._n_of_modes, self.modes, self.dependent, v.n_modes = 0, [], {}, 0
+        self._fresh.restore(self.shelves.rooms)
+        known, count = self._kept
+        del self.functions[len(self.functions) - self._n_of_modes + count :]
+        self._n_of_modes, self.modes, self.dependent = count, self.modes[:known], {}
         if len(parameters) == len(v.params):
             v.params[:] = parameters
         elif len(parameters):
@@ -178,7 +201,7 @@ class Stepper:
         n_contacts, n_guards = layout.n_contacts, len(self.manager.guards)
         K = Kernel(
             n_q=layout.n_q, n_v=layout.n_v, n=layout.n, n_rows=layout.n_rows, n_anchors=layout.n_anchors,
-            n_contacts=n_contacts, n_guards=n_guards, n_modes=0,
+            n_contacts=n_contacts, n_guards=n_guards,
             n_frictions=layout.n_frictions, n_machines=len(self.manager.machines),
             n_impulses=len(self.manager.impulses),
             n_cones=len({f.group for f in self.manager.frictions if f.group}),
@@ -276,7 +299,7 @@ class Stepper:
             if int(v.n_steps) == 0:
                 raise
             raise MemoryLimitError(f"t = {float(v.time):.9g} s: {refused}") from refused  # what has run is kept
-        count, width = int(v.n_modes), v.n_contacts + v.n_rows + v.n_frictions
+        count, width = int(v.n_known), v.n_contacts + v.n_rows + v.n_frictions
         phases = np.maximum(2 * (sticks == 1), slip != 0.0) if v.n_frictions else sticks
         if PROGRAMS * (count + 1) > len(v.mode_code):
             v.mode_key = np.concatenate([v.mode_key, np.zeros_like(v.mode_key)])
@@ -302,7 +325,12 @@ class Stepper:
                 self.dependent.setdefault(
                     row, tuple(int(k) for k in np.flatnonzero(np.abs(dependence[row]) > MIN_COEFFICIENT))
                 )
-        v.n_modes = count + 1  # at last: an interrupt may come between any two lines
+        v.n_known = count + 1  # at last: an interrupt may come between any two lines
+
+    def code_of(self, mode: int) -> Any:
+        """The code of a mode by its number in the kernel."""
+        residual = self.functions[self.kernel.mode_code[PROGRAMS * mode + 1]]
+        return next(code for code in self.modes if code.residual is residual)
 
     def _maker(self) -> Any:
         """What makes the code of a mode, no more of it than the scheme calls."""
@@ -340,7 +368,7 @@ class Stepper:
         if v.n_kkt >= MIN_UNKNOWNS and v.n_modes == 0 and v.orders[0] == 0:
             order = self.mechanism.order(self.manager.active_rows(v.closed[: v.n_contacts]))
             v.orders = v.orders if order is None else np.concatenate([[1], order])
-        if v.n_modes == 0 and not (v.n_rows or v.n_contacts or v.n_frictions):
+        if v.n_known == 0 and not (v.n_rows or v.n_contacts or v.n_frictions):
             self.add_mode()  # the only one there is, which the kernel need not ask for
         if v.auto:
             v.strategy = int(v.fallback > 0)

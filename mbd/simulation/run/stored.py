@@ -23,7 +23,7 @@ def record_of(run: RunData, table: Matrix, events: Sequence[EventRecord] = ()) -
     parts |= {"closed": _bytes(parts["closed"], np.uint8), "phase": _bytes(parts["phase"], np.int8)}
     return Record(
         equations=equations, parameters=run.first_parameters,
-        parameter_names=[parameter.name for parameter in equations.parameters], **parts,
+        parameter_names=[*run.mechanism.parameter_places], **parts,
         events=events, settings=run.settings, parameter_changes=run.parameter_changes, start=run.start,
     )  # fmt: skip
 
