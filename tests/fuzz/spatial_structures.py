@@ -221,7 +221,7 @@ def _round(rng: random.Random) -> Made:
     model = mbd.Model("round", gravity=(0.0, -9.81, 0.0))
     r = rng.uniform(0.05, 0.3)
     across, along = rng.uniform(0.2, 0.4) * r * r, rng.uniform(0.3, 0.5) * r * r
-    body = mbd.RigidBody("body", rng.uniform(0.3, 2.0), (across, across, along))
+    body = mbd.RigidBody("body", rng.uniform(0.3, 2.0), (across, across, min(along, 2.0 * across)))
     model.connect(mbd.Free("float", model.ground.origin, body.origin))
     plane = any_plane(rng, 0.0)
     drop = rng.uniform(0.005, 0.1)

@@ -12,11 +12,12 @@ from mbd.equations import kinematics
 from mbd.joints.losses.viscous import Viscous
 from mbd.results.columns import ModelColumns
 from tests.fuzz import batch, forms
+from tests.fuzz.bodies import mass_of
 from tests.fuzz.forms import Form
 from tests.fuzz.geometry import Signal, inverse, product, shift, turn, twist
 from tests.fuzz.judge import between, judge
 from tests.fuzz.scenes import STRUCTURES, scene
-from tests.fuzz.structures import DRIVEN, SPACE
+from tests.fuzz.structures import DRIVEN, SPACE, structure
 from tests.fuzz.verdict import run_of, verdict
 from tests.helpers import altered
 
@@ -127,6 +128,16 @@ def test_the_rows_of_a_run_that_ends_at_a_contact_without_a_force_keep_the_laws(
     """A foot that sticks whatever its force, in index 3: neither closed nor open; the row before has its forces."""
     told = verdict(24029)
     assert told["kind"] == "error", told
+
+
+def test_bodies_of_scenes_in_space_may_be_made():
+    """Half the trace less the tensor is a second moment of mass: no moment exceeds the sum of the other two."""
+    for number in range(SPACE, SPACE + 400):
+        model = structure(number).model
+        for body in model.bodies.values():
+            if body is not model.ground:
+                inertia = mass_of(body, model.parameters).inertia
+                assert np.linalg.eigvalsh(0.5 * np.trace(inertia) * np.eye(3) - inertia)[0] > -1e-15, number
 
 
 def test_a_scene_is_made_again_from_its_number():
