@@ -61,6 +61,11 @@ def follow_solution(K: Equations, m: int) -> None:
     """K.rhs ← A⁻¹ K.rhs with these factors, and the derivatives of both."""
 
 
+def follow_stage(K: Kernel, h: float, t: float, stage: int) -> bool:
+    """The rates of a stage of an explicit step with their derivatives, where straight-line code has them."""
+    return False
+
+
 def follow_move(K: Steps, h: float, weights: int, count: int) -> None:
     """h times the weighted slopes of the first stages into K.spare."""
 

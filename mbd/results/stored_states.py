@@ -146,17 +146,22 @@ class StoredStates:
                     found[row] = min(found[row], lefts[place])
         return found
 
-    @cached_property
-    def anchors(self) -> Matrix:
-        """What each contact captured where it closed or began to stick, or holds from the start, until it opens."""
-        start, wrapped = self.record.start, self.equations.wrapped
+    def held_by_machines(self) -> Matrix:
+        """Of `anchors` those of machines, and turns that were counted before the run; the others are 0."""
+        start = self.record.start
         held = np.zeros((len(self.record.time), self.equations.n_anchors))
-        if not held.size:
-            return held
         counts = [turn.anchor for turn in self.equations.turns]
         if counts and start is not None and len(start.anchors) == held.shape[1]:
             held[:, counts] = start.anchors[counts]
         self._follow_machines(held)
+        return held
+
+    @cached_property
+    def anchors(self) -> Matrix:
+        """What each contact captured where it closed or began to stick, or holds from the start, until it opens."""
+        start, wrapped, held = self.record.start, self.equations.wrapped, self.held_by_machines()
+        if not held.size:
+            return held
         rows = self.record.rows(held)
         for number, contact in enumerate(self.equations.contacts):
             closed = self.record.closed[:, number].astype(bool)

@@ -54,7 +54,7 @@ class MadeRun(TangentRun):
         wanted = directions(mechanism, ways)
         programs = programs_of(mechanism, wanted, values)
         self.moved_with_jump = lambda: None
-        self.begin_tangents(programs.places)
+        self.begin_tangents(programs.directed)
         super().at_start()
         point, self.stepper.follows = save(self), False
         status, self.stepper.follows = call(self, self.now, np.inf), True

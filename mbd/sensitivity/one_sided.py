@@ -7,9 +7,11 @@ end, happens within the run on one side of it and not on the other.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.projection import project
@@ -38,19 +40,32 @@ class _Watched:
     """Guards of a row: values, their changes in every direction and in time, and the sums of the terms of these."""
 
     def __init__(self, programs: Programs, motion: Motion, mode: Mode, rates: Rates) -> None:
-        c, self.equations, self.mode = programs.columns, programs.equations, mode
-        self.values, slopes = programs.watched(motion.at(mode, rates.rate, rates.lam))
-        Z = motion.tangent.stacked(c, rates.of_rate, rates.of_lam)
-        flow, still = np.zeros(c.count), np.zeros(c.count)
-        flow[c.x], flow[c.y], flow[c.t] = motion.y[: c.n_v], rates.rate, 1.0
-        still[c.y], still[c.t] = motion.y, 1.0
-        self.growth, self.terms, self.speeds = (
-            slopes @ flow,
-            np.abs(slopes) @ np.abs(flow),
-            np.abs(slopes) @ np.abs(still),
-        )
-        changes = np.max(np.abs(slopes @ Z), axis=1, initial=0.0)
-        self.moves = changes > EQUAL_RTOL * np.max(np.abs(slopes) @ np.abs(Z), axis=1, initial=0.0)
+        self.columns, self.equations, self.mode = programs.columns, programs.equations, mode
+        self.values, self.slopes = programs.watched(motion.at(mode, rates.rate, rates.lam))
+        self.at, self.flow = (motion, rates), np.zeros(self.columns.count)
+        c = self.columns
+        self.flow[c.x], self.flow[c.y], self.flow[c.t] = motion.y[: c.n_v], rates.rate, 1.0
+        self.growth = self.slopes @ self.flow
+
+    @cached_property
+    def terms(self) -> Vector:
+        """Sums of the terms of their changes in time."""
+        return np.asarray(np.abs(self.slopes) @ np.abs(self.flow))
+
+    @cached_property
+    def speeds(self) -> Vector:
+        """Sums of the terms of what is a velocity."""
+        still = np.zeros(self.columns.count)
+        still[self.columns.y], still[self.columns.t] = self.at[0].y, 1.0
+        return np.asarray(np.abs(self.slopes) @ np.abs(still))
+
+    @cached_property
+    def moves(self) -> NDArray[np.bool_]:
+        """Whether any direction changes them."""
+        motion, rates = self.at
+        Z = motion.tangent.stacked(self.columns, rates.of_rate, rates.of_lam)
+        changes = np.max(np.abs(self.slopes @ Z), axis=1, initial=0.0)
+        return np.asarray(changes > EQUAL_RTOL * np.max(np.abs(self.slopes) @ np.abs(Z), axis=1, initial=0.0))
 
     def firing(self, within: float) -> Iterator[str]:
         """Names of the contacts and events that fire within so short a time, or would do if nothing were changed."""
@@ -73,8 +88,8 @@ class _Watched:
 
     def _crosses(self, k: int, direction: int, within: float) -> bool:
         growth = float(self.growth[k])
-        fast = abs(growth) > GRAZE * self.terms[k] and (direction == 0 or direction * growth > 0.0)
-        return fast and bool(self.moves[k]) and abs(self.values[k]) <= abs(growth) * within
+        due = abs(self.values[k]) <= abs(growth) * within and (direction == 0 or direction * growth > 0.0)
+        return bool(due and abs(growth) > GRAZE * self.terms[k] and self.moves[k])
 
     def starting(self) -> Iterator[str]:
         """Names of the frictions that slide although they are at rest, in directions that change their velocity."""

@@ -93,7 +93,7 @@ def tangent_run(
             run.every_row = visit is not None
             run.differentiated_reset = _reset(rows, programs, charted, start.p[:, some], run)
             run.moved_with_jump = partial(_moved_with_jump, rows, programs, start.p[:, some], run)
-            run.begin_tangents(programs.places)
+            run.begin_tangents(programs.directed)
             run.at_start()
             seed(run, charted, rows.record.q[0], start, restitutions, some)
             _require_same(rows, run)

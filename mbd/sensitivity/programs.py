@@ -19,9 +19,10 @@ block (`_chart_columns`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ from mbd.tape.node import Node, Scalar
 
 __all__ = ["Columns", "Programs", "Sparse", "State", "watched_nodes"]
 
+EMPTY: Mapping[int, int] = MappingProxyType({})
 RESULT_SEPARATOR = "\n"
 """Between names of results that one program lists; no name has it."""
 
@@ -136,10 +138,14 @@ class Programs:
     ----------
     places : numbers of the parameters
     values : of all parameters, then of the tables, as a run holds them
+    alone : numbers of directions that each change one of these parameters, by 1, and no other, by its number
     """
 
-    def __init__(self, mechanism: Mechanism, places: Sequence[int], values: Vector) -> None:
+    def __init__(
+        self, mechanism: Mechanism, places: Sequence[int], values: Vector, alone: Mapping[int, int] = EMPTY
+    ) -> None:
         self.mechanism, self.places = mechanism, tuple(places)
+        self.directed = tuple((place, alone.get(place, -1)) for place in self.places)
         self.equations, self.layout = mechanism.equations, mechanism.layout
         count = len(self.places)
         self.columns = mechanism.kept((Columns, count), lambda: Columns.of(self.equations, self.layout, count))

@@ -142,12 +142,14 @@ class RunRows:
         """What contacts and machines hold at every row; 0 where nothing that is watched or limits friction reads it."""
         equations = self.mechanism.equations
 
-        def reads() -> bool:
+        def last() -> int:
             nodes = live([*watched_nodes(equations), *(friction.limit for friction in equations.frictions)])
-            return any(node.op == "input" and node.data[0] == "anchor" for node in nodes)
+            return max((node.data[1] for node in nodes if node.op == "input" and node.data[0] == "anchor"), default=-1)
 
-        shape = len(self.record.time), self.mechanism.layout.n_anchors
-        return self.stored.anchors if self.mechanism.kept(RunRows, reads) else np.zeros(shape)
+        read = self.mechanism.kept(RunRows, last)
+        if read < 0:
+            return np.zeros((len(self.record.time), self.mechanism.layout.n_anchors))
+        return self.stored.held_by_machines() if read < equations.n_held_by_machines else self.stored.anchors
 
     @cached_property
     def changes(self) -> dict[int, Vector]:

@@ -5,6 +5,7 @@ least in the metric of the mass matrix until the rows on positions and the gaps 
 where they are then; then velocities.
 """
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
@@ -20,6 +21,7 @@ from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.notes import doubt
 from mbd.sensitivity.motion import First, Mode, Motion, Tangent
 from mbd.sensitivity.programs import Programs
+from mbd.sensitivity.tangent.printer import LANES
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names
 from mbd.sensitivity.transitions import stored_at_start
 
@@ -69,9 +71,14 @@ def unknown_name(equations: Equations, name: str, known: Collection[str], what: 
 
 def programs_of(mechanism: Mechanism, wanted: Sequence[Direction], values: Vector) -> Programs:
     """The programs for the parameters that some directions change, at these values of all parameters."""
-    known = _numbers(mechanism)
-    names = dict.fromkeys(name for each in wanted for name in each.parameters or {})
-    return Programs(mechanism, [known[name] for name in names], values)
+    known, alone = _numbers(mechanism), dict[int, int]()
+    counts = Counter(name for each in wanted for name in each.parameters or ())
+    if len(wanted) < LANES:  # else several runs share them
+        for k, each in enumerate(wanted):
+            for name, rate in (each.parameters or {}).items():
+                if len(each.parameters or ()) == counts[name] == rate == 1:
+                    alone[known[name]] = k
+    return Programs(mechanism, [known[name] for name in counts], values, alone)
 
 
 def _numbers(mechanism: Mechanism) -> dict[str, int]:

@@ -14,7 +14,7 @@ from mbd.kernel.records import TABLE
 from mbd.sensitivity.tangent.build import entry, plain_entry
 from mbd.sensitivity.tangent.follow_coupled_stages import MAX_COUPLED
 from mbd.sensitivity.tangent.interpreted import Table
-from mbd.sensitivity.tangent.printer import LANES
+from mbd.sensitivity.tangent.printer import HELD_ARRAYS, LANES
 from mbd.sensitivity.tangent.programs import (
     Derivative,
     derivatives_of_modes,
@@ -33,8 +33,10 @@ DIRECTIONS = LANES - 1
 """Directions of one run: the last derivative is that by the size of a step."""
 WITH_DERIVATIVES = frozenset(TABLE.real_arrays) - {"shift1"}
 """Arrays that have derivatives of their own: `shift1` is a part of another."""
-WRITTEN_FIRST = frozenset(("store", "log", "starts", "spare", "out", "kkt", "acc", "rhs", "work", "coupled"))
-"""Large arrays whose derivatives are written before they are read: rows, events, and what is computed at once."""
+WRITTEN_FIRST = HELD_ARRAYS.union(("store", "log", "starts", "spare", "out", "kkt", "acc", "rhs", "work", "coupled"))
+"""Large arrays that have no derivatives, or whose derivatives are written before they are read: rows, events, and what
+is computed at once.
+"""
 Lanes = NDArray[np.float64]
 
 
@@ -70,7 +72,7 @@ class TangentStepper(Stepper):
     rooms : of derivatives, for each shelf of arrays (see `mbd.simulation.run.shelves`); those of integers are empty
     """
 
-    places: Sequence[int] | None = None
+    places: Sequence[tuple[int, int]] | None = None
     follows = True
     """Whether compiled code carries derivatives; not where values alone are asked for."""
 
@@ -143,8 +145,8 @@ class TangentStepper(Stepper):
         assert found is not None
         return found
 
-    def differentiate_by(self, places: Sequence[int]) -> None:
-        """Parameters that have derivatives."""
+    def differentiate_by(self, places: Sequence[tuple[int, int]]) -> None:
+        """Parameters that have derivatives, see `mbd.sensitivity.tangent.programs.Derivative`."""
         common = len(self.functions) - self._n_of_modes
         if tuple(places) != self.places:
             self.places, self._of_modes = tuple(places), {}
@@ -224,7 +226,7 @@ class TangentRun(Run):
             for name, size in sizes.items()
         }
 
-    def begin_tangents(self, places: Sequence[int]) -> None:
+    def begin_tangents(self, places: Sequence[tuple[int, int]]) -> None:
         """Before the start is put into the kernel's arrays: which parameters are differentiated by."""
         self.kernel.last_time, self.kernel.near_end = self.end, self.boundaries.near
         self.of_times: list[Lanes] = []
@@ -236,7 +238,7 @@ class TangentRun(Run):
     def seed(self, of_parameters: Matrix, of_q: Matrix, of_y: Matrix, of_anchors: Matrix, of_e: Matrix) -> None:
         """Derivatives of the start; of q number by number."""
         own, width = self.stepper, of_q.shape[1]
-        own.tangent("params")[list(own.places or ()), :width] = of_parameters
+        own.tangent("params")[[place for place, _ in own.places or ()], :width] = of_parameters
         for name, given in (("q", of_q), ("y", of_y), ("anchors", of_anchors), ("restitution", of_e)):
             own.tangent(name)[: len(given), :width] = given
 

@@ -86,3 +86,18 @@ def test_straight_line_code_and_matrices_give_the_same_derivatives(made, monkeyp
         assert np.all(np.abs(found[1] - found[0]) <= 1e-9 * size), scheme
         assert np.all(np.abs(found[2] - found[0]) <= 1e-9 * size), scheme
     assert sum(answered) >= len(SCHEMES) and len(replaced) == 2 * len(answered)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+@pytest.mark.parametrize("made", [walker, sleigh, partial(scene, 8)], ids=["walker", "sleigh", "scene 8"])
+def test_derivatives_by_several_parameters_are_sums_of_those_by_each(made, scheme):
+    """What one direction alone changes stands ready in its lane; sums of directions are multiplied."""
+    model, start, settings = made()
+    names = [name for name in model.parameters if name.endswith((".mass", ".inertia", "gravity.x", "gravity.y"))][:6]
+    rates = np.random.default_rng(len(names)).uniform(-1.0, 1.0, (3, len(names)))
+    groups = [{f"way {k}": dict(zip(names, line.tolist(), strict=True))} for k, line in enumerate(rates)]
+    single = mbd.sensitivities(model, start, scheme, wrt=[start.names[0], *names], hold=[], **settings)
+    mixed = mbd.sensitivities(model, start, scheme, wrt=[*groups, names[0], start.names[0]], hold=[], **settings)
+    wanted = np.column_stack([single.matrix[:, 1:] @ rates.T, single.matrix[:, 1], single.matrix[:, 0]])
+    size = np.abs(single.matrix).max(axis=1, keepdims=True) + np.abs(single.matrix).max() * 1e-6
+    assert np.all(np.abs(mixed.matrix - wanted) <= 1e-10 * size)

@@ -30,7 +30,7 @@ from mbd.kernel.stepping.restart import (
     fill_block,
     measure_accepted,
 )
-from mbd.kernel.tangent_rules import follow_move, follow_rates, is_differentiated
+from mbd.kernel.tangent_rules import follow_move, follow_rates, follow_stage, is_differentiated
 
 __all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
 
@@ -79,6 +79,8 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         fill_block(K, K.time, K.q, K.y)
     for s in range(1, stages):
         t = K.time + K.tableau[at_nodes + s] * h
+        if follow_stage(K, h, t, s):
+            continue
         explicit_move(K, h, s * stages, s)
         if not (free and stage_in_chart(K, t, s)):
             place_in_chart(K, s)
@@ -87,8 +89,7 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
                 return status
         for i in range(n):
             K.stages[s * width + n_v + i] = K.jump[i]
-            if i < n_v and K.vector == 1:
-                K.stages[s * width + i] = K.y1[i]
+        note_velocities(K, s)
     explicit_move(K, h, at_end, stages)
     place_in_chart(K, stages)
     if K.n_active > 0:
@@ -113,11 +114,12 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
         K.aux1[i] = K.jump[i]
         K.block[K.o_a + i] = K.jump[i]
         K.stages[stages * width + n_v + i] = K.jump[i]
-        if i < n_v and K.vector == 1:
-            K.stages[stages * width + i] = K.y1[i]
+    note_velocities(K, stages)
     for k in range(K.n_rows):
         K.lam1[k] = K.impulse[k]
         K.block[K.o_lam + k] = K.impulse[k]
+    if is_differentiated():  # of the error only the values count, which were judged
+        return 0
     if K.n_active > 0:
         note_row_norms(K)
     explicit_error(K, h)
@@ -129,6 +131,12 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
             find_sizes(K)
             return NOT_CONVERGED
     return 0
+
+
+def note_velocities(K: Steps, stage: int) -> None:
+    """The velocities at a stage as its slope of positions, where coordinates add."""
+    for i in range(K.n_v if K.vector == 1 else 0):
+        K.stages[stage * (K.n_v + K.n) + i] = K.y1[i]
 
 
 def explicit_move(K: Steps, h: float, weights: int, count: int) -> None:

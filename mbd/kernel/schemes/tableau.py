@@ -28,8 +28,9 @@ class Tableau:
         return len(self.nodes)
 
     def flat(self) -> Vector:
-        """What the kernel needs, one after the other: a, b, c, the error, the second one."""
-        return np.concatenate([self.weights.ravel(), self.end, self.nodes, self.error, self.second])
+        """What the kernel needs, one after the other: a, b, c, the error, the second one; a² and b a, of positions."""
+        twice = np.vstack([self.weights, self.end]) @ self.weights
+        return np.concatenate([self.weights.ravel(), self.end, self.nodes, self.error, self.second, twice.ravel()])
 
 
 def weights_at(stages: int, entries: Mapping[tuple[int, int], float]) -> Matrix:

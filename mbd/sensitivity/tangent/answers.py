@@ -1,8 +1,9 @@
 """Derivatives of a program from those of its inputs: straight-line code for all directions at once.
 
 They are linear in some inputs 'lane' k, the derivatives of its inputs: nodes that these lead to are computed for every
-direction, what multiplies them once, by the code of the program (`programs`). A system of equations makes its answer of
-the derivatives of its residuals.
+direction, what multiplies them once, by the code of the program (`programs`). What parameters give that one direction
+each changes alone, by 1, stands ready direction by direction: inputs 'ready' k. A system of equations makes its answer
+of the derivatives of its residuals.
 """
 
 from __future__ import annotations
@@ -33,9 +34,9 @@ Operand = tuple[str, Any]
 class Answer:
     """Code of an answer.
 
-    factors : what derivatives are multiplied by, computed before
+    factors : what derivatives are multiplied by, computed before; behind them stand derivatives that are ready
     lines, results : operations, and what is written behind `first` numbers without derivatives: operands are ('lane',
-        k), ('factor', k), ('line', k) or ('number', value)
+        k), ('ready', k), ('factor', k), ('line', k) or ('number', value)
     address : ``code(factors, derivatives of the block, of parameters, of the outputs)``; 0 where there is no code
     """
 
@@ -45,14 +46,14 @@ class Answer:
     first: int
     address: int
 
-    def taken(self, factors: Vector, of: Matrix) -> Matrix:
-        """The answer in Python, from the derivatives of inputs."""
+    def taken(self, factors: Vector, ready: Matrix, of: Matrix) -> Matrix:
+        """The answer in Python, from derivatives that are ready and those of inputs."""
         known = list[Any]()
 
         def one(kind: str, data: Any) -> Any:
             if kind == "number":
                 return data
-            return of[data] if kind == "lane" else factors[data] if kind == "factor" else known[data]
+            return {"lane": of, "ready": ready}.get(kind, factors if kind == "factor" else known)[data]
 
         for word, operands in self.lines:
             known.append(PLAIN[word](*(one(*each) for each in operands)))
@@ -83,14 +84,14 @@ def answer_of(
         return factors[node.index]
 
     for node in live(outputs):
-        if node.op == "input" and node.data[0] == "lane":
-            known[node.index] = "lane", node.data[1]
+        if node.op == "input" and node.data[0] in ("lane", "ready"):
+            known[node.index] = node.data
         elif any(arg.index in known for arg in node.args):
             lines.append((node.op, [operand(arg) for arg in node.args]))
             known[node.index] = "line", len(lines) - 1
     results, address = [operand(node) for node in outputs], 0
     if load is not None and first + len(results):
-        text = _text(places, first, lines, results)
+        text = _text(places, first, len(nodes), lines, results)
         symbol = f"{SYMBOL}.{hashlib.sha256(text.encode()).hexdigest()[:24]}"
         text = text.replace(f"@{SYMBOL}(", f"@{symbol}(")
         size = text.count("\n")
@@ -100,8 +101,9 @@ def answer_of(
 
 
 def _text(
-    places: Sequence[Place], first: int, lines: Sequence[tuple[str, Sequence[Operand]]], results: Sequence[Operand]
-) -> str:
+    places: Sequence[Place], first: int, factors: int, lines: Sequence[tuple[str, Sequence[Operand]]],
+    results: Sequence[Operand],
+) -> str:  # fmt: skip
     """The code in LLVM's words: one piece of the derivatives after the other, each read whole before it is written."""
     text = list[str]()
     numbered: dict[Operand, str] = {}
@@ -130,6 +132,9 @@ def _text(
                 if other >= 0:
                     found = add(f"{name}.both", f"fadd {VECTOR} {found}, {read(f'{name}.other', other)}")
                 numbered[kind, data] = found
+            elif kind == "ready":
+                at = add(f"{name}.at", f"getelementptr {ROOM}, ptr %ready, i64 {data}")
+                numbered[kind, data] = add(name, f"load {VECTOR}, ptr {at}, align 8")
             else:  # a factor
                 at = add(f"{name}.at", f"getelementptr double, ptr %factors, i64 {data}")
                 numbered[kind, data] = splat(name, add(f"{name}.value", f"load double, ptr {at}, align 8"))
@@ -149,12 +154,14 @@ def _text(
 declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)
 define void @{SYMBOL}(ptr %factors, ptr %of.block, ptr %of.params, ptr %of.out) {{
 entry:
-{clear}  br label %piece
+{clear}  %behind = getelementptr double, ptr %factors, i64 {factors}
+  br label %piece
 piece:
   %i = phi i64 [ 0, %entry ], [ %next, %piece ]
   %block = getelementptr {VECTOR}, ptr %of.block, i64 %i
   %params = getelementptr {VECTOR}, ptr %of.params, i64 %i
   %out = getelementptr {VECTOR}, ptr %of.out, i64 %i
+  %ready = getelementptr {VECTOR}, ptr %behind, i64 %i
 {body}
   %next = add i64 %i, 1
   %more = icmp slt i64 %next, {PIECES}

@@ -57,6 +57,7 @@ HELD = (
     "rules.restore_candidate", "rules.take_again", "rules.keep_stages", "rules.restore_stages", "rules.prepare_metric",
     "rules.prepare_rates", "schemes.explicit_rates.explicit_rates",
     "schemes.explicit_rates.rates_at_end", "schemes.runge_kutta.find_sizes", "schemes.runge_kutta.note_uneven",
+    "schemes.runge_kutta.note_velocities",
     "schemes.radau_end.end_rates", "stepping.mass_ratios.polish_with_rows", "stepping.restart.holds_rows",
     "rules.prepare_newton", "rules.prepare_stages", "rules.prepare_coupled",
     "rules.prepare_coupled_stages", "stepping.observe.store_passed_row",

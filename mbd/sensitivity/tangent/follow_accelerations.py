@@ -2,11 +2,11 @@
 
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.hooks import call
-from mbd.kernel.records import Kernel
+from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.stepping.restart import consistent, evaluate, fill_block
 from mbd.sensitivity.tangent.words import derivative_of, is_differentiated, solve_plain, solved_program, without_tangent
 
-__all__ = ["follow_factors", "follow_move", "follow_rates", "follow_solution"]
+__all__ = ["follow_factors", "follow_move", "follow_rates", "follow_solution", "follow_stage"]
 
 BALANCE = 9
 """The function behind those of `mbd.kernel.codes`: M v̇ + f + R λ and B v̇ + γ of all rows, of derivatives alone."""
@@ -86,25 +86,66 @@ def solve_straight_rates(K: Kernel, m: int) -> bool:
     return True
 
 
-def follow_move(K: Kernel, h: float, weights: int, count: int) -> None:
-    """h times the weighted slopes of the first stages into K.spare, as `schemes.runge_kutta.explicit_move` has it.
+def follow_stage(K: Kernel, h: float, t: float, stage: int) -> bool:
+    """The rates of a stage in K.stages, from the block of an earlier one; false where straight-line code fails."""
+    if stage < 2 or K.vector == 0 or K.correction_program != 0 or not is_differentiated():
+        return False
+    if K.n_frictions > 0 or K.loaded > 0 or K.loads_act == 1 or K.n_dropped > 0:
+        return False
+    n = K.n
+    K.block[0] = t
+    weigh_rates(K, h, stage * K.n_nodes, stage, K.block, K.o_q, K.o_v)
+    for i in range(n):
+        K.block[K.o_v + i] += K.y[i]
+        if i < K.n_v:
+            K.block[K.o_q + i] += K.q[i]
+    call(K, solved_program(K), K.out)
+    if without_tangent(K.out[n + K.n_active]) != 1.0:
+        return False
+    o = stage * (K.n_v + n) + K.n_v
+    for i in range(n):
+        K.stages[o + i] = K.out[i]
+    return True
 
-    Two numbers at once take the same weights.
-    """
+
+def follow_move(K: Kernel, h: float, weights: int, count: int) -> None:
+    """h times the weighted slopes of the first stages into K.spare, as `schemes.runge_kutta.explicit_move` has it."""
+    if K.vector == 1:
+        weigh_rates(K, h, weights, count, K.spare, 0, K.n_v)
+        return
     width = K.n_v + K.n
-    i = 0
-    while i < width:
-        following = i + 1 if i + 1 < width else i
-        own = 0.0
-        other = 0.0
+    for i in range(width):
+        total = 0.0
         for j in range(count):
             weight = K.tableau[weights + j]
             if weight != 0.0:
-                own += weight * K.stages[j * width + i]
-                other += weight * K.stages[j * width + following]
-        K.spare[i] = h * own
-        K.spare[following] = h * other
-        i += 2
+                total += weight * K.stages[j * width + i]
+        K.spare[i] = h * total
+
+
+def weigh_rates(K: Kernel, h: float, weights: int, count: int, out: Reals, o_x: int, o_y: int) -> None:
+    """What stages move where coordinates add: ``x_i = h (c_i v + h Σ_j (a²)_ij v̇_j)``, and ``h Σ_j a_ij v̇_j`` of rates.
+
+    As slopes of positions are velocities, rates alone carry derivatives from stage to stage (Hairer, Nørsett & Wanner
+    1993, II.14).
+    """
+    n_v = K.n_v
+    width = n_v + K.n
+    stages = K.n_nodes
+    squares = weights + stages * stages + 4 * stages + 2
+    node = 1.0 if count == stages else K.tableau[stages * stages + stages + count]
+    for i in range(K.n):
+        own = 0.0
+        twice = 0.0
+        for j in range(count):
+            weight = K.tableau[weights + j]
+            square = K.tableau[squares + j]
+            if weight != 0.0 or square != 0.0:
+                own += weight * K.stages[j * width + n_v + i]
+                twice += square * K.stages[j * width + n_v + i]
+        out[o_y + i] = h * own
+        if i < n_v:
+            out[o_x + i] = h * (node * K.y[i] + h * twice)
 
 
 def follow_factors(K: Kernel, m: int) -> bool:

@@ -38,6 +38,8 @@ ROOM = f"[{LANES} x double]"
 Parts = tuple[str, ...]
 """Operands of the derivatives of one value: vectors of those of a real, the address of those of an array or a table."""
 WITH_TANGENT = {"real": PIECES * (VECTOR,), "reals": ("ptr",), "kernel": ("ptr",)}
+FLAGS = "contract nnan nsz"
+"""What derivatives allow: fused operations, and that what is multiplied by 0 is 0."""
 ZERO: Parts = PIECES * ("zeroinitializer",)
 HELD_ARRAYS = frozenset(
     (
@@ -217,14 +219,14 @@ class TangentBody(Body):
 
     def scaled(self, factor: str, tangent: Parts) -> Parts:
         """Derivatives times a number; ZERO stays."""
-        return ZERO if tangent == ZERO else self.vectors("fmul contract", self.splat(factor), tangent)
+        return ZERO if tangent == ZERO else self.vectors(f"fmul {FLAGS}", self.splat(factor), tangent)
 
     def sum(self, a: Parts, b: Parts, word: str = "fadd") -> Parts:
         if b == ZERO:
             return a
         if a == ZERO:
             return b if word == "fadd" else self.vectors("fneg", b)
-        return self.vectors(f"{word} contract", a, b)
+        return self.vectors(f"{word} {FLAGS}", a, b)
 
     def dual(self, value: str, tangent: Parts) -> str:
         return value if tangent == ZERO else Dual(value, tangent)

@@ -39,7 +39,8 @@ class Derivative:
     ----------
     mechanism, name : of the program
     outputs : gives its outputs where its derivatives are not known yet
-    places : of parameters that are differentiated by
+    places : of parameters that are differentiated by, each with the number of the direction that changes it by 1 and
+        nothing else does; −1 where there is none such
     first : numbers before the outputs, without derivatives
 
     Attributes
@@ -54,7 +55,7 @@ class Derivative:
         mechanism: Mechanism,
         name: str,
         outputs: Callable[[], Sequence[Node] | System],
-        places: Sequence[int],
+        places: Sequence[Place],
         first: int = 0,
         without: Sequence[str] = WITHOUT,
     ) -> None:
@@ -64,9 +65,9 @@ class Derivative:
             return _made(mechanism, f"tangent_{len(mechanism.common)}", system, places, first, without)
 
         self._known = known = mechanism.kept((Derivative, name, first, *places), made)
-        self._numbers = np.zeros(max(known.values + len(known.answer.factors), 1))
-        numbers, factors = int(self._numbers.ctypes.data), len(known.answer.factors)
-        words = [0, numbers, known.answer.address, NUMBER_BYTES * known.values, numbers + NUMBER_BYTES * factors]
+        self._numbers = np.zeros(max(known.before + known.values, 1))
+        numbers = int(self._numbers.ctypes.data)
+        words = [0, numbers, known.answer.address, NUMBER_BYTES * known.values, numbers + NUMBER_BYTES * known.before]
         self._words = np.array(words, dtype=np.int64)
         self._address = int(self._words.ctypes.data)
 
@@ -87,12 +88,13 @@ class Derivative:
         if known.function is not None:
             known.function(block.values, parameters.values, self._numbers)
         factors = len(known.answer.factors)
-        values[: known.values] = self._numbers[factors : factors + known.values]
+        values[: known.values] = self._numbers[known.before : known.before + known.values]
         own, others = np.array(known.inputs, dtype=np.int64).reshape(-1, 2).T
         inputs = block.of[np.maximum(own, 0)]
         inputs[own < 0] = parameters.of[-1 - own[own < 0]]
         inputs[others >= 0] += block.of[others[others >= 0]]
-        return known.answer.taken(self._numbers[:factors], inputs)
+        ready = self._numbers[factors : known.before].reshape(-1, LANES)
+        return known.answer.taken(self._numbers[:factors], ready, inputs)
 
 
 def lanes(count: int) -> Matrix:
@@ -104,48 +106,59 @@ def lanes(count: int) -> Matrix:
 
 @dataclass(frozen=True)
 class _Code:
-    """Compiled values and factors of an answer, how many the values are, the places of its inputs, and itself."""
+    """Compiled factors of an answer, derivatives that are ready, and values; how many numbers stand before the values
+    and how many these are; the places of its inputs, and the answer itself.
+    """
 
     function: Any
+    before: int
     values: int
     inputs: Sequence[Place]
     answer: Answer
 
 
 def _made(
-    mechanism: Mechanism, symbol: str, system: System, places: Sequence[int], first: int, without: Sequence[str]
+    mechanism: Mechanism, symbol: str, system: System, places: Sequence[Place], first: int, without: Sequence[str]
 ) -> _Code:
     """The derivatives of some outputs that are not always 0."""
     outputs, tape = system.lines, mechanism.equations.tape
-    layout, wanted = mechanism.layout, set(places)
+    layout, alone = mechanism.layout, dict(places)
     inputs = [node for node in live(outputs) if node.op == "input"]
     inputs = [
         each for each in inputs
-        if each.data[0] not in without and (each.data[0] != "p" or each.data[1] in wanted) and each not in system.known
+        if each.data[0] not in without and (each.data[0] != "p" or each.data[1] in alone) and each not in system.known
     ]  # fmt: skip
     slopes = jvps(outputs, [{node: 1.0} for node in inputs]) if inputs else []
-    found = {node.data: each for node, each in zip(inputs, slopes, strict=True)}
-    own, columns = list[Place](), list[Sequence[Node]]()
-    for (kind, index), column in found.items():
-        beside, other = found.get(("q" if kind == "x" else "x", index), ()), -1
-        if kind in "qx" and [each.index for each in column] == [each.index for each in beside]:
+    given = substitute([entry for column in slopes for entry in column], system.known)
+    columns = [given[k : k + len(outputs)] for k in range(0, len(given), max(len(outputs), 1))]
+    found = {node.data: each for node, each in zip(inputs, zip(slopes, columns, strict=True), strict=True)}
+    own, lines = list[Place](), [tape.zero for _ in outputs]
+    ready: dict[int, list[Node]] = {}
+    for (kind, index), (slope, column) in found.items():
+        direction = alone[index] if kind == "p" else -1
+        if direction >= 0:
+            for line, entry in enumerate(column):
+                if not entry.is_zero:
+                    ready.setdefault(line, [tape.zero] * LANES)[direction] = entry
+            continue
+        beside, other = found.get(("q" if kind == "x" else "x", index), ((), ()))[0], -1
+        if kind in "qx" and [each.index for each in slope] == [each.index for each in beside]:
             if kind == "x":
                 continue
             other = layout.place("x", index)
+        lane = tape.input("lane", len(own))
         own.append((-1 - index if kind == "p" else layout.place(kind, index), other))
-        columns.append(column)
-    entries = iter(substitute([entry for column in columns for entry in column], system.known))
-    lines = [tape.zero for _ in outputs]
-    for k, each_column in enumerate(columns):
-        lane = tape.input("lane", k)
-        for line in range(len(each_column)):
-            lines[line] = lines[line] + next(entries) * lane
+        for line, entry in enumerate(column):
+            lines[line] = lines[line] + entry * lane
+    for k, line in enumerate(ready):
+        lines[line] = lines[line] + tape.input("ready", k)
     load = partial(_loaded, mechanism) if mechanism.backend.name == "llvm" else None
     answer = answer_of(lines if system.answer is None else system.answer(lines), own, first, load)
-    numbers = [*answer.factors, *system.values]
+    before = [*answer.factors, *(entry for entries in ready.values() for entry in entries)]
+    numbers = [*before, *system.values]
     if numbers:
         mechanism.common.add({symbol: numbers}, soon=True)
-    return _Code(mechanism.common[symbol] if numbers else None, len(system.values), own, answer)
+    return _Code(mechanism.common[symbol] if numbers else None, len(before), len(system.values), own, answer)
 
 
 def _loaded(mechanism: Mechanism, code: bytes, symbol: str) -> int:
@@ -154,7 +167,7 @@ def _loaded(mechanism: Mechanism, code: bytes, symbol: str) -> int:
     return mechanism.kept((_loaded, symbol), lambda: machine.load(code, [symbol])[0])
 
 
-def derivatives_of_programs(mechanism: Mechanism, places: Sequence[int]) -> list[Derivative]:
+def derivatives_of_programs(mechanism: Mechanism, places: Sequence[Place]) -> list[Derivative]:
     """Of the programs that every mode has, in the order of the kernel's code."""
     equations, vector = mechanism.equations, mechanism.vector
 
@@ -184,7 +197,7 @@ def no_values(mechanism: Mechanism) -> Any:
 
 
 def derivatives_of_modes(
-    mechanism: Mechanism, active: programs.ActiveSet, places: Sequence[int], stepping: bool
+    mechanism: Mechanism, active: programs.ActiveSet, places: Sequence[Place], stepping: bool
 ) -> list[Derivative]:
     """Of the tangent and the residual of a mode, and with `stepping` of the matrix times a correction W of positions.
 
