@@ -108,7 +108,7 @@ def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any, more: Any 
     whirl = reach * (
         spinning + np.max([np.linalg.norm(m.angular_second, axis=1) for m in motions], axis=0, initial=0.0)
     )
-    terms = {}
+    terms, largest = {}, np.zeros(len(bodies.told))
     for name, load in acting.on.items():
         mass = mass_of(bodies.model.bodies[name], bodies.told.parameters)
         R, motion = bodies.placed[name].H[:, :3, :3], bodies.twist(name)
@@ -124,12 +124,13 @@ def balance(found: Faults, bodies: Bodies, acting: Loads, share: Any, more: Any 
         heavy = mass.mass * (np.linalg.norm(a, axis=1) + whirl) + load.force_size
         twisted = np.linalg.norm(turn, axis=1) + np.linalg.norm(gyro, axis=1) + load.torque_size
         twisted = twisted + mass.mass * reach * whirl
-        own = mass.mass * np.linalg.norm(a, axis=1) + load.force_size
-        terms[name] = force, heavy, torque, None if mass.planar and not planar else twisted, own
-    # what Newton's method leaves of the largest terms of all, inertia among them, at the two joints of a body
-    most = 2e-3 * share * np.max([own for *_, own in terms.values()], axis=0, initial=0.0)
+        terms[name] = force, heavy, torque, None if mass.planar and not planar else twisted
+        largest = np.maximum(largest, np.maximum(heavy, twisted))
+    # what Newton's method leaves, at the two joints of a body, of the largest terms that there have been: those of
+    # forces and of moments about joints, inertia among them
+    most = 2e-3 * share * np.maximum.accumulate(largest)
     small = 1e-9 * np.max(whole, initial=0.0)
-    for name, (force, heavy, torque, twisted, _) in terms.items():
+    for name, (force, heavy, torque, twisted) in terms.items():
         limit = share * heavy + most + 1e-9 + small + more
         found.small("balance of forces", name, np.linalg.norm(force, axis=1), limit)
         if twisted is not None:
