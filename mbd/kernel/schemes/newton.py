@@ -88,7 +88,7 @@ def solve_step(K: Kernel, h: float, t1: float, c_C: float, c_K: float, tangents:
     for iteration in range(MAX_ITERATIONS + further_corrections()):
         tangent = not fresh
         if together:
-            share_loads(K, m)
+            share_loads(K, m, iteration > 10)  # shares that go round and round with the loads would never end
         if tangent:
             straight = renew(K, m, tangents)
             note_matrix(K)

@@ -103,7 +103,7 @@ def load_stage(K: Kernel, i: int, h: float, t1: float) -> None:
     K.block[0] = t1 if i == 2 else K.time + S[C_ + i] * h
     K.block[K.o_lam : K.o_lam + K.n_rows] = S[o_L : o_L + K.n_rows]
     if sharing(K):
-        share_loads(K, K.n_active)
+        share_loads(K, K.n_active, False)
 
 
 def load_state(K: Steps, i: int, h: float) -> None:

@@ -160,7 +160,7 @@ def singular_newmark_step(K: Kernel, h: float, t1: float) -> int:
     for iteration in range(MAX_ITERATIONS + further_corrections()):
         # tangent and residual at the iterate
         if sharing(K):
-            share_loads(K, m)
+            share_loads(K, m, False)
         clear_tangent(K, m, K.out)
         call(K, K.tangent_program, K.out)
         K.n_tangents += 1

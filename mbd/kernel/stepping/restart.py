@@ -362,13 +362,17 @@ def minimum_norm_multipliers(K: Balance, lam: Reals) -> None:
         keep_in_cones(K, lam)
 
 
-def share_loads(K: Balance, m: int) -> None:
-    """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate."""
+def share_loads(K: Balance, m: int, known: bool) -> None:
+    """Multipliers of dependent rows in the block, where they are part of the step's equations, at its iterate.
+
+    By the shares found last, where these are `known`.
+    """
     K.loads[: K.n_rows] = K.block[K.o_lam : K.o_lam + K.n_rows]
     call(K, ACCELERATIONS, K.acc)
-    find_dependence(K, m)
-    find_limits_of_loads(K)
-    find_shares(K)
+    if not known:
+        find_dependence(K, m)
+        find_limits_of_loads(K)
+        find_shares(K)
     take_shares(K, K.loads)
     K.block[K.o_lam : K.o_lam + K.n_rows] = K.loads[: K.n_rows]
 
