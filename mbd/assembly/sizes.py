@@ -42,7 +42,7 @@ class Sizes:
         scaled = self.steps[:, None] * M * self.steps
         heaviest = self._largest(np.abs(np.diag(scaled)))[self.cluster]
         heaviest[heaviest == 0.0] = 1.0
-        return np.asarray(scaled / heaviest[:, None] + 1e-9 * np.eye(len(M)))
+        return definite(np.asarray(scaled / heaviest[:, None]))
 
     def of_contact(self, contact: Contact) -> float:
         """What the gap of a contact is measured by: 1 of an angle, else L, the longest where a force alone acts."""
@@ -80,6 +80,12 @@ class Sizes:
         named = float(np.max(np.abs(asked[len(of) :]), initial=0.0))
         fastest = max(named, float(np.max(found)))
         return np.append(np.maximum(found[of], max(named, 1e-3 * fastest)), np.full(len(asked) - len(of), fastest))
+
+
+def definite(M: Matrix) -> Matrix:
+    """M with a little more of each inertia, whatever its unit; where there is none, with a little of the largest."""
+    own = np.abs(np.diag(M))
+    return M + 1e-9 * np.diag(np.where(own > 0.0, own, float(np.max(own, initial=0.0)) or 1.0))
 
 
 def terms_and_sizes(

@@ -110,16 +110,20 @@ class _Watched:
 
 
 def refuse_sided_start(
-    rows: RunRows, programs: Programs, at_row: Callable[[int], tuple[Motion, Rates]]
+    rows: RunRows, programs: Programs, at_row: Callable[[int], tuple[Motion, Rates]], looked: tuple[Vector, ...]
 ) -> None:  # fmt: skip
     """Raise a `OneSidedError` where a change of the start decides what happens first.
 
     at_row : gives the motion and rates of a row with their derivatives
+    looked : what is watched in the first row, and its change in time
     """
-    if not _is_any(programs):
+    if not is_any(programs):
+        return
+    within = INSTANT_RTOL * _duration(rows)
+    if not programs.equations.frictions and np.all(np.abs(looked[0]) > 2.0 * within * np.abs(looked[1])):
         return
     (motion, rates), mode = at_row(0), rows.mode(0)
-    watched, within = _Watched(programs, motion, mode, rates), INSTANT_RTOL * _duration(rows)
+    watched = _Watched(programs, motion, mode, rates)
     if names := dict.fromkeys(watched.starting()):
         raise sided(
             f"{_listed(names)} starts at rest and slides at once, and a change of its velocity decides which way"
@@ -169,7 +173,7 @@ def refuse_sided_end(
     until, end = rows.record.settings.get("until"), float(rows.record.time[-1])
     latest: Any = until[-1] if isinstance(until, tuple | list) else until
     within = INSTANT_RTOL * _duration(rows)
-    if not is_number(latest) or end < float(latest) - within or not _is_any(programs):
+    if not is_number(latest) or end < float(latest) - within or not is_any(programs):
         return
     names = [each.name for each in instants if end - each.time <= within and np.any(each.of_time != 0.0)]
     if not names:
@@ -187,7 +191,8 @@ def sided_end(names: Sequence[str], end: float) -> OneSidedError:
     )
 
 
-def _is_any(programs: Programs) -> bool:
+def is_any(programs: Programs) -> bool:
+    """Whether anything is watched that may happen."""
     equations = programs.equations
     return bool(equations.contacts or equations.guards or equations.frictions)
 

@@ -1,6 +1,7 @@
 """Decisions of a run that a small change may turn: its events, its start and its end, told from their neighbours."""
 
 from collections.abc import Callable, Collection, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from mbd.equal import HALF_PRECISION_RTOL
 from mbd.errors import OneSidedError
 from mbd.sensitivity.guards import GRAZING_RTOL, Numbers, Trigger, acts, refused_graze, trigger
 from mbd.sensitivity.motion import Mode, Motion, Rates
-from mbd.sensitivity.one_sided import refuse_sided_end, refuse_sided_grip, refuse_sided_start
+from mbd.sensitivity.one_sided import is_any, refuse_sided_end, refuse_sided_grip, refuse_sided_start
 from mbd.sensitivity.passed import Instant
 from mbd.sensitivity.programs import Programs, State
 from mbd.sensitivity.run_data import RunRows, refused, sided
@@ -37,12 +38,13 @@ def refuse_turning_points(
     OneSidedError, CapabilityError
         where a run has derivatives on one side only, or none.
     """
-    refuse_sided_start(rows, programs, at_row)
     time, order = rows.record.time, sorted(rows.events)
     for row in (0, *(row for row in order if row < len(time) - 1)) if programs.equations.frictions else ():
         refuse_sided_grip(rows, programs, row, at_row)
     leads = [row for row in order if not _is_again(rows, row)]
-    fired = dict(zip(leads, _fired(rows, programs, leads, at_row), strict=True))
+    looked = _watched(rows, programs, [0, *(row - 1 for row in leads)]) if is_any(programs) else [()]
+    refuse_sided_start(rows, programs, at_row, looked[0])
+    fired = dict(zip(leads, _fired(rows, programs, leads, looked[1:], at_row), strict=True))
     found, lead = list[Instant](), 0
     for row in order:
         if row not in fired:
@@ -104,29 +106,37 @@ def _guard(
     return values[place], HALF_PRECISION_RTOL * size, change, float(slopes[place] @ flow)
 
 
-def _fired(rows: RunRows, programs: Programs, leads: Sequence[int], at_row: AtRow) -> list[Trigger]:
-    """What ended the steps to the events of rows; no graze, and no contact that touches by chance."""
-    if not leads:
-        return []
-    equations, record, c = programs.equations, rows.record, programs.columns
-    contacts, guards = len(equations.contacts), len(equations.guards)
-    before = np.array(leads) - 1
-    modes = [rows.mode(row) for row in before]
-    active = np.zeros((len(leads), c.rows))
+def _watched(rows: RunRows, programs: Programs, chosen: list[int]) -> list[tuple[Vector, ...]]:
+    """What is watched at rows, as steps end there: values, their changes in time, and sums of sizes of their terms."""
+    record, c = rows.record, programs.columns
+    modes = [rows.mode(row) for row in chosen]
+    active = np.zeros((len(chosen), c.rows))
     for line, mode in zip(active, modes, strict=True):
         line[list(mode.held)] = 1.0
-    y, rate = np.hstack([record.v[before], record.z[before]]), np.hstack([record.a[before], record.s[before]])
-    times = rows.ends[before]
+    y, rate = np.hstack([record.v[chosen], record.z[chosen]]), np.hstack([record.a[chosen], record.s[chosen]])
     switches, slips = np.array([mode.switch for mode in modes]), np.array([mode.slip for mode in modes])
-    at = State(
-        times, record.q[before], y, rate, record.lam[before] * active, rows.watched_anchors[before], switches, slips
-    )
-    flow = np.zeros((len(leads), c.count))
-    flow[:, c.x], flow[:, c.y], flow[:, c.t] = record.v[before], rate, 1.0
+    held = rows.watched_anchors[chosen]
+    times: Any = rows.ends[chosen]
+    at = State(times, record.q[chosen], y, rate, record.lam[chosen] * active, held, switches, slips)
+    flow = np.zeros((len(chosen), c.count))
+    flow[:, c.x], flow[:, c.y], flow[:, c.t] = record.v[chosen], rate, 1.0
+    return list(zip(*programs.watched_flow(at, flow), strict=True))
+
+
+def _fired(
+    rows: RunRows, programs: Programs, leads: Sequence[int], looked: Sequence[tuple[Vector, ...]],
+    at_row: AtRow,
+) -> list[Trigger]:  # fmt: skip
+    """What ended the steps to the events of rows; no graze, and no contact that touches by chance.
+
+    looked : what is watched just before each (`_watched`)
+    """
+    equations, record = programs.equations, rows.record
+    contacts, guards = len(equations.contacts), len(equations.guards)
     found = list[Trigger]()
     rest_speed = float(record.settings.get("rest_speed", 1e-6))
-    for row, mode, values, growth, terms in zip(leads, modes, *programs.watched_flow(at, flow), strict=True):
-        now = float(rows.ends[row - 1])
+    for row, (values, growth, terms) in zip(leads, looked, strict=True):
+        mode, now = rows.mode(row - 1), float(rows.ends[row - 1])
         fired = trigger(rows.mechanism, rows.events[row], values[:contacts], growth[:contacts], mode.slip, now)
         k = fired.number
         places = {"closed": k, "gap": k, "force": contacts + k, "press": contacts + k, "event": 2 * contacts + k,
