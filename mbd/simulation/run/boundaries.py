@@ -59,7 +59,7 @@ class Boundaries:
 
     def break_at(self, jumps: Sequence[Jump], now: float, dt: float, follows_tolerance: bool) -> None:
         """End steps at these jumps from now on, but for those about as dense as the steps."""
-        self.breaks = _ends_of_steps(jumps, dt, follows_tolerance) if jumps else ()
+        self.breaks = _ends_of_steps(jumps, dt, follows_tolerance)
         self._find_place(now)
 
     def _find_place(self, now: float) -> None:

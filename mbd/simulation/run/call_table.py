@@ -43,6 +43,7 @@ class CallTable:
         self._words = np.zeros(len(PLACES), dtype=np.int64)
         self._bytes = self._words.data.cast("B")  # into which `struct` writes in a third of numpy's time
         self._code = np.zeros(0, dtype=np.int64)
+        self._numbers: tuple[Any, Any] | None = None
         arrays, self._words[BOUND] = known
         values = vars(kernel)
         self.renewed = {name for name, array in zip(ARRAYS, arrays, strict=True) if values[name] is not array}
@@ -57,11 +58,14 @@ class CallTable:
     def fill(self, functions: Sequence[Any], kernel: Kernel) -> None:
         """Bring the table up to what the next call needs."""
         values = vars(kernel)
-        try:
-            INTEGERS.pack_into(self._bytes, 0, *_whole(values))
-        except struct.error:  # a real in the place of an integer
-            self._words[WHOLE] = _whole(values)
-        REALS.pack_into(self._bytes, INTEGERS.size, *_real(values))
+        numbers = _whole(values), _real(values)
+        if numbers != self._numbers:
+            self._numbers, (whole, real) = numbers, numbers
+            try:
+                INTEGERS.pack_into(self._bytes, 0, *whole)
+            except struct.error:  # a real in the place of an integer
+                self._words[WHOLE] = whole
+            REALS.pack_into(self._bytes, INTEGERS.size, *real)
         for name in kernel.renewed:
             self._words[PLACES[name]] = address_of(values[name])
         self.renewed |= kernel.renewed

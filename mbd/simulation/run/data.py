@@ -11,7 +11,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.bodies.domains import ParameterCheck
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
-from mbd.equations.switching_times import jumps_between
+from mbd.equations.switching_times import jumps_between, switches_of
 from mbd.forces.base import Force
 from mbd.integrators.base import Integrator
 from mbd.kernel.contact.active_set import ActiveSetManager
@@ -175,6 +175,8 @@ class RunData:
 
     def _find_breaks(self, now: float) -> None:
         """The instants at which the equations jump with the present parameters, and those in its neighbourhood."""
+        if not switches_of(self.mechanism.equations):
+            return
         around = WINDOW_STEPS * self.dt
         span = min(self.start.time, now) - around, self.end + around
         highest = max(1, self.integrator.order() - 2)  # a jump of derivative k costs an error of dt^(k + 1)
