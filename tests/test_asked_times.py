@@ -266,3 +266,19 @@ def test_states_at_times_that_are_asked_for_again_are_found_once(name, monkeypat
     moved = once.at(times)[one]
     assert len(found) == 2 and np.all(moved != first)
     np.testing.assert_array_equal(moved, again.at([0.0133, 0.0466, 0.0799])[one])
+
+
+@pytest.mark.parametrize("name", ["HHT", "RadauIIA", "RungeKutta853"])
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_machine_code_finds_the_states_between_rows_that_numpy_finds(kind, name):
+    """Which trial runs of a tolerance are compared by; what a user reads has the bits that a file of the run gives."""
+    run = mbd.simulate(*mechanism(kind, 2), SCHEMES[name](), dt=STEPS.get(name, USUAL), until=0.1)
+    columns, times = run._model_columns, np.linspace(0.003, 0.097, 12)
+    places = columns.grid.places(times)
+    quick, plain = columns.by_machine.between(places), columns.between(places)
+    assert columns.by_machine.machine is not None and columns.machine is None
+    for part in ("q", "v", "z", "a", "lam"):
+        expected = getattr(plain, part)
+        np.testing.assert_allclose(
+            getattr(quick, part), expected, rtol=1e-7, atol=1e-9 * (1.0 + np.max(np.abs(expected), initial=0.0))
+        )

@@ -138,6 +138,8 @@ class Mechanism:
         self._drawn: dict[str, Sequence[Node]] = {}
         self._has_free_rates: bool | None = None
         equations.memory["mechanism"] = ref(self)
+        if self.accelerations.address:
+            equations.memory["machine code"] = self.layout, self.common, self.accelerations
         self.seconds = perf_counter() - started
 
     def _compiled(self, question: Hashable, make: Callable[[], Made], rarely: bool = False) -> Facts:

@@ -6,6 +6,7 @@ the constraint manifold, as at a stage of an explicit step, all of them together
 other. Their multipliers are those of least norm among all that give the same forces.
 """
 
+from contextlib import suppress
 from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
+from mbd.compile.many import at_inputs
 from mbd.compile.python import ArrayFunction, array_function
 from mbd.compile.trivial_rows import parts_of_row
 from mbd.dataclass import dataclass
@@ -187,7 +189,12 @@ class Balance:
         The limits are those of frictions (k, n_frictions), the last what anchors would be here (k, n_anchors).
         """
         n, m, count = self.equations.n_v + self.equations.n_z, len(self.equations.rows), len(rows)
-        flat = self.terms.lines(self.states.all_inputs(rows), self.states.record.parameters_at(rows.source)).T
+        inputs, parameters = self.states.all_inputs(rows), self.states.record.parameters_at(rows.source)
+        if self.states.machine is None:
+            flat = self.terms.lines(inputs, parameters).T
+        else:
+            layout, _, function = self.states.machine
+            flat = at_inputs(function, layout, inputs, parameters)[:, : self.terms.size]
         ends = accumulate((n * n, n, n * m, m * n, m, m, m, flat.shape[1]), initial=0)
         M, f, R, B, h, rates, bias, rest = (flat[:, first:end] for first, end in pairwise(ends))
         last = rest.shape[1] - len(self.equations.frictions)
@@ -217,7 +224,9 @@ class Balance:
         M, _, _, B, *_ = self.terms_at(there)
         every = self._acting(every, there, B)
         # in the metric of M one light coordinate makes all rows that move it parallel; dependent rows are so in any
-        independent = max(_independent(B[:, every] / weights(M)), _independent(B[:, every]), key=len)
+        independent = _independent(B[:, every] / weights(M))
+        if len(independent) < len(every):
+            independent = max(independent, _independent(B[:, every]), key=len)
         return Held(every, [every[k] for k in independent])
 
     def _acting(self, every: list[int], rows: Rows, B: Any) -> list[int]:
@@ -288,6 +297,10 @@ def saddle(M: Any, f: Matrix, R: Any, B: Any, bias: Matrix) -> tuple[Matrix, Mat
     finite = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
     if not finite.all():
         matrix[~finite] = np.eye(n + m)
+    if not m:
+        with suppress(np.linalg.LinAlgError):  # then some are singular, and told apart below
+            rate = np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0], dtype=float)
+            return rate, np.zeros((count, 0)), np.zeros(count), np.asarray(finite)
     sign, size = np.linalg.slogdet(matrix)
     sound = finite & (sign != 0.0)
     if not sound.all():

@@ -130,6 +130,13 @@ class ModelColumns(StoredStates, Columns):
         self._placed: WeakKeyDictionary[Places, dict[bool, Rows]] = WeakKeyDictionary()
 
     @cached_property
+    def by_machine(self) -> ModelColumns:
+        """The same from machine code, where there is any: to round-off, which a file of the run does not give."""
+        found = ModelColumns(self.record, self.equations)
+        found.machine, vars(found)["rows"] = self.equations.memory.get("machine code"), self.rows
+        return found if found.machine else self
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(self.equations.output_names())
 
@@ -206,27 +213,31 @@ class ModelColumns(StoredStates, Columns):
             return self._steps.at(self.rows, places)
         if forces and Balance.serves(self.equations):
             return self._forces.at(places)
-        return self._held(places, self._polynomials(places)[0])
+        return self._held(places, self._polynomials(places, forces))
 
     def _interpolated(self, places: Places) -> tuple[Rows, Rows]:
         """States by polynomials, and by polynomials of a lower degree."""
-        found, rougher = self._polynomials(places)
+        found = self._polynomials(places)
+        rougher = self.grid.rougher(self.rows, places, found, self.equations.compose is None, self._smooth)
         return self._held(places, found), self._held(places, rougher)
 
     def _held(self, places: Places, found: Rows) -> Rows:
         """The states on the constraints as far as the rows are."""
         return found if self._onto is None else self._onto.at(self.rows, places, found)
 
-    def _polynomials(self, places: Places) -> tuple[Rows, Rows]:
-        """The same wherever they lead."""
-        rows, plain = self.rows, self.equations.compose is None
+    def _polynomials(self, places: Places, forces: bool = True) -> Rows:
+        """The same wherever they lead, with multipliers where these count."""
+        rows, loads = self.rows, forces or any(friction.group for friction in self.equations.frictions)
         charts = Charts.of(self.equations)
-        smooth = is_smooth(self.record, plain or charts is not None)
-        found = self.grid.between(rows, places, self.q_rate, smooth, charts)
-        rougher = self.grid.rougher(rows, places, found, plain, smooth)
-        if smooth and LedSteps.serves(self) and Balance.serves(self.equations):
+        rates = self.q_rate if charts is None else rows.v  # which charts do without
+        found = self.grid.between(rows, places, rates, self._smooth, charts, loads)
+        if self._smooth and LedSteps.serves(self) and Balance.serves(self.equations):
             found = LedSteps(Restepping(self, self.balance)).at(rows, places, found)
-        return found, rougher
+        return found
+
+    @cached_property
+    def _smooth(self) -> bool:
+        return is_smooth(self.record, self.equations.compose is None or Charts.of(self.equations) is not None)
 
     @cached_property
     def _steps(self) -> Restepping | None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.compile.many import at_inputs
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.results.balance import Balance, Solved, put
 from mbd.results.charts import Charts
@@ -91,7 +92,9 @@ class Restepping:
             moved = base + h * np.tensordot(formula.weights[stage, :stage], slopes[:stage], 1)
             q, v, z = self._parts(begin, moved)
             there = self._rates(replace(begin, time=begin.time + formula.nodes[stage] * h[:, 0], q=q, v=v, z=z))
-            flow = v if self.charts is None else self.charts.increment_rates(moved[:, : v.shape[1]], v)
+            flow = v
+            if self.charts is not None:
+                flow = self._charted(self.charts, "increment_rates", x=moved[:, : v.shape[1]], v=v)
             slopes[stage] = np.hstack([flow, there.rate])
             least = np.minimum(least, there.size - before)
         return np.asarray(base + h * np.tensordot(formula.end, slopes, 1)), least
@@ -100,8 +103,16 @@ class Restepping:
         n_q, n_v = self.equations.n_q, self.equations.n_v
         if self.charts is not None:
             x, v, z = np.split(state, [n_v, 2 * n_v], axis=1)
-            return self.charts.composed(begin.q, x), v, z
+            return self._charted(self.charts, "compose", q=begin.q, x=x), v, z
         return state[:, :n_q], state[:, n_q : n_q + n_v], state[:, n_q + n_v :]
+
+    def _charted(self, charts: Charts, name: str, **inputs: Matrix) -> Matrix:
+        """q ⊕ x by 'compose', or ẋ by 'increment_rates'."""
+        if self.states.machine is None:
+            return charts.composed(**inputs) if name == "compose" else charts.increment_rates(**inputs)
+        layout, programs, _ = self.states.machine
+        values = {"t": np.zeros(len(inputs["x"])), **inputs}
+        return at_inputs(programs[name], layout, values, self.states.record.parameters)
 
     def _rates(self, rows: Rows) -> Solved:
         return self.balance.solve(rows)

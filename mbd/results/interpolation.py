@@ -95,15 +95,16 @@ class Grid:
         return kept[1]
 
     def between(
-        self, rows: Rows, places: Places, q_rate: Matrix, smooth: bool = False, charts: Charts | None = None
-    ) -> Rows:
+        self, rows: Rows, places: Places, q_rate: Matrix, smooth: bool = False, charts: Charts | None = None,
+        loads: bool = True,
+    ) -> Rows:  # fmt: skip
         """The states at places between the rows.
 
         q by Hermite with q̇, v with v̇, z with ż; accelerations and ż are the slopes of those
-        curves; multipliers by Hermite with three-point slopes; contacts, frictions and anchors as they hold in the
-        interval. `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of degree 8 through
-        three rows, v and v̇ its slopes, and z of degree 5 (`results.osculating`). Where coordinates do not add,
-        `charts` interpolate q, v and v̇ (`results.charts`).
+        curves; multipliers, where `loads` count, by Hermite with three-point slopes; contacts, frictions and anchors as
+        they hold in the interval. `smooth`, for rows whose accelerations are as accurate as the rest and q̇ = v: q of
+        degree 8 through three rows, v and v̇ its slopes, and z of degree 5 (`results.osculating`). Where
+        coordinates do not add, `charts` interpolate q, v and v̇ (`results.charts`).
         """
         low, high = places.lower, places.upper
         ends = (rows.v[low], rows.a[low], rows.v[high], rows.a[high])
@@ -119,7 +120,7 @@ class Grid:
         else:
             z, change = hermite(places, *states), hermite_rate(places, *states)
             q, v, a = places.blend(rows.q, q_rate), hermite(places, *ends), hermite_rate(places, *ends)
-        lam = places.blend(rows.lam, self._slopes_of(rows.lam))
+        lam = places.blend(rows.lam, self._slopes_of(rows.lam)) if loads else rows.lam[low]
         return replace(rows.part(low), time=places.time, q=q, v=v, z=z, a=a, s=change, lam=lam)
 
     def rougher(self, rows: Rows, places: Places, found: Rows, plain: bool, smooth: bool) -> Rows:

@@ -30,6 +30,9 @@ END_RTOL = 8.0 * float(np.finfo(float).eps)
 class StoredStates:
     """States at the rows of a run, with what contacts and turns hold there."""
 
+    machine: Any = None
+    """Layout, common programs and `accelerations` in machine code, where results need not be those of numpy."""
+
     def __init__(self, record: Record, equations: Equations) -> None:
         self.record, self.equations = record, equations
         self.grid = Grid(record.time)

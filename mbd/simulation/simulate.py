@@ -212,6 +212,8 @@ class _Motion:
             share = min(max((allowed / first) ** power, MIN_STEP_LIMIT_RATIO), MAX_STEP_SHARE / FIRST_STEP_SHARE)
             more = {"tol": tol, "tol_of": names, "driven": driven, "allowed": allowed, "longest": longest * share}
             run, trajectory, problem = self.run(BRIEF_TIME_SHARE * min(length, 1.0), more, most)
+            if self.kind is Run and not problem:
+                keep_idle(run.stepper)
             return Trial(allowed, trajectory, problem, run, run.room, widest=share == MAX_STEP_SHARE / FIRST_STEP_SHARE)
 
         found = calibrated(trial, tol, first, finer, scheme.order(), names)

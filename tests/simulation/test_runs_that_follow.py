@@ -1,11 +1,12 @@
 """A run that takes the arrays of an earlier one of its kind is, to the bit, the run that has new ones."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
-from mbd.simulation.run import stepper
+from mbd.simulation.run import idle, stepper
 from mbd.simulation.run.begin import guard_values, require_consistent, set_side
 from mbd.simulation.simulate import REST_SPEED, laid_out
 from mbd.testing.mechanisms import random_scene
@@ -87,6 +88,24 @@ def test_a_run_is_not_asked_for_modes_that_earlier_ones_have_met(monkeypatch):
     asked.clear()
     assert_same(mbd.simulate(model, start, dt=1e-3, until=1.0), brief)
     assert not asked
+
+
+@pytest.mark.parametrize("scheme", SCHEMES[1:], ids=repr)
+def test_trial_runs_of_a_tolerance_take_the_arrays_of_each_other(scheme, monkeypatch):
+    model, made = ball(), []
+    start, begin = mbd.assemble(model, position={"fall.displacement": 1.0}), stepper.Stepper.__init__
+
+    def counted(self, *given):
+        made.append(self)
+        begin(self, *given)
+
+    monkeypatch.setattr(stepper.Stepper, "__init__", counted)
+    runs = [mbd.simulate(model, start, scheme, tol=tol, until=1.0) for tol in (1e-4, 1e-7, 1e-4)]
+    assert len(made) == 2 and len(runs[0].stats["tolerance"]["runs"]) > 1, "one for each tolerance"
+    assert_same(runs[0], runs[2])
+    monkeypatch.setattr(idle, "_key", lambda *given: None)
+    assert_same(runs[0], mbd.simulate(model, start, scheme, tol=1e-4, until=1.0))
+    assert len(made) > 3
 
 
 def test_arrays_are_taken_and_given_back():

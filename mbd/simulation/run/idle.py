@@ -11,6 +11,9 @@ from mbd.kernel.contact.active_set import ActiveSetManager
 from mbd.kernel.schemes.contract import NO_SCHEME
 from mbd.simulation.run.stepper import Stepper
 
+OF_TRIALS = ("allowed", "longest")
+"""Options that the trial runs of a tolerance differ by: numbers of the record, which nothing else follows from."""
+
 
 def stepper_of(
     kind: type[Stepper],
@@ -33,6 +36,7 @@ def stepper_of(
     else:
         found.manager, found.integrator = manager, integrator
         found.begin_again(parameters, float(options.get("end", 0.0)))
+        vars(found.kernel).update((name, options[name]) for name in OF_TRIALS if name in options)
     return found
 
 
@@ -53,5 +57,6 @@ def _key(
     """What the arrays of a stepper and its numbers depend on, besides the mechanism; None where that cannot be told."""
     if own_scheme(integrator) is NO_SCHEME:
         return None
-    own = tuple(item for item in options.items() if item[0] != "end")
-    return (kind, integrator, *integrator.numbers().items(), manager.trivial, dt, *own)
+    own = tuple(item for item in options.items() if item[0] != "end" and item[0] not in OF_TRIALS)
+    given = () if type(integrator).__module__.startswith("mbd.") else integrator.numbers().items()
+    return (kind, integrator, *given, manager.trivial, dt, *own)

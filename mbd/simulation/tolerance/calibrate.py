@@ -170,7 +170,8 @@ def _no_room(trials: Sequence[Trial], wanted: float, power: float, order: int) -
         return ""
     near = min(trials, key=lambda trial: trial.allowed)
     longer = (near.allowed / wanted) ** (power / order)
-    return near.room.refused(len(near.run.time) * longer, near.run.stats["wall_seconds"] * longer)
+    room = trials[0].room  # which may have looked already
+    return room.refused(len(near.run.time) * longer, near.run.stats["wall_seconds"] * longer)
 
 
 def _coming_nearer(trials: Sequence[Trial], tol: float) -> bool:

@@ -194,7 +194,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     """Coordinates at places (k, n_q), and where they are known well enough (k,)."""
     record, sure = columns.record, np.ones(len(places.time), dtype=bool)
     if columns.equations.compose is not None:
-        return np.asarray(columns.between(places, forces=False).q), sure
+        return np.asarray(columns.by_machine.between(places, forces=False).q), sure
     if not record.extension.uses_accelerations:
         return quintic(places, record.q, record.v, record.a), sure
     known = (record.q, record.v, record.a)
@@ -209,7 +209,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     sure[again] = False
     if len(again) > MAX_DOUBTFUL_SHARE * len(sure) and Restepping.serves(columns):
         again = again[np.argsort(-doubt[again], kind="stable")[:16]]
-        q[again], sure[again] = columns.between(places.part(again), forces=False).q, True
+        q[again], sure[again] = columns.by_machine.between(places.part(again), forces=False).q, True
     elif len(again) > MAX_DOUBTFUL_SHARE * len(sure):
         sure[again] = True  # the polynomials are what there is
     return q, sure
