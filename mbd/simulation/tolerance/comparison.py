@@ -100,12 +100,13 @@ def gap(run: Trajectory, other: Trajectory, accuracy: float = 0.0, names: tuple[
 
 
 def _named(run: Trajectory, other: Trajectory, names: tuple[str, ...], pairs: Matches, end: float) -> Gap:
-    """The same of named results, each read as a user reads it."""
+    """The same of named results."""
     shifted, beside = pairs.pairs + pairs.late, INSTANT_RTOL * (end - float(run.time[0]))
     times = np.concatenate([_rows(run, end)[:-1], _some_middles(run, end)])
     times = times[apart(times, shifted, beside)]
-    ours, theirs = run.at(times).read(*names), other.at(times).read(*names)
-    apart_by = {name: float(np.max(np.abs(ours[name] - theirs[name]), initial=0.0)) for name in names}
+    both = (run._model_columns.by_machine, other._model_columns.by_machine)
+    ours, theirs = (columns.at_places(names, columns.grid.places(times)) for columns in both)
+    apart_by = {name: float(np.max(np.abs(a - b), initial=0.0)) for name, a, b in zip(names, ours, theirs, strict=True)}
     if not pairs.late:
         last = {name: abs(float(run[name][-1] - other[name][-1])) for name in names}
         apart_by = {name: max(size, last[name]) for name, size in apart_by.items()}
