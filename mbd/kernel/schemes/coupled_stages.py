@@ -12,7 +12,7 @@ is solved as it stands, with three times as many unknowns.
 from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.redundancy import sharing
 from mbd.kernel.codes import NOT_CONVERGED, NOT_FINITE, SINGULAR
-from mbd.kernel.records import Kernel, SingularSteps, Steps
+from mbd.kernel.records import Kernel, Memory, SingularSteps, Steps
 from mbd.kernel.schemes.iteration import MAX_ITERATIONS, MAX_RATE_ERROR, MIN_RATE_SHARE, note_fastest
 from mbd.kernel.schemes.radau_end import complete
 from mbd.kernel.schemes.stage_layout import A2_, A_, BALANCES, CHANGES, E_, MU_REAL, STAGE_RATES, stage_place
@@ -29,7 +29,7 @@ from mbd.kernel.schemes.stages import (
 )
 from mbd.kernel.tangent_rules import is_differentiated, solve_plain
 
-__all__ = ["correct_coupled_rates", "couple_stages", "coupled_step"]
+__all__ = ["correct_coupled_rates", "couple_stages", "coupled_step", "stage_weight"]
 
 MIN_CORRECTION_PART = 1e-3
 """Part of a correction below which none reduces the residuals [-]."""
@@ -126,9 +126,7 @@ def couple_stages(K: Kernel, m: int, h: float, t1: float) -> None:
     """
     n = K.n
     size = n + m
-    S = K.stages
-    mu = S[MU_REAL]
-    c = mu * h
+    c = K.stages[MU_REAL] * h
     K.coupled[: 9 * size * size] = 0.0
     for i in range(3):
         for turn in range(3):
@@ -137,17 +135,8 @@ def couple_stages(K: Kernel, m: int, h: float, t1: float) -> None:
             K.block_c_K = c * c if turn == 0 else 0.0
             tangent_of_stage(K, m)
             for j in range(3):
-                own = 0.5 if i == j else 0.0
-                damping = 0.5 * S[A_ + 3 * i + j] / mu
-                stiffness = S[A2_ + 3 * i + j] / (mu * mu)
-                part = stiffness  # of the balance
-                row_part = mu * stiffness  # of rows
-                if turn == 1:
-                    part = own + damping - stiffness
-                    row_part = S[A_ + 3 * i + j] - row_part
-                elif turn == 2:
-                    part = own - damping
-                    row_part = 0.0
+                part = stage_weight(K, i, j, turn, False)
+                row_part = stage_weight(K, i, j, turn, True)
                 for k in range(size):
                     weight = part if k < n else row_part
                     o = (i * size + k) * 3 * size + j * size
@@ -157,3 +146,18 @@ def couple_stages(K: Kernel, m: int, h: float, t1: float) -> None:
                         for other in range(n, size):
                             K.coupled[o + other] = K.out[k * size + other]
     K.n_tangents += 9
+
+
+def stage_weight(K: Memory, i: int, j: int, turn: int, is_row: bool) -> float:
+    """What F, P or L of stage i (turn 0, 1, 2) weighs in its balance, or its rows, by changes of stage j."""
+    S = K.stages
+    mu = S[MU_REAL]
+    slope = S[A_ + 3 * i + j]
+    stiffness = S[A2_ + 3 * i + j] / (mu * mu)
+    if is_row:
+        return float(mu * stiffness if turn == 0 else (slope - mu * stiffness if turn == 1 else 0.0))
+    if turn == 0:
+        return float(stiffness)
+    own = 0.5 if i == j else 0.0
+    damping = 0.5 * slope / mu
+    return float(own + damping - stiffness if turn == 1 else own - damping)

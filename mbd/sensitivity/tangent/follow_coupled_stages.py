@@ -13,9 +13,9 @@ from __future__ import annotations
 from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import solve_held
 from mbd.kernel.records import Kernel
+from mbd.kernel.schemes.coupled_stages import stage_weight
 from mbd.kernel.schemes.stage_layout import (
     A2_,
-    A_,
     BALANCES,
     CHANGES,
     HEIGHTS,
@@ -108,17 +108,8 @@ def fill_coupled(K: Kernel, m: int, h: float, t1: float) -> None:
             K.block_c_K = c * c if turn == 0 else 0.0
             tangent_of_stage(K, m)
             for j in range(3):
-                own = 0.5 if i == j else 0.0
-                damping = 0.5 * S[A_ + 3 * i + j] / mu
-                stiffness = S[A2_ + 3 * i + j] / (mu * mu)
-                part = stiffness
-                row_part = mu * stiffness
-                if turn == 1:
-                    part = own + damping - stiffness
-                    row_part = S[A_ + 3 * i + j] - row_part
-                elif turn == 2:
-                    part = own - damping
-                    row_part = 0.0
+                part = stage_weight(K, i, j, turn, False)
+                row_part = stage_weight(K, i, j, turn, True)
                 for k in range(size):
                     weight = part if k < n else row_part
                     o = (i * each + k) * whole + j * each
