@@ -208,9 +208,9 @@ def _pulls(name: str) -> str:
 def _faults(found: Instant) -> list[str]:
     """Active rows that the state does not satisfy."""
     state, system = found.state, found.system
-    y = np.concatenate([state.v, state.z])
+    y, speed = np.concatenate([state.v, state.z]), float(np.max(np.abs(state.v), initial=0.0))
     left = residuals(found.mechanism, state.time, state.q, y, system.parameters, system.anchors)
-    faults = violations(found.mechanism.equations.rows, found.rows, left)
+    faults = violations(found.mechanism.equations.rows, found.rows, left, speed)
     if faults:
         faults[-1] += "; mbd.project(model, state) or mbd.assemble(model, …) gives a state that satisfies all rows"
     return faults

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.assembly.conditions import Condition, conditions
-from mbd.assembly.consistency import ASSEMBLED_RTOL
+from mbd.assembly.consistency import ASSEMBLED_RESIDUAL
 from mbd.assembly.contradictions import Attempt, contradictions, infeasible
 from mbd.assembly.doubtful import doubtful
 from mbd.assembly.foot_places import foot_places
@@ -259,7 +259,8 @@ def _closed(work: Posture, named: _Named, project: bool, model: Any) -> list[str
         return never
     capture(work)
     speed_misfit = close_velocities(work, free[1])
-    if project and np.max(np.abs(speed_misfit), initial=0.0) > EQUAL_RTOL and work.rates:
+    speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
+    if project and np.max(np.abs(speed_misfit), initial=0.0) > EQUAL_RTOL * speed and work.rates:
         work.y = y.copy()
         if nearest_velocities(work, work.active_rows, named.v):
             speed_misfit = np.zeros(len(speed_misfit))
@@ -278,7 +279,8 @@ def _closed_as_named(work: Posture, named: _Named, close: Callable[..., Vector])
         return False
     nearest_turns(trial, rows, named.q, EQUAL_RTOL)
     capture(trial)
-    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= EQUAL_RTOL:
+    speed = 1.0 + float(np.max(np.abs(trial.y[: work.equations.n_v]), initial=0.0))
+    if not np.max(np.abs(close_velocities(trial, free[1])), initial=0.0) <= EQUAL_RTOL * speed:
         return False
     capture(trial)
     work.q, work.y, work.anchors = trial.q, trial.y, trial.anchors
@@ -334,12 +336,7 @@ def _below(work: Posture, opened: set[str]) -> list[str]:
     for c, contact in enumerate(work.manager.contacts):
         named_off = isinstance(contact.only_while, str) and contact.only_while not in work.manager.mode(work.flags)
         off = named_off or (contact.only_while is not None and values[3 * count + c] <= 0.0)
-        if (
-            values[c] < -MAX_START_DEPTH * work.sizes.of_contact(contact)
-            and not work.flags[c]
-            and contact.name not in opened
-            and not off
-        ):
+        if values[c] < -MAX_START_DEPTH and not work.flags[c] and contact.name not in opened and not off:
             on = "let it push" if contact.kind == "penalty" else "set it on the surface"
             inside = (
                 f"{contact.name!r} starts {-values[c]:.6g} {contact.unit} {_beyond(contact.unit)}, "
@@ -363,18 +360,16 @@ def _beyond(unit: str) -> str:
 def _armed(work: Posture, opened: set[str]) -> frozenset[str]:
     """Open contacts that may close from the start.
 
-    One that touches (|g| below 1e-8 of its size) and waits for another by `When` is a trailing foot: ignored until it
-    has risen.
+    One that touches (|g| below 1e-8) and waits for another by `When` is a trailing foot: ignored until it has risen.
     """
     armed = set[str]()
     if not work.manager.contacts:
         return frozenset(armed)
     values = _gaps(work)
     for c, contact in enumerate(work.manager.contacts):
-        size = work.sizes.of_contact(contact)
-        lifted = values[c] > ASSEMBLED_RTOL * size
+        lifted = values[c] > ASSEMBLED_RESIDUAL
         trailing = bool(contact.when) or contact.name in opened
-        if not work.flags[c] and (lifted or (not trailing and values[c] > -MAX_START_DEPTH * size)):
+        if not work.flags[c] and (lifted or (not trailing and values[c] > -MAX_START_DEPTH)):
             armed.add(contact.name)
     return frozenset(armed)
 

@@ -64,7 +64,7 @@ def changed_start(
         capture(work)
         close_velocities(work, free_v)
         rows = residuals(mechanism, work.time, work.q, work.y, work.parameters, work.anchors)
-        left = violations(equations.rows, active, rows)
+        left = violations(equations.rows, active, rows, float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0)))
         if left:
             shown = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
             raise AssemblyError(f"no start with {shown}: {'; '.join(left)}")

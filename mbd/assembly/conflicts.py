@@ -111,11 +111,11 @@ def irreducible(items: Sequence[Any], holds: Callable[[list[Any]], bool]) -> lis
     return kept
 
 
-def solvable(B: Matrix, right: Vector, tolerance: Vector | float) -> bool:
+def solvable(B: Matrix, right: Vector, tolerance: float) -> bool:
     """Whether ``B w = right`` has a solution, to a tolerance of the right-hand sides."""
     if not len(right):
         return True
-    return bool(np.all(np.abs(misfit(B, right)) <= tolerance))
+    return bool(np.max(np.abs(misfit(B, right))) <= tolerance)
 
 
 def misfit(B: Matrix, right: Vector, weights: Vector | float = 1.0) -> Vector:
@@ -129,7 +129,7 @@ def misfit(B: Matrix, right: Vector, weights: Vector | float = 1.0) -> Vector:
 
 
 def linear_conflict(
-    B: Matrix, right: Vector, members: Sequence[Member], units: Sequence[str], level: str, tolerance: Vector | float
+    B: Matrix, right: Vector, members: Sequence[Member], units: Sequence[str], level: str, tolerance: float
 ) -> Conflict | None:
     """An irreducible set of rows of ``B w = right`` without a solution, told by their members; None if there is one.
 
@@ -140,15 +140,14 @@ def linear_conflict(
     level : 'velocity' or 'acceleration'
     tolerance : of the right-hand sides
     """
-    bound = np.broadcast_to(tolerance, len(right))
-    if solvable(B, right, bound):
+    if solvable(B, right, tolerance):
         return None
 
     def rows(chosen: Sequence[Member]) -> list[int]:
         return [k for k, member in enumerate(members) if member in chosen]
 
     every = list(dict.fromkeys(members))
-    least = irreducible(every, lambda chosen: solvable(B[rows(chosen)], right[rows(chosen)], bound[rows(chosen)]))
+    least = irreducible(every, lambda chosen: solvable(B[rows(chosen)], right[rows(chosen)], tolerance))
     picked = rows(least)
     weights = np.array([1.0 if members[k] == least[-1] else HELD_ROW_WEIGHT for k in picked])
     left = np.abs(misfit(B[picked], right[picked], weights)) * (weights == 1.0)

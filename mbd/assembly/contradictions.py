@@ -23,7 +23,7 @@ class Attempt:
     rows : numbers of the rows on positions; q, y : the values from which closing began
     held_q, held_v : named coordinates and rates, which stay
     projected : whether named coordinates and rates were free to move
-    misfit, speed_misfit : what is left of `rows` and named positions, of the active rows and named rates, over sizes
+    misfit, speed_misfit : what is left of `rows` and named positions, of the active rows and named rates
     """
 
     rows: Sequence[int]
@@ -43,7 +43,7 @@ def infeasible(work: Posture, rows: Sequence[int], start: Vector, misfit: Vector
     ----------
     work : the posture that closing reached
     rows, start : numbers of the rows, and q from which closing began
-    misfit : what is left of the rows and of named positions, over their sizes
+    misfit : what is left of the rows and of named positions
     named : whether values were held, so that the rows alone might close
     """
     if np.max(np.abs(misfit), initial=0.0) <= EQUAL_RTOL or not np.isfinite(misfit).all():
@@ -57,7 +57,8 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
     active = work.active_rows
     if not (active or rows or work.places or work.rates):
         return []
-    fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > EQUAL_RTOL)
+    speed = 1.0 + float(np.max(np.abs(work.y[: equations.n_v]), initial=0.0))
+    fast = bool(np.max(np.abs(speed_misfit), initial=0.0) > EQUAL_RTOL * speed)
     if fast and np.isfinite(speed_misfit).all():
         conflict = velocity_conflict(work, loops_of(model))
         if conflict is not None:
@@ -69,13 +70,11 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
         *(("", *each) for each in zip(work.places, misfit[len(rows) :], strict=True)),
         *(("the rate of ", *each) for each in zip(work.rates, speed_misfit[len(active) :], strict=True)),
     ]
-    block, terms = work.mechanism.block(work.time, work.q, work.y, work.anchors), work.terms()
     found = [
         f"{'' if condition.name.endswith('.rate') else which}{condition.name!r} = {condition.target:.9g} cannot be "
-        f"reached: off by {condition.at(block, work.parameters)[0]:.6g}; name fewer values"
-        f"{sets.get(repr(condition.name), '')}"
+        f"reached: off by {off:.6g}; name fewer values" + sets.get(repr(condition.name), "")
         for which, condition, off in wanted
-        if not abs(off) <= EQUAL_RTOL
+        if not abs(off) <= EQUAL_RTOL * speed
     ]
     for k in active:
         row = equations.rows[k]
@@ -85,12 +84,12 @@ def contradictions(work: Posture, attempt: Attempt, model: Any) -> list[str]:
                 f"{row.title} is not finite at the start: check roots, logarithms and divisions, and "
                 "whether a disk lies flat, which touches with all its edge"
             )
-        elif abs(position) > EQUAL_RTOL or abs(velocity) > EQUAL_RTOL:
-            place = "" if row.is_velocity else f"position residual {position * work.sizes.rows[k]:.6g} {row.unit}, "
+        elif abs(position) > EQUAL_RTOL or abs(velocity) > EQUAL_RTOL * speed:
+            place = "" if row.is_velocity else f"position residual {position:.6g} {row.unit}, "
             sticks = row.contact >= 0 and k != equations.contacts[row.contact].rows[0] and row.friction < 0
             slide = f"{row.owner!r} sticks while it is closed, and slides with friction=mu; "
             found.append(
-                f"the start contradicts {row.title}: {place}velocity residual {terms.rate[k]:.6g} {row.unit}/s; "
+                f"the start contradicts {row.title}: {place}velocity residual {velocity:.6g} {row.unit}/s; "
                 f"{slide if sticks and not row.is_velocity else ''}name fewer values"
                 f"{'' if attempt.projected else PROJECT_ADVICE}" + sets.get(repr(row.owner), "")
             )

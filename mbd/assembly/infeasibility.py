@@ -13,7 +13,7 @@ from mbd.assembly.conflicts import HELD_ROW_WEIGHT, Conflict, Member, irreducibl
 from mbd.assembly.pose import Posture
 from mbd.assembly.posture import close_positions, descend, descents
 from mbd.dataclass import dataclass
-from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL
+from mbd.equal import EQUAL_RTOL
 
 MAX_CONFLICTING_SETS = 5
 """Conflicting sets that are reported at once."""
@@ -91,7 +91,7 @@ def _conflict(work: Posture, start: Vector, rows: Sequence[int], loops: Loops, s
     for k, member, value in zip(rows, members, missing, strict=True):
         if member == members[-1]:
             unit = equations.rows[k].unit
-            sizes[unit] = float(np.hypot(sizes.get(unit, 0.0), value * work.sizes.rows[k]))
+            sizes[unit] = float(np.hypot(sizes.get(unit, 0.0), value))
     unit = max(sizes, key=lambda each: sizes[each])
     return Conflict("position", tuple(dict.fromkeys(members)), sizes[unit], unit, members[-1], spent)
 
@@ -110,7 +110,7 @@ def _nearest(
     free: Matrix,
     weights: Vector | float = 1.0,
 ) -> tuple[Vector, Matrix]:
-    """Residuals and Jacobian over sizes where Σ (w h)² is least: Levenberg–Marquardt from a few starts."""
+    """Residuals and Jacobian where Σ (w h)² is least: Levenberg–Marquardt from a few starts."""
     best: tuple[Vector, Matrix] | None = None
     for q in descents(work, start, free):
         trial = replace(work, q=q, places=tuple(places))
@@ -123,31 +123,28 @@ def _nearest(
 
 def velocity_conflict(work: Posture, loops: Loops) -> Conflict | None:
     """An irreducible set of active rows that no velocity satisfies at the position of `work`, whatever is named."""
+    equations = work.equations
+    active = work.active_rows
     y = work.y.copy()
-    y[: work.equations.n_v] = 0.0
+    y[: equations.n_v] = 0.0
     terms = work.terms(y=y)
-    speed = work.sizes.speeds(
-        work.y, work.active_rows, terms.rate[work.active_rows] / work.sizes.rows[work.active_rows]
-    )
-    return _conflict_of_rates(work, terms.B, terms.rate, loops, "velocity", EQUAL_RTOL * speed)
+    right = -terms.rate[active]
+    tolerance = EQUAL_RTOL * (1.0 + float(np.max(np.abs(right), initial=0.0)))
+    members = [member_of(equations.rows[k], equations, loops) for k in active]
+    units = [equations.rows[k].unit for k in active]
+    return linear_conflict(terms.B[active][:, : equations.n_v], right, members, units, "velocity", tolerance)
 
 
 def acceleration_conflict(work: Posture, loops: Loops) -> Conflict | None:
     """An irreducible set of active rows that no acceleration satisfies at the state of `work`."""
-    terms, active = work.terms(), work.active_rows
-    bias = np.abs(terms.bias[active]) / work.sizes.rows[active]
-    fast = np.maximum(work.sizes.speeds(work.y, active, np.zeros(len(active))) ** 2, np.max(bias, initial=0.0))
-    return _conflict_of_rates(work, terms.B, terms.bias, loops, "acceleration", NOMINAL_RTOL * fast)
-
-
-def _conflict_of_rates(
-    work: Posture, B: Matrix, left: Vector, loops: Loops, level: str, tolerance: Vector
-) -> Conflict | None:
-    """An irreducible set of active rows that no w satisfies with ``B w + left = 0``; the tolerance is over sizes."""
-    rows, active, sizes = work.equations.rows, work.active_rows, work.sizes
-    members = [member_of(rows[k], work.equations, loops) for k in active]
-    units, slopes = [rows[k].unit for k in active], B[active][:, : work.equations.n_v] * sizes.steps
-    return linear_conflict(slopes, -left[active], members, units, level, tolerance * sizes.rows[active])
+    equations = work.equations
+    active = work.active_rows
+    terms = work.terms()
+    right = -terms.bias[active]
+    tolerance = 1e-6 * (1.0 + float(np.max(np.abs(right), initial=0.0)))
+    members = [member_of(equations.rows[k], equations, loops) for k in active]
+    units = [equations.rows[k].unit for k in active]
+    return linear_conflict(terms.B[active][:, : equations.n_v], right, members, units, "acceleration", tolerance)
 
 
 def named_conflict(
@@ -203,7 +200,8 @@ def _moves(work: Posture, y: Vector, rows: Sequence[int], wanted: Sequence[Condi
     still = replace(work, y=np.concatenate([np.zeros(n_v), y[n_v:]]))
     terms = still.terms()
     picked = list(rows)
-    rate, B = still.over_sizes(picked, terms.rate[picked], terms.B[picked][:, :n_v], wanted)
-    moved = [each.moves[0] for each in held]
-    right = np.concatenate([-rate, [each.value / work.sizes.steps[each.moves[0]] for each in held]])
-    return solvable(np.vstack([B, np.eye(n_v)[moved]]), right, EQUAL_RTOL * float(np.max(np.abs(right), initial=0.0)))
+    rate, B = still.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], wanted)
+    unit = np.eye(n_v)[[k for each in held for k in each.moves]]
+    right = np.concatenate([-rate, [each.value for each in held]])
+    scale = 1.0 + float(np.max(np.abs(right), initial=0.0))
+    return solvable(np.vstack([B, unit]), right, EQUAL_RTOL * scale)

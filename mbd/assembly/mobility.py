@@ -195,13 +195,15 @@ def _posture(
 
 
 def _off(work: Posture, rows: list[int]) -> Any:
-    """Residuals of rows at a given state, over their sizes."""
-    return work.terms().h[rows] / work.sizes.rows[rows]
+    """Residuals of rows at a given state."""
+    terms = work.terms()
+    return terms.h[rows]
 
 
 def _jacobian(work: Posture, active: list[int]) -> Matrix:
-    """B of the active rows, by increments over their sizes."""
-    return np.asarray(work.terms().B[active][:, : work.equations.n_v] * work.sizes.steps)
+    """B of the active rows."""
+    terms = work.terms()
+    return np.asarray(terms.B[active][:, : work.equations.n_v])
 
 
 def _idle(model: Any, work: Posture, active: list[int]) -> list[str]:
@@ -238,10 +240,10 @@ def _generic(work: Posture, rows: list[int], active: list[int], here: Matrix) ->
         if count == work.equations.n_v:
             break
         step = right[count:].T @ random.standard_normal(work.equations.n_v - count)
-        # how far from one to the next, along the motions that the rows allow, over sizes
+        # how far from one to the next, along the motions that the rows allow [m, rad]
         step *= 0.2 / float(np.linalg.norm(step)) * (-1.0 if step @ last < 0.0 else 1.0)  # on, not to and fro
         last = step
-        move(walker, step * work.sizes.steps)
+        move(walker, step)
         if np.max(np.abs(close_nearby(walker, rows, free)), initial=0.0) > EQUAL_RTOL:
             walker.q = before
             continue

@@ -16,7 +16,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.conditions import Condition
 from mbd.assembly.pose import Posture
 from mbd.assembly.posture import close_nearby, close_positions, move
-from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL, RANK_RTOL
+from mbd.equal import EQUAL_RTOL, RANK_RTOL
 
 
 def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, float]) -> bool:
@@ -37,7 +37,7 @@ def nearest_positions(work: Posture, rows: Sequence[int], named: Mapping[int, fl
         for _ in range(100):  # steps of the method of Gauss and Newton
             q, anchors = work.q.copy(), work.anchors.copy()
             change = _step(_jacobian(work, rows), off, slopes, damping)
-            move(work, change / max(1.0, 2.0 * float(np.max(np.abs(change), initial=0.0))) * work.sizes.steps)
+            move(work, change / max(1.0, 2.0 * float(np.max(np.abs(change), initial=0.0))))
             closed = np.max(np.abs(close_nearby(work, rows, free)), initial=0.0) <= EQUAL_RTOL
             new, new_slopes = _off(work, places, named)
             if closed and new @ new < off @ off:
@@ -64,22 +64,20 @@ def nearest_velocities(work: Posture, rows: Sequence[int], named: Mapping[int, f
     """
     n_v = work.equations.n_v
     terms = work.terms()
-    rate, B = work.over_sizes(rows, terms.rate[list(rows)], terms.B[list(rows)][:, :n_v], ())
+    B, rate = terms.B[list(rows)][:, :n_v], terms.rate[list(rows)]
     off, slopes = _misfits(work, work.rates, named, work.y)
     first, free = _split(B, rate)
     wanted = -(off + slopes @ first)
-    left, sizes, right = np.linalg.svd(slopes @ free, full_matrices=False)
-    able = sizes > NOMINAL_RTOL  # a limit is found to √ε only: there the rates of what is at its limit are none
-    change = first + free @ (right[able].T @ ((left[:, able].T @ wanted) / sizes[able]))
-    work.y[:n_v] += change * work.sizes.steps
-    missing = work.terms().rate[list(rows)] / work.sizes.rows[list(rows)]
-    return bool(np.all(np.abs(missing) <= EQUAL_RTOL * work.sizes.speeds(work.y, rows, rate)))
+    work.y[:n_v] += first + free @ np.linalg.lstsq(slopes @ free, wanted, rcond=RANK_RTOL)[0]
+    terms = work.terms()
+    speed = 1.0 + float(np.max(np.abs(work.y[:n_v]), initial=0.0))
+    return bool(np.max(np.abs(terms.rate[list(rows)]), initial=0.0) <= EQUAL_RTOL * speed)
 
 
 def _jacobian(work: Posture, rows: Sequence[int]) -> Matrix:
-    """B of the rows, over sizes."""
-    terms, picked = work.terms(), list(rows)
-    return work.over_sizes(picked, terms.h[picked], terms.B[picked][:, : work.equations.n_v], ())[1]
+    """B of the rows."""
+    terms = work.terms()
+    return np.asarray(terms.B[list(rows)][:, : work.equations.n_v])
 
 
 def _split(B: Matrix, residual: Vector) -> tuple[Vector, Matrix]:
@@ -110,9 +108,7 @@ def _off(work: Posture, places: Sequence[Condition], named: Mapping[int, float])
     configuration = work.equations.configuration
     if len(named):
         turning = configuration.rates(work.q, np.eye(configuration.n_v)).T  # N(q), n_q × n_v
-        sizes = work.sizes.steps[[configuration.velocities_of[k][0] for k in named]]
-        slopes[: len(named)] = turning[list(named)] * work.sizes.steps / sizes[:, None]
-        off[: len(named)] /= sizes
+        slopes[: len(named)] = turning[list(named)]
     angles = [work.equations.coordinates[k].unit == "rad" for k in named] + [_turns(work, each.name) for each in places]
     return np.where(angles, np.remainder(off + np.pi, 2.0 * np.pi) - np.pi, off), slopes
 
@@ -123,12 +119,14 @@ def _turns(work: Posture, name: str) -> bool:
 
 
 def _misfits(work: Posture, found: Sequence[Condition], named: Mapping[int, float], values: Any) -> Any:
-    """Values less the named ones and their derivatives over sizes: of coordinates or rates, then of other results."""
-    n_v, steps = work.equations.n_v, work.sizes.steps
-    others, of_others = work.over_sizes((), np.zeros(0), np.zeros((0, n_v)), found)
-    own = np.zeros((len(named), n_v))
-    own[range(len(named)), [min(k, n_v - 1) for k in named]] = 1.0  # of rates; those of coordinates are N(q)
-    off = np.array([values[k] - value for k, value in named.items()])
-    if values is work.y:
-        off /= steps[list(named)]
-    return np.append(off, others), np.vstack([own, of_others])
+    """Values less the named ones and their derivatives: of coordinates or rates, then of other results."""
+    n_v = work.equations.n_v
+    block = work.mechanism.block(work.time, work.q, work.y, work.anchors)
+    others = [condition.at(block, work.parameters) for condition in found]
+    off = np.array([*(values[k] - value for k, value in named.items()), *(residual for residual, _ in others)])
+    slopes = np.zeros((len(off), n_v))
+    for line, k in enumerate(named):
+        slopes[line, min(k, n_v - 1)] = 1.0  # of rates; those of coordinates are N(q)
+    for line, (_, slope) in enumerate(others, start=len(named)):
+        slopes[line] = slope
+    return off, slopes

@@ -10,7 +10,7 @@ from mbd.assembly.orientation import faced
 from mbd.assembly.pose import Posture
 from mbd.assembly.turns import choose_turns, hold_directions
 from mbd.compile.orders import MIN_UNKNOWNS
-from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, ROUND_OFF_RTOL, SMALL_SUM_RTOL
+from mbd.equal import EQUAL_RTOL, HALF_PRECISION_RTOL, SMALL_SUM_RTOL
 
 REFINEMENTS = 3
 """Solutions of the linear equations for velocities: bodies without mass leave an error in the first [-]."""
@@ -19,9 +19,7 @@ MAX_LEVER = 2.0
 MAX_STEPS_TO_HALVE = 20
 """Steps of Newton's method in which the largest residual of a start must come down to half [-]."""
 NUDGE, NUDGES = 0.01, 3
-"""Step, over the size of each increment, out of a flat spot of the rows, and how often it is tried."""
-VANISHING, NONE_LEFT = 1e-5, 1e-8
-"""What is left of a row beside others where it may vanish at the posture looked for, and where it has [-]."""
+"""Step [m, rad] out of a flat spot of the rows, and how often it is tried."""
 MAX_STARTS, MAX_DESCENT_STEPS = 4, 400
 """Starts of a descent of the sum of squares of the rows, and its most steps [-]."""
 
@@ -46,33 +44,27 @@ def _involved(B: Matrix, free: Matrix, missing: float = 0.0) -> Any:
     return np.flatnonzero(free & (np.max(np.abs(B), axis=0, initial=0.0) > least))
 
 
+def _weighted(M: Matrix) -> Matrix:
+    """The mass matrix made definite, so that coordinates without inertia move at almost no cost."""
+    size = float(np.max(np.abs(np.diag(M)), initial=0.0)) or 1.0
+    return np.asarray(M + 1e-9 * size * np.eye(len(M)))
+
+
 class _LeastChange:
-    """The change d with B d = −residual nearest to `pull` in the M-norm; least squares where rows depend.
-
-    Rows are weighed by the mass that they move, so that light bodies beside heavy ones decide no rank.
-
-    vanishing : whether what is left of a row beside others is neither clearly there nor clearly round-off
-    """
+    """The change d with B d = −residual nearest to `pull` in the M-norm; least squares where rows depend."""
 
     def __init__(self, M: Matrix, B: Matrix) -> None:
-        flow, lengths = np.linalg.inv(M) @ B.T, np.einsum("ij,ij->i", B, B)
-        mobility = np.einsum("ij,ji->i", B, flow)
-        self.weights = np.sqrt(np.divide(lengths, mobility, out=np.ones(len(B)), where=mobility > 0.0))
-        self.B, self.flow = B * self.weights[:, None], flow * self.weights
-        self.matrix = self.B @ self.flow
+        self.B, self.flow = B, np.linalg.inv(_weighted(M)) @ B.T
+        self.matrix = B @ self.flow
         self.inverse = _regular_inverse(self.matrix) if len(B) >= MIN_UNKNOWNS else None
-        self.vanishing, self.solution = False, self.inverse
-        if self.solution is None:
-            left, sizes, right = np.linalg.svd(self.matrix)
-            largest = float(np.max(sizes, initial=0.0))
-            kept = sizes > ROUND_OFF_RTOL * largest
-            self.solution = right[kept].T / sizes[kept] @ left[:, kept].T
-            apart = np.linalg.svd(B, compute_uv=False)  # whatever the masses
-            part = apart / (float(np.max(apart, initial=0.0)) or 1.0)
-            self.vanishing = bool(np.any((part > NONE_LEFT) & (part < VANISHING)))
 
     def __call__(self, residual: Vector, pull: Vector) -> Vector:
-        return np.asarray(pull - self.flow @ (self.solution @ (residual * self.weights + self.B @ pull)))
+        right = residual + self.B @ pull
+        if self.inverse is None:
+            multiplier = np.linalg.lstsq(self.matrix, right, rcond=1e-12)[0]
+        else:
+            multiplier = self.inverse @ right
+        return np.asarray(pull - self.flow @ multiplier)
 
 
 def _regular_inverse(matrix: Matrix) -> Matrix | None:
@@ -86,7 +78,7 @@ def _regular_inverse(matrix: Matrix) -> Matrix | None:
 
 
 def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
-    """The free coordinates that satisfy the rows nearest to the given ones; the residual of each row over its size.
+    """The free coordinates that satisfy the rows nearest to the given ones; the remaining residual of each row.
 
     Newton's method from the given values; where it gets stuck, from others with the free angles turned, and at last
     from where the sum of squares of the rows is least, which Newton's method misses near singular poses.
@@ -110,7 +102,7 @@ def close_positions(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
     for q in descents(work, start, free) if np.max(np.abs(misfit)) > EQUAL_RTOL else ():
         work.q = q
         missing, _ = descend(work, rows, free, weights)
-        if np.max(np.abs(missing)) < 1e-3:  # from such residuals on Newton's method may go on
+        if np.max(np.abs(missing)) < 1e-3:  # from such residuals [m, rad] on Newton's method may go on
             again = _newton(work, rows, free, work.q.copy())
             if np.max(np.abs(again)) <= EQUAL_RTOL:
                 return again
@@ -122,7 +114,7 @@ def descents(work: Posture, start: Vector, free: Matrix) -> list[Vector]:
     """Positions to descend from: the given one, and others with the free angles turned and the rest shifted."""
     if not bool(np.any(free)):
         return [start.copy()]
-    reach = np.where(_angles(work), 1.5, 0.5) * work.sizes.steps
+    reach = np.where(_angles(work), 1.5, 0.5)
     turns = np.random.default_rng(1).uniform(-1.0, 1.0, (MAX_STARTS, len(free)))
     turns[0] = 0.0
     return [work.equations.configuration.compose(start, np.where(free, reach * turn, 0.0)) for turn in turns]
@@ -134,7 +126,7 @@ def _angles(work: Posture) -> Any:
 
 
 def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -> tuple[Vector, Matrix]:
-    """(h, B) over sizes at the end of a descent of Σ (w h)² from the position of `work`, which moves there."""
+    """(h, B) at the end of a descent of Σ (w h)² from the position of `work`, which moves there."""
     choose_turns(work, rows)
     n_v, moving = work.equations.n_v, np.flatnonzero(free)
     h, B = _weighted_rows(work, rows, weights)
@@ -147,7 +139,7 @@ def descend(work: Posture, rows: Sequence[int], free: Matrix, weights: Vector) -
         before, x = work.q.copy(), np.zeros(n_v)
         x[moving] = damped_step(J, h, damping)
         x *= min(1.0, 0.5 / float(np.max(np.abs(x))))
-        move(work, x * work.sizes.steps)
+        move(work, x)
         new_h, new_B = _weighted_rows(work, rows, weights)
         if np.linalg.norm(new_h) < np.linalg.norm(h) and np.all(np.isfinite(new_B)):
             h, B, damping = new_h, new_B, max(damping / 3.0, 1e-12)
@@ -168,13 +160,13 @@ def _weighted_rows(work: Posture, rows: Sequence[int], weights: Vector) -> tuple
     """w h and w B of rows and named results."""
     terms = work.terms()
     picked = list(rows)
-    h, B, _ = faced(work, picked, terms.h[picked], terms.B[picked][:, : work.equations.n_v])
-    h, B = work.over_sizes(picked, h, B, work.places)
+    h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)
+    h, B, _ = faced(work, picked, h, B)
     return weights * h, weights[:, None] * B
 
 
 def close_nearby(work: Posture, rows: Sequence[int], free: Matrix) -> Vector:
-    """Newton's method from the present position alone; the remaining residual of each row over its size."""
+    """Newton's method from the present position alone; the remaining residual of each row."""
     hold_directions(work.mechanism, work.time, work.q, work.parameters, work.anchors)
     return _newton(work, rows, free, work.q.copy()) if rows or work.places else np.zeros(0)
 
@@ -195,8 +187,8 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
     for iteration in range(200):
         work.iterations += 1
         terms = work.terms()
-        h, B, opposite = faced(work, picked, terms.h[picked], terms.B[picked][:, :n_v])
-        h, B = work.over_sizes(picked, h, B, work.places)
+        h, B = work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places)
+        h, B, opposite = faced(work, picked, h, B)
         if opposite and iteration < NUDGES:
             _turn_away(work, free)
             continue
@@ -217,22 +209,18 @@ def _newton(work: Posture, rows: Sequence[int], free: Matrix, start: Vector) -> 
         if near:
             acting = _involved(B, free, size)
             places = acting if len(acting) else places
-            change = np.where(free, work.equations.configuration.difference(work.q, start), 0.0) / work.sizes.steps
-        M = work.sizes.metric(terms.M[:n_v, :n_v])[np.ix_(places, places)]
-        least_change = _LeastChange(M, B[:, places])
-        if least_change.vanishing:  # the pull would lead along what rows hold to second order
-            change[:] = 0.0
-        change[places] = least_change(h, change[places])
+            change = np.where(free, work.equations.configuration.difference(work.q, start), 0.0)
+        M = terms.M[:n_v, :n_v][np.ix_(places, places)]
+        change[places] = _LeastChange(M, B[:, places])(h, change[places])
         limit = max(1.0, float(np.max(np.abs(change))) / 0.5)
-        if size < 1e-13 and (least_change.vanishing or float(np.max(np.abs(change))) < 1e-12):
+        if size < 1e-13 and float(np.max(np.abs(change))) < 1e-12:
             return h
         if iteration > 60 and size > 0.5 * before and size < 1e-12:
             return h
         before = size
-        move(work, change / limit * work.sizes.steps)
+        move(work, change / limit)
     terms = work.terms()
-    h, B, _ = faced(work, picked, terms.h[picked], terms.B[picked][:, :n_v])
-    return work.over_sizes(picked, h, B, work.places)[0]
+    return faced(work, picked, *work.with_conditions(terms.h[picked], terms.B[picked][:, :n_v], work.places))[0]
 
 
 def _turn_away(work: Posture, free: Matrix) -> None:
@@ -243,12 +231,11 @@ def _turn_away(work: Posture, free: Matrix) -> None:
 
 def _nudge(work: Posture, rows: Sequence[int], free: Matrix) -> None:
     """Leave a flat spot, where no free coordinate acts on the rows, along those that act on them nearby."""
-    step = np.where(free, NUDGE * (1.0 + np.arange(len(free)) / 7.0), 0.0) * work.sizes.steps
+    step = np.where(free, NUDGE * (1.0 + np.arange(len(free)) / 7.0), 0.0)
     nearby = work.equations.configuration.compose(work.q, step)
     terms = work.terms(nearby)
     acting = np.zeros(len(free))
-    B = terms.B[list(rows)][:, : work.equations.n_v] * work.sizes.steps / work.sizes.rows[list(rows)][:, None]
-    acting[_involved(B, free)] = 1.0
+    acting[_involved(terms.B[list(rows)][:, : work.equations.n_v], free)] = 1.0
     move(work, acting * step)
 
 
@@ -264,21 +251,18 @@ def capture(work: Posture) -> None:
 
 
 def close_velocities(work: Posture, free: Matrix) -> Vector:
-    """Complete the free velocities; the remaining rate of each active row, over its size and speed (`Sizes.speeds`)."""
+    """Complete the free velocities; the remaining rate of each active row."""
     picked = work.active_rows
     if not picked and not work.rates:
         return np.zeros(0)
-    n_v, least_change, asked = work.equations.n_v, None, np.zeros(0)
+    n_v, least_change = work.equations.n_v, None
     for refinement in range(REFINEMENTS + 1):
         terms = work.terms()
-        rate, B = work.over_sizes(picked, terms.rate[picked], terms.B[picked][:, :n_v], work.rates)
-        asked = asked if refinement else rate
+        rate, B = work.with_conditions(terms.rate[picked], terms.B[picked][:, :n_v], work.rates)
         places = _involved(B, free)
         if refinement == REFINEMENTS or not len(places):
             break
         if least_change is None:  # neither M nor B follow velocities
-            metric = work.sizes.metric(terms.M[:n_v, :n_v])[np.ix_(places, places)]
-            least_change = _LeastChange(metric, B[:, places])
-        work.y[places] += work.sizes.steps[places] * least_change(rate, np.zeros(len(places)))
-    fast = work.sizes.speeds(work.y, picked, asked)
-    return np.divide(rate, fast, out=rate.copy(), where=fast > 0.0)
+            least_change = _LeastChange(terms.M[:n_v, :n_v][np.ix_(places, places)], B[:, places])
+        work.y[places] += least_change(rate, np.zeros(len(places)))
+    return rate

@@ -93,11 +93,12 @@ def _close(work: Posture) -> None:
     def found() -> Any:
         return residuals(work.mechanism, work.time, work.q, work.y, work.parameters, work.anchors)
 
-    if np.any(np.abs(found()[0, active]) > EQUAL_RTOL * work.sizes.rows[active]):
+    if np.max(np.abs(found()[0, active]), initial=0.0) > EQUAL_RTOL:
         close_nearby(work, position_rows(work), free)
         capture(work)
     close_velocities(work, free)
-    left = violations(work.equations.rows, active, found())
+    speed = float(np.max(np.abs(work.y[: work.equations.n_v]), initial=0.0))
+    left = violations(work.equations.rows, active, found(), speed)
     left += reversed_joints(work.mechanism, work.time, work.q, work.parameters, work.anchors)
     if left:
         raise AssemblyError(

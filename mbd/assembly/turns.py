@@ -87,9 +87,10 @@ def _in_rows(work: Posture, rows: Sequence[int]) -> set[int]:
 
 
 def _residuals(work: Posture, rows: Sequence[int]) -> Vector:
-    """Rows and named results, over their sizes."""
-    terms, picked = work.terms(), list(rows)
-    return work.over_sizes(picked, terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)[0]
+    """Rows and named results."""
+    terms = work.terms()
+    picked = list(rows)
+    return work.with_conditions(terms.h[picked], terms.B[picked][:, : work.equations.n_v], work.places)[0]
 
 
 def keep_wrapped(work: Posture, q: Vector, anchors: Vector) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
-from mbd.assembly.sizes import definite
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equal import ROUND_OFF_RTOL
@@ -222,7 +221,9 @@ class Completion:
         sizes = np.abs(B).max(axis=0, initial=0.0)
         places = np.flatnonzero((sizes > 1e-12 * sizes.max(initial=0.0)) & free)
         if len(places):
-            self._by_row[places] = _by_row(definite(M[places[:, None], places]), B[:, places])
+            part, rows = M[places[:, None], places], B[:, places]
+            part.flat[:: len(places) + 1] += 1e-9 * (float(np.abs(part.diagonal()).max()) or 1.0)
+            self._by_row[places] = _by_row(part, rows)
 
     def is_of(self, B: Matrix, free: Flags) -> bool:
         """Whether it is that of these rows too."""

@@ -103,4 +103,5 @@ def violations_now(run: RunData, found: NDArray[np.float64], usual: NDArray[np.f
     """`mbd.assembly.consistency.violations` of the rows that are active now."""
     v = run.kernel
     active = run.manager.active_rows(v.closed[: v.n_contacts])
-    return violations(run.mechanism.equations.rows, active, found, usual)
+    speed = float(np.max(np.abs(v.y[: v.n_v]), initial=0.0))
+    return violations(run.mechanism.equations.rows, active, found, speed, usual)
