@@ -1,10 +1,12 @@
 """The pages of docs/ and the README: every Python block runs, and prints what the comment beside it says."""
 
 import ast
+import logging
 import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +99,9 @@ def run_block(page: Path, before: int, code: str, namespace: dict[str, Any]) -> 
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_block_of_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):
+def test_every_block_of_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch, request):
+    log = logging.getLogger("mbd")
+    request.addfinalizer(partial(log.setLevel, log.level))
     monkeypatch.chdir(tmp_path)
     namespace: dict[str, Any] = {"__name__": "page"}
     monkeypatch.setitem(sys.modules, "page", type(sys)("page"))  # where the classes of a page live
