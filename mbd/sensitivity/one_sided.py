@@ -17,6 +17,7 @@ from mbd.arrays import Matrix, Vector
 from mbd.assembly.projection import project
 from mbd.bodies.values import is_number
 from mbd.equal import EQUAL_RTOL, INSTANT_RTOL, NOMINAL_RTOL
+from mbd.equations.equations import Guard
 from mbd.errors import MbdError, OneSidedError
 from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.motion import Mode, Motion, Rates
@@ -74,8 +75,7 @@ class _Watched:
             if not self.mode.closed[k] and self._is_watched(k) and self._crosses(k, -1, within):
                 yield contact.name
         for e, guard in enumerate(self.equations.guards):
-            acts = guard.reset is not None or guard.terminal
-            if acts and self._crosses(2 * n_c + e, guard.direction, within):
+            if _ends(guard) and self._crosses(2 * n_c + e, guard.direction, within):
                 yield guard.name
 
     def _is_watched(self, k: int) -> bool:
@@ -109,6 +109,11 @@ class _Watched:
                 yield friction.name
 
 
+def _ends(guard: Guard) -> bool:
+    """Whether the event of a guard changes the run."""
+    return guard.reset is not None or guard.terminal
+
+
 def refuse_sided_start(
     rows: RunRows, programs: Programs, at_row: Callable[[int], tuple[Motion, Rates]], looked: tuple[Vector, ...]
 ) -> None:  # fmt: skip
@@ -120,9 +125,14 @@ def refuse_sided_start(
     if not is_any(programs):
         return
     within = INSTANT_RTOL * _duration(rows)
-    if not programs.equations.frictions and np.all(np.abs(looked[0]) > 2.0 * within * np.abs(looked[1])):
+    mode, equations = rows.mode(0), programs.equations
+    chosen = [(k, -1) for k in range(len(equations.contacts)) if not mode.closed[k]]
+    first = 2 * len(equations.contacts)
+    chosen += [(first + e, guard.direction) for e, guard in enumerate(equations.guards) if _ends(guard)]
+    pace = [(k, sense * looked[1][k] if sense else abs(looked[1][k])) for k, sense in chosen]
+    if not (equations.frictions or any(speed > 0.0 and abs(looked[0][k]) <= 2.0 * within * speed for k, speed in pace)):
         return
-    (motion, rates), mode = at_row(0), rows.mode(0)
+    motion, rates = at_row(0)
     watched = _Watched(programs, motion, mode, rates)
     if names := dict.fromkeys(watched.starting()):
         raise sided(
