@@ -31,7 +31,8 @@ def scene(M, normals, tangents, mu, velocity, closed=None):
     size = n + rows
     K = Scene(
         vector=1, n=n, n_v=n, n_q=n, n_rows=rows, n_contacts=contacts, n_frictions=frictions, n_cones=0, n_clusters=1,
-        dt=0.0, n_machines=0, n_impulses=0, n_anchors=0, loaded=0, loads_act=0, n_modes=0, params=np.zeros(1),
+        dt=0.0, n_machines=0, n_impulses=0, n_anchors=0, loaded=0, loads_act=0, limits=np.zeros(24, dtype=int),
+        params=np.zeros(1),
         acc=np.zeros(n * n + n + 2 * n * rows + 3 * rows + 1 + max(frictions, 1)),
         kkt=np.zeros(size * size), rhs=np.zeros(size), columns=np.zeros(size, dtype=int), work=np.zeros(3 * size),
         basis=np.zeros((rows + 1) * n), lower=np.zeros((rows + 1) * rows), dependence=np.zeros(rows * rows),

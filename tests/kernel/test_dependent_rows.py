@@ -18,7 +18,7 @@ def judged(B, M, whole):
 
     acc = np.concatenate([M.ravel(), np.zeros(n + n * m), B.ravel(), np.zeros(3 * m)])
     K = Kernel(
-        n=n, n_v=n, n_rows=m, n_modes=0, vector=1, acc=acc,
+        n=n, n_v=n, n_rows=m, vector=1, acc=acc, limits=np.zeros(24, dtype=np.int64),
         rows=np.arange(m), row_unit=np.zeros(m, dtype=np.int64), unit=np.zeros(n, dtype=np.int64),
         dropped=np.zeros(m, dtype=np.int64), state=np.zeros(64, dtype=np.int64), work=np.zeros(n + m),
         basis=np.full((m + 1) * n, 7.0), lower=np.zeros((m + 1) * m), dependence=np.zeros(m * m),
