@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.equations.equations import Guard
+from mbd.equations.programs import ActiveSet
 from mbd.kernel.records import TABLE
 from mbd.sensitivity.tangent.build import entry, plain_entry
 from mbd.sensitivity.tangent.follow_coupled_stages import MAX_COUPLED
@@ -93,6 +94,7 @@ class TangentStepper(Stepper):
         self._code = np.zeros(0, dtype=np.int64)  # their addresses
         self._code_settled = False
         self._of_modes: dict[Hashable, list[Derivative]] = {}
+        self._others: list[int] = []  # of each mode, functions that run without derivatives only
         self.scheme = Kept(self)
         self._begin()
 
@@ -107,6 +109,7 @@ class TangentStepper(Stepper):
 
     def begin_again(self, parameters: Vector, end: float) -> None:
         super().begin_again(parameters, end)
+        del self._others[len(self.modes) :]
         for room in self._cleared:
             room[:] = 0.0
         self._begin()
@@ -147,13 +150,14 @@ class TangentStepper(Stepper):
 
     def differentiate_by(self, places: Sequence[tuple[int, int]]) -> None:
         """Parameters that have derivatives, see `mbd.sensitivity.tangent.programs.Derivative`."""
-        common = len(self.functions) - self._n_of_modes
         if tuple(places) != self.places:
             self.places, self._of_modes = tuple(places), {}
             self._programs = derivatives_of_programs(self.mechanism, self.places)
-        del self._programs[common:]
+        del self._programs[len(self.functions) - self._n_of_modes :]
+        for code, others in zip(self.modes, self._others, strict=True):  # of earlier runs
+            self._programs += self._derivatives_of_mode(code.active, others)
         self._code = self._code[:0]
-        assert len(self._programs) == common  # in the same order
+        assert len(self._programs) == len(self.functions)  # in the same order
 
     def follow_rows(self) -> None:
         """Store the derivatives of all rows, not only of those at events."""
@@ -162,16 +166,20 @@ class TangentStepper(Stepper):
     def add_mode(self) -> None:
         known = len(self.functions)
         super().add_mode()
-        code, others = self.modes[-1], len(self.functions) - known - 2
-        key = code.active
+        self._others.append(len(self.functions) - known - 2)
+        found = self._derivatives_of_mode(self.modes[-1].active, self._others[-1])
+        self._programs += found
+        behind = len(found) - (len(self.functions) - known)
+        self.functions += behind * [no_values(self.mechanism)]
+        self._n_of_modes += behind
+
+    def _derivatives_of_mode(self, key: ActiveSet, others: int) -> list[Derivative]:
+        """In the order of its functions, and behind them see `words.turned_program` and what follows."""
         if key not in self._of_modes:
             newton = self.own.programs == "stepping"
             self._of_modes[key] = derivatives_of_modes(self.mechanism, key, self.places or (), newton)
         tangent, residual, turned, *solved = self._of_modes[key]
-        # others run without derivatives only; behind them see `words.turned_program` and what follows
-        self._programs += [tangent, residual, *others * [turned], turned, residual, *solved]
-        self.functions += (2 + len(solved)) * [no_values(self.mechanism)]
-        self._n_of_modes += 2 + len(solved)
+        return [tangent, residual, *others * [turned], turned, residual, *solved]
 
     def _advance_compiled(self) -> int:
         known = self._table is not None and not self._provisional

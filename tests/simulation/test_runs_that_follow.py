@@ -90,6 +90,23 @@ def test_a_run_is_not_asked_for_modes_that_earlier_ones_have_met(monkeypatch):
     assert not asked
 
 
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_derivatives_by_others_follow_in_modes_that_earlier_runs_have_met(scheme, monkeypatch):
+    """The programs of a mode that is known are those of the parameters that are asked for now."""
+
+    def found(model, names):
+        return mbd.sensitivities(model, kneed_walker_start(model), scheme, dt=5e-3, until="right foot", wrt=names)
+
+    one, other = ["left hip.angle", "hip.mass"], ["left thigh.mass", "right hip.angle.rate", "left shank.length"]
+    fresh = [found(kneed_walker(), names).matrix for names in (one, other)]
+    model, asked, add_mode = kneed_walker(), [], stepper.Stepper.add_mode
+    monkeypatch.setattr(stepper.Stepper, "add_mode", lambda self: (asked.append(self), add_mode(self)))
+    for k in (0, 1, 0, 1):
+        asked.clear()
+        np.testing.assert_allclose(found(model, (one, other)[k]).matrix, fresh[k], rtol=1e-9, atol=1e-11)
+    assert not asked
+
+
 @pytest.mark.parametrize("scheme", SCHEMES[1:], ids=repr)
 def test_trial_runs_of_a_tolerance_take_the_arrays_of_each_other(scheme, monkeypatch):
     model, made = ball(), []

@@ -172,7 +172,7 @@ class Stepper:
         v, own, known = self.kernel, self.shelves.arrays, len(self.modes)
         alone = not (v.n_rows or v.n_contacts or v.n_frictions)  # the only one has the only order
         same = v.mode_code is own["mode_code"] and (v.orders is own["orders"] or alone)
-        if type(self) is Stepper and known != self._kept[0] and known == v.n_known and same and not self.dependent:
+        if known != self._kept[0] and known == v.n_known and same and not self.dependent:
             number = self.place_of("limits").start + TABLE.places["n_known"][1]
             places = [*map(self.place_of, ("mode_key", "mode_code", "mode_order")), slice(number, number + 1)]
             fresh.keep(self.shelves.rooms, 3, places, {"orders": v.orders})
