@@ -193,7 +193,7 @@ class Run(RunData):
                 self.stepper.add_mode()
             elif status == codes.DONE:
                 circular = circular_laws(self.stepper)
-                if not circular and self.boundaries.is_end(target, self.end):  # what is there is left to who goes on
+                if not circular and self.boundaries.is_end(target, self.end):  # left to a run that continues
                     self.label = self.end
                     return "", f"reached t = {self.end:g} s"
                 save(self)
