@@ -14,8 +14,6 @@ from benchmarks.stopwatch import processor_seconds
 from mbd.simulation.batch.runner import Runner
 from mbd.simulation.many_runs import start_line
 
-__all__ = ["measure"]
-
 STARTS = 20000
 """Runs of no length [-]."""
 SIMPLEST, COMPASS = (200, 100), (60, 50)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from benchmarks.figures import NOISY, Figure
 from benchmarks.run import Record
 
-__all__ = ["WORSE", "comparison", "regressions"]
-
 WORSE = 1.15
 """A figure that has grown by more than this is flagged."""
 

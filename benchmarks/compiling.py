@@ -15,8 +15,6 @@ from mbd.equations.derivation import derive
 from mbd.equations.programs import ActiveSet
 from mbd.kernel.contact.active_set import ActiveSetManager
 
-__all__ = ["MODES", "measure", "python_loop"]
-
 LEFT, RIGHT = ("left foot", "left knee lock"), ("right foot", "right knee lock")
 MODES = (LEFT, (*LEFT, RIGHT[1]), RIGHT, (*RIGHT, LEFT[1]))
 """Closed contacts in the order in which a gait meets them."""

@@ -13,8 +13,6 @@ from mbd.equations.cost import operations as total
 from mbd.equations.derivation import derive
 from mbd.kernel.contact.active_set import ActiveSetManager
 
-__all__ = ["measure"]
-
 WALKERS: dict[str, tuple[Callable[[], mbd.Model], tuple[str, ...]]] = {
     "compass": (lambda: compass()[0], ()),
     "7 links": (lambda: seven()[0], ()),

@@ -10,8 +10,6 @@ from benchmarks.figures import Figure, interleaved
 from benchmarks.stopwatch import processor_seconds
 from mbd.cli import Script
 
-__all__ = ["measure"]
-
 SIDES = ("left", "right")
 WALKERS: dict[str, tuple[str, dict[str, Any], float]] = {
     "simplest walker": ("simplest-walker-lagrangian", {"section": "heel strike"}, 5.0),

@@ -10,8 +10,6 @@ from benchmarks.figures import Figure, interleaved
 from benchmarks.stopwatch import processor_seconds
 from benchmarks.walkers import kneed_walker, seven
 
-__all__ = ["measure"]
-
 SCHEMES: dict[str, tuple[mbd.HHT | mbd.RungeKutta853 | mbd.RadauIIA, dict[str, float]]] = {
     "HHT, dt = 2 ms": (mbd.HHT(alpha=0.05), {"dt": 2e-3}),
     "HHT, index 3, dt = 2 ms": (mbd.HHT(alpha=0.05, formulation="index3"), {"dt": 2e-3}),

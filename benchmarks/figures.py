@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from statistics import median
 from time import sleep
 
-__all__ = ["BURST", "NOISY", "Figure", "Samples", "interleaved", "table"]
-
 NOISY = 1.2
 """Median over minimum of the repeats above which a figure is marked as taken on a busy machine."""
 

@@ -13,8 +13,6 @@ from benchmarks.stopwatch import processor_seconds
 from benchmarks.walkers import kneed_walker, knocking_walker
 from mbd.compile.mechanisms import mechanism_of
 
-__all__ = ["measure"]
-
 STEP_TIME = 0.56433
 """Time of one walker step [s]."""
 WALKER_STEPS = 1000

@@ -16,8 +16,6 @@ from benchmarks.stopwatch import kernel_watched, processor_seconds
 from mbd.compile.background import finish
 from mbd.integrators import Integrator
 
-__all__ = ["LARGEST", "SCENES", "Growth", "Scene", "chain", "measure", "page", "sliders", "slope", "write"]
-
 LARGEST = 512
 """Bodies at most, unless others are asked for; a scene may have a smaller number [-]."""
 DT, REPEATS = 1e-3, 5

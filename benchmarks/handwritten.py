@@ -17,8 +17,6 @@ import numpy as np
 from mbd import State
 from mbd.integrators.family import NewmarkFamily
 
-__all__ = ["FLAGS", "Motion", "Program", "compiler", "compiler_version"]
-
 HERE = Path(__file__).with_name("c")
 FLAGS = ("-O3", "-march=native")
 

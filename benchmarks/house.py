@@ -18,8 +18,6 @@ import networkx as nx
 
 from mbd.kernel.records import TABLE
 
-__all__ = ["Count", "House", "measure", "report"]
-
 ROOT = Path(__file__).parents[1]
 
 SILENT = {

@@ -22,8 +22,6 @@ from mbd.compile.background import finish
 from mbd.compile.mechanisms import mechanism_of
 from mbd.laboratory.marker_program import marker_program
 
-__all__ = ["measure"]
-
 FRAMES, MARKED = 2000, 500
 """Frames of inverse dynamics, and of inverse kinematics."""
 PLACES = [(0.06, -0.05, 0.08), (-0.07, -0.2, -0.05), (0.03, -0.3, 0.1)]

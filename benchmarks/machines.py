@@ -20,8 +20,6 @@ import mbd
 from benchmarks.figures import BURST, Figure, Samples, interleaved
 from benchmarks.stopwatch import processor_seconds
 
-__all__ = ["MACHINES", "Walker", "measure"]
-
 SIDES = ("left", "right")
 AIM, RUN_AIM = 2.0, {"a knee of five phases": 1.3}
 """Times of a machine over those of its twin, and of a run of some [-]."""

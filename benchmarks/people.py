@@ -25,8 +25,6 @@ from mbd.equations.cost import operations
 from mbd.equations.derivation import derive
 from mbd.kernel.contact.active_set import ActiveSetManager
 
-__all__ = ["flight", "measure", "on_two_feet", "pinocchio_tree"]
-
 DT, STEPS = 1e-3, 200
 CALLS = 200
 """Of pinocchio in one repeat."""

@@ -6,8 +6,6 @@ import os
 import subprocess
 import sys
 
-__all__ = ["output_of"]
-
 
 def output_of(script: str) -> str:
     """What a script prints in a fresh process that finds the same packages; they have bytecode, as if installed."""

@@ -28,8 +28,6 @@ from benchmarks import (
 from benchmarks.figures import Figure
 from benchmarks.handwritten import FLAGS, compiler, compiler_version
 
-__all__ = ["BASELINE", "GROUPS", "RESULTS", "Record", "load", "measure"]
-
 HERE = Path(__file__).parent
 BASELINE, RESULTS = HERE / "baseline.json", HERE / "results.json"
 GROUPS = (

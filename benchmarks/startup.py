@@ -8,8 +8,6 @@ from functools import partial
 from benchmarks.figures import Figure, interleaved
 from benchmarks.processes import output_of
 
-__all__ = ["measure", "until_done"]
-
 FIRST_STEP = """
 import mbd
 from benchmarks.walkers import kneed_walker

@@ -16,8 +16,6 @@ from benchmarks.handwritten import Program, compiler
 from benchmarks.stopwatch import kernel_watched
 from mbd.integrators.family import NewmarkFamily
 
-__all__ = ["CASES", "Case", "DT", "measure"]
-
 DT = 1e-3
 AIM_RATIO = 1.0
 PAUSE = 1.0

@@ -8,8 +8,6 @@ from time import thread_time
 
 from mbd.kernel import entry
 
-__all__ = ["Stopwatch", "kernel_watched", "processor_seconds"]
-
 
 def processor_seconds(task: Callable[..., object], *arguments: object) -> float:
     """What a call takes."""

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import mbd
 
-__all__ = ["COMPASS", "SEVEN", "Compass", "Seven", "compass", "kneed_model", "kneed_walker", "knocking_walker", "seven"]
-
 
 @dataclass(frozen=True)
 class Compass:

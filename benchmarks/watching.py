@@ -8,8 +8,6 @@ import mbd
 from benchmarks.figures import Figure, interleaved
 from benchmarks.stopwatch import kernel_watched
 
-__all__ = ["measure"]
-
 STEPS = 50_000
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from mbd.analysis.gait_report import GaitReport
     from mbd.scripts import Script
 
-__all__ = ["accuracy", "accuracy_arguments", "effects", "effects_arguments", "gait", "gait_arguments"]
-
 
 def accuracy(script: Script, arguments: Namespace) -> int:
     """Measure the model of a script; 0, 1 where the target was not reached, 130 where it was interrupted.

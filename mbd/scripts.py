@@ -24,8 +24,6 @@ from mbd.results.storage import SUFFIX
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["OPTIONS", "Script", "examples", "find", "folder"]
-
 DESCRIBES = {"model", "start", "until"}
 """Names of a script that ``mbd run`` simulates itself, with any settings."""
 

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-__all__ = ["at_least", "compared"]
-
 _counts: list[int] = []
 
 

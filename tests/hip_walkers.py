@@ -17,8 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-__all__ = ["Rods", "exchanged", "held_out"]
-
 Numbers = NDArray[np.float64]
 TIGHT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
 AHEAD = 0.1

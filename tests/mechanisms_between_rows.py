@@ -11,8 +11,6 @@ from tests.equations.mechanisms import furnished
 from tests.fuzz.spatial_structures import turned_four_bar
 from tests.space_scenes import JOINTS, scene
 
-__all__ = ["KINDS"]
-
 
 def tree(seed: int) -> tuple[mbd.Model, mbd.State]:
     """A planar or spatial tree with springs, losses, forces and a rod of prescribed length."""

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from mbd.hardcases.case import definition
 
-__all__ = ["Case", "Quantity", "case", "double_pendulum", "integrated", "knee_stop_events", "leg", "pendulum"]
-
 Numbers = NDArray[np.float64]
 Motion = Callable[[float, Numbers], Any]
 DATA = Path(__file__).parent / "cases" / "data"

@@ -15,8 +15,6 @@ from tests.fuzz.parts import any_axis, any_body, any_frame
 from tests.fuzz.spatial_structures import any_foot, any_place, any_plane
 from tests.fuzz.tree_poses import close_loop, pose
 
-__all__ = ["JOINTS", "KINDS", "Scene", "cases", "scene"]
-
 Maker = Callable[[random.Random, str, Frame, Frame], Joint]
 
 JOINTS: dict[str, Maker] = {

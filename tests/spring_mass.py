@@ -12,8 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-__all__ = ["G", "MASS", "derivative", "runner_apex", "speed_at", "until", "walker_apex"]
-
 MASS, G = 80.0, 9.81
 TIGHT = {"rtol": 1e-12, "atol": 1e-13, "method": "DOP853"}
 Numbers = NDArray[np.float64]

@@ -23,8 +23,6 @@ from benchmarks.processes import output_of
 from benchmarks.run import load
 from benchmarks.startup import until_done
 
-__all__ = ["SYSTEMS", "Comparison", "System", "compare"]
-
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 PATIENCE = 1800.0
 """Seconds after which a system is given up."""

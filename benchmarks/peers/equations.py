@@ -15,8 +15,6 @@ import numpy as np
 from benchmarks.peers.scenes import ANDREWS, CHAINS, ELASTIC, FOUR_BARS, STOP, Andrews, G
 from mbd.arrays import Vector
 
-__all__ = ["Problem", "andrews", "chain", "elastic", "four_bar", "problem", "stop"]
-
 
 def chain(y: Any, out: Any, P: Any) -> None:
     """Rods hanging from each other, in absolute angles: y = [θ, ω]. P = [length, mass, damping]. O(n).

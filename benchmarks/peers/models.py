@@ -28,8 +28,6 @@ from benchmarks.peers.scenes import (
 from benchmarks.peers.space import COIN, TREES, Part, Tree, centers, rotation, tree
 from mbd.arrays import Matrix, Vector
 
-__all__ = ["Posed", "posed"]
-
 Read = Callable[[mbd.Trajectory, Vector], Matrix]
 X_OF_POSE = tuple[float, float, float]
 

@@ -9,8 +9,6 @@ from benchmarks.peers.command import SYSTEMS, Comparison
 from benchmarks.peers.race import Result
 from benchmarks.peers.scenes import SCENES
 
-__all__ = ["draw"]
-
 COLORS = dict(zip(
     (system.name for system in SYSTEMS),
     ("#c0392b", "#555555", "#999999", "#2c6fbb", "#e08e0b", "#2a9d5c", "#8e5bb5", "#8a5a2b"), strict=True,

@@ -11,8 +11,6 @@ from typing import TypeVar
 from benchmarks.peers.scenes import Scene
 from mbd.arrays import Matrix, Vector
 
-__all__ = ["Attempt", "Outcome", "Result", "Sweep", "measured", "seconds"]
-
 T = TypeVar("T")
 
 MOST_REPEATS = 5

@@ -18,20 +18,6 @@ from benchmarks.peers.scenes import BALL, COMPASS, LEG, REFERENCES, SCENES, STOP
 from benchmarks.peers.space import COIN, coin_motion, tree, tree_motion
 from mbd.arrays import Matrix, Vector
 
-__all__ = [
-    "IMPACTS",
-    "Phase",
-    "bounces",
-    "exact",
-    "gait",
-    "leg",
-    "rhs_of",
-    "smooth",
-    "stopped",
-    "through_phases",
-    "wheel",
-]
-
 FINEST = 2.3e-14
 """Least relative tolerance that DOP853 takes."""
 

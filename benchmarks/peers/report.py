@@ -10,8 +10,6 @@ from benchmarks.peers.command import SYSTEMS, Comparison
 from benchmarks.peers.race import Result
 from benchmarks.peers.scenes import SCENES
 
-__all__ = ["GROUPS", "page", "settings", "table", "write"]
-
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 GROUPS = {
     "S1": "Double pendulum", "S2": "Chains", "S3a": "Four-bars through singular poses", "S3b": "Andrews' mechanism",

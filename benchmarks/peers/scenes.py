@@ -15,11 +15,6 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 
-__all__ = [
-    "ANDREWS", "BALL", "CHAINS", "COMPASS", "ELASTIC", "FOUR_BARS", "G", "LEG", "REFERENCES", "SCENES", "STOP", "WHEEL",
-    "Andrews", "Ball", "Chain", "Compass", "Elastic", "FourBars", "Leg", "Scene", "Stop", "Wheel", "chosen",
-]  # fmt: skip
-
 G = 9.81
 REFERENCES = Path(__file__).parent / "references.npz"
 

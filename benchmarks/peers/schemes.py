@@ -11,8 +11,6 @@ from typing import Any
 import mbd
 from benchmarks.peers.scenes import Scene
 
-__all__ = ["Setting", "settings"]
-
 
 @dataclass(frozen=True)
 class Scheme:

@@ -16,8 +16,6 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 
-__all__ = ["COIN", "TREES", "Coin", "Part", "Tree", "centers", "coin_motion", "rolling", "tree", "tree_motion"]
-
 FREE, BALL, HINGES = "free", "ball", "hinges"
 X, Y, Z = np.eye(3)
 

@@ -13,8 +13,6 @@ from importlib import import_module
 from benchmarks.peers.race import measured
 from benchmarks.peers.scenes import SCENES
 
-__all__ = ["DONE", "MARK", "main"]
-
 MARK, DONE = "RESULT ", "DONE "
 """What our lines begin with: libraries print too."""
 

@@ -19,8 +19,6 @@ from mbd.results.names import AXES
 from mbd.results.units import unit
 from mbd.tape.node import Node
 
-__all__ = ["Input", "InputNames", "Output", "acting", "doubt_of_idle", "input_names", "output_nodes", "port_terms"]
-
 ORDERS = {"": 0, ".rate": 1, ".acceleration": 2}
 """Derivatives of a parameter that may be an input, by the ending of its name."""
 

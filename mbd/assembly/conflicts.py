@@ -16,8 +16,6 @@ from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations, Row
 
-__all__ = ["Conflict", "Member", "irreducible", "linear_conflict", "loops_of", "member_of", "solvable"]
-
 ADVICE = {
     "joint": "change a length in the loop of the joint, or give one of its joints another freedom",
     "constraint": "give up one of the constraints, change its value, or make it a force (mbd.Spring, mbd.Penalty)",

@@ -8,8 +8,6 @@ from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
 from mbd.equal import HALF_PRECISION_RTOL
 
-__all__ = ["MIN_COEFFICIENT", "Dependence", "dependences", "rank_of"]
-
 MIN_COEFFICIENT = 1e-7
 """Coefficient below which a row does not take part in a dependence [-]."""
 

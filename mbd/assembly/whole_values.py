@@ -11,8 +11,6 @@ from mbd.errors import ModelError, nearest
 from mbd.joints.base import Joint
 from mbd.joints.orientations import is_orientation, orientation_doubt, quaternion_of
 
-__all__ = ["as_given", "spelled_out", "three_of_four"]
-
 QUATERNION_PARTS = "wxyz"
 EULER = re.compile(r"(.+)\.euler\.([xyz]{3})")
 

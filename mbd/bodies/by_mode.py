@@ -9,8 +9,6 @@ from mbd.errors import ModelError, nearest
 from mbd.tape.node import Node, Scalar
 from mbd.tape.selection import by_state
 
-__all__ = ["ByMode", "by_mode_of", "number_by_mode", "parameter_by_mode", "parameters_by_mode", "require_use"]
-
 
 class Modes(Protocol):
     """What of a `mbd.bodies.scope.Scope` is asked here."""

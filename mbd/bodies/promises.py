@@ -14,8 +14,6 @@ from mbd.bodies.values import is_number, named_number_faults, shown
 from mbd.errors import MbdError, ModelError
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["called", "function_of", "line_of_user", "promise_faults", "scalar", "title_of"]
-
 
 def promise_faults(word: object) -> list[str]:
     """What a word, and the measures and losses that it holds, break of the promises of their bases, a sentence each."""

@@ -9,11 +9,6 @@ import numpy as np
 
 from mbd.errors import ModelError
 
-__all__ = [
-    "Vector3", "among", "flag", "is_finite_number", "is_number", "name_of", "named_number_faults", "names_given",
-    "names_of", "number", "numbers", "printable", "shown", "triple", "unit_vector",
-]  # fmt: skip
-
 Vector3: TypeAlias = tuple[float, float, float]
 """Three plain numbers, known when the model is described."""
 

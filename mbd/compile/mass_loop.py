@@ -14,8 +14,6 @@ from mbd.compile.backend import Function
 from mbd.equations.composite_mass import entry, passed_down
 from mbd.trees.llvm import HEAD, Writer
 
-__all__ = ["WithMasses"]
-
 OF_BODY, OF_COORDINATE = 12, 12
 """Numbers of a body and of a coordinate, see `mbd.equations.composite_mass.MassLoop`."""
 

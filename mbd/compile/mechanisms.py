@@ -28,8 +28,6 @@ from mbd.notes import PROCESS, doubt
 from mbd.topology.check import parameter_check
 from mbd.topology.description import Description
 
-__all__ = ["is_known", "mechanism_of", "require_model", "tunable_model"]
-
 _KNOWN: WeakKeyDictionary[Any, dict[tuple[str, frozenset[str]], _Kept[Mechanism]]] = WeakKeyDictionary()
 _TUNABLE: WeakKeyDictionary[Any, dict[frozenset[str], _Kept[Any]]] = WeakKeyDictionary()
 _BY_WORDS: OrderedDict[Hashable, Mechanism] = OrderedDict()

@@ -21,8 +21,6 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Table, Tape
 
-__all__ = ["ArrayFunction", "ScalarFunction", "array_function", "scalar_function"]
-
 SCALAR = {
     "add": "{} + {}", "sub": "{} - {}", "mul": "{} * {}", "div": "{} / {}", "neg": "-{}",
     "lt": "{} < {}", "le": "{} <= {}", "and": "{} and {}", "or": "{} or {}", "not": "not {}",

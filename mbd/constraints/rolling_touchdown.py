@@ -22,8 +22,6 @@ from mbd.forces.quantities import Mention
 from mbd.tape.functions import atan2, sin
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["ProfileTouchdown", "RollingTouchdown", "profile_touchdown", "rolling_touchdown"]
-
 
 class RollingSole(Measure):
     """A sole on a frame of a body that turns about z, over a plane on which it can roll.

@@ -26,8 +26,6 @@ from mbd.tape.derivatives import substitute
 from mbd.tape.functions import cos, sin, sqrt, where
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["NO_CONTACT_POINT", "ball_on", "edge_on"]
-
 NO_CONTACT_POINT = (
     "the ground is narrower or steeper there than what is round can touch at one place, or its height is no "
     "number; take a smaller radius, a smoother height function, or points of its surface with mbd.touchdown"

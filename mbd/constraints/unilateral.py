@@ -30,8 +30,6 @@ from mbd.joints.losses.isotropic import isotropic
 from mbd.tape.functions import maximum
 from mbd.tape.node import Scalar
 
-__all__ = ["Unilateral"]
-
 
 @dataclass(frozen=True)
 class Unilateral(Constraint):

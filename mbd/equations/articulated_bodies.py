@@ -26,8 +26,6 @@ from mbd.equations.kinematics import Moving
 from mbd.tape.functions import minimum
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["articulated_accelerations"]
-
 
 @dataclass(frozen=True)
 class ArticulatedBody:

@@ -22,8 +22,6 @@ from mbd.equations import sizes
 from mbd.equations.kinematics import Moving
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["MassLoop", "composite_mass_matrix", "entry", "mass_loop", "passed_down"]
-
 
 @dataclass(frozen=True)
 class Composite:

@@ -18,8 +18,6 @@ from mbd.equations.equations import Equations
 from mbd.tape.functions import sqrt
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["NO_SLIP", "cosine", "slip_square", "sliding_force"]
-
 NO_SLIP = 1e-100
 """‖s‖² that is none [-]."""
 

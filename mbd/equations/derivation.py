@@ -48,8 +48,6 @@ from mbd.topology.plan import Plan, plan
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["FrontDoor", "derivation_faults", "derive"]
-
 
 @runtime_checkable
 class FrontDoor(Protocol):

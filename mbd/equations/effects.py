@@ -19,8 +19,6 @@ from mbd.joints.losses.base import rates_of
 from mbd.tape.derivatives import jvp, live
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Cause", "causes", "effect_of", "penalty_effect", "weight_of"]
-
 NO_POTENTIAL = {"v": "velocities", "a": "accelerations", "s": "rates of states", "lam": "forces of constraints"}
 """Inputs on which no potential depends."""
 

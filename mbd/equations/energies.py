@@ -31,8 +31,6 @@ from mbd.tape.tracing import traced_scalar
 if TYPE_CHECKING:
     from mbd.equations.energy_description import EnergyDescription
 
-__all__ = ["Lowering", "assembled"]
-
 
 class Lowering:
     """The expressions of a description on one tape; `faults` tells which could not be read."""

@@ -33,11 +33,6 @@ from mbd.tape.node import Node, Table, Tape
 if TYPE_CHECKING:
     from mbd.equations.composite_mass import MassLoop
 
-__all__ = [
-    "ActingForces", "Chart", "Contact", "Coordinate", "Effect", "Eliminated", "Equations", "Facing", "Friction",
-    "Geometry", "Guard", "Parameter", "Machine", "Row", "Transition", "Turn",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Coordinate:

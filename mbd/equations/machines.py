@@ -13,8 +13,6 @@ from mbd.errors import ModelError, nearest
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["declare_machines", "machine_guards"]
-
 OPENED = " opened"
 """Behind the name of a contact, what its opening is called among causes."""
 

@@ -17,8 +17,6 @@ from mbd.equations.programs import balance_with
 from mbd.tape.derivatives import jvps, live, substitute
 from mbd.tape.node import Node
 
-__all__ = ["PortTerms", "enters", "ports"]
-
 
 @dataclass(frozen=True)
 class PortTerms:

@@ -21,8 +21,6 @@ from mbd.tape.interpolation import Pieces, hold, linear, monotone, spline
 from mbd.tape.node import Node, Scalar
 from mbd.tape.table import Table
 
-__all__ = ["KINDS", "MOTION", "Samples", "in_degrees"]
-
 KINDS = ("spline", "smooth", "monotone", "linear", "hold")
 """Curves through samples."""
 ENDS = ("not-a-knot", "natural", "clamped")

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["LimitCycle", "cost_of_transport", "energy_by_cause"]
-
 
 @dataclass(frozen=True, eq=False)
 class LimitCycle:

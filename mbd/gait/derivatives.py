@@ -23,8 +23,6 @@ from mbd.gait.map_derivative import MapDerivative, Measured, map_derivative, mea
 from mbd.gait.return_map import Arrival
 from mbd.sensitivity.starts import unknown_name
 
-__all__ = ["Derivatives", "parameter_value", "require_member", "step_spans"]
-
 BESIDE, LEVELS = 1e-3, 3
 """Change of the numbers of the map [m, rad, s, …] to where it is differentiated again, and how many, each twice the one
 before."""

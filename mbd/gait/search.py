@@ -19,8 +19,6 @@ from mbd.gait.samples import explain_samples
 from mbd.gait.section import Chart, Section, section_of
 from mbd.state import State
 
-__all__ = ["Failed", "Search", "fallen_first", "first_found", "first_return", "gait_at", "search"]
-
 FIRST_STEPS, HALVINGS = 11.8, 9
 """Steps of the first return that is tried, no whole number lest its event fall on the end of a step, where light bodies
 blur its instant; and how often they are halved until their error is below `tol`."""

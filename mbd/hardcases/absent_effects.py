@@ -10,8 +10,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "double_pendulum"]
-
 A2, J17 = "a2-double-pendulum", "j17-effects-off"
 UNTIL, DT = 5.0, 1e-3
 TIMES, LONG = 5, 20

@@ -16,8 +16,6 @@ from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 from mbd.simulation.simulate import REST_SPEED
 
-__all__ = ["CASES"]
-
 
 @cache
 def ball(m: float, g: float, e: float) -> mbd.Model:

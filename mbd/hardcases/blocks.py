@@ -16,8 +16,6 @@ from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.hardcases.stepped import HOW, stepped_figures, within_steps
 
-__all__ = ["CASES"]
-
 ANGLE_OFFSET = 1e-6
 """How far beside the angle of toppling a block is let go, relative [-]."""
 

@@ -11,8 +11,6 @@ from typing import Any
 from mbd.dataclass import dataclass
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CLOSURE_ATOL", "ROUND_OFF", "Curve", "Figure", "HardCase", "Outcome", "definition", "hard_case"]
-
 ROUND_OFF = 1e-10
 """What round-off and the tolerance of Newton's method may leave [m, rad, m/s, -]."""
 CLOSURE_ATOL = 1e-8

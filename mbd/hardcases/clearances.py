@@ -12,9 +12,6 @@ from mbd.hardcases.convergence import study
 from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import limits_of, numbers, published, size
 
-__all__ = ["CASES"]
-
-
 CORNERS = ("front-top", "front-bottom", "rear-top", "rear-bottom")
 """As the reference counts them."""
 

@@ -14,8 +14,6 @@ from mbd.hardcases.impacts import deepest, difference, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 from mbd.simulation.arguments import CHOICES
 
-__all__ = ["CASES"]
-
 LAWS = {
     "newton": "velocities, simultaneous Newton (Moreau) law",
     "sequential": "velocities, sequential (pairwise, repeated) law",

@@ -9,8 +9,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome
 from mbd.hardcases.references import numbers, quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "leg"]
-
 ID = "j18-driven-leg"
 
 

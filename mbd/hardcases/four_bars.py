@@ -16,8 +16,6 @@ from mbd.hardcases.crossings import crossing
 from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import DAMPED, EVERY, holds_positions_only
 
-__all__ = ["CASES", "four_bars"]
-
 ENERGY_RTOL = 1e-3
 """Most change of energy that the definition allows [-]; a scheme of order 2 is far below it."""
 ERROR_FACTOR = 0.4

@@ -14,8 +14,6 @@ from mbd.hardcases.convergence import study
 from mbd.hardcases.references import numbers, published, size
 from mbd.joints.losses import Loss
 
-__all__ = ["CASES"]
-
 
 # pendulums ----------------------------------------------------------------------------------------------------------
 @cache

@@ -15,8 +15,6 @@ from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import is_explicit
 
-__all__ = ["CASES", "governor"]
-
 B5 = "b5-iftomm-a05-flyball"
 LARGE, LARGE_ERROR = 1e-2, 1e-3
 """A step [s] that must be taken without failure, and the most that the slider may be off then [m]."""

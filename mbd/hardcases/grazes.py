@@ -16,8 +16,6 @@ from mbd.hardcases.convergence import second_order
 from mbd.hardcases.impacts import deepest
 from mbd.hardcases.references import accuracy, numbers, published, size
 
-__all__ = ["CASES"]
-
 
 @cache
 def oscillator(m: float, w: float, place: float | None, e: float) -> mbd.Model:

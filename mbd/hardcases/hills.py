@@ -12,8 +12,6 @@ from mbd.hardcases.case import ROUND_OFF, Curve, Figure, Outcome, hard_case
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 
-__all__ = ["CASES"]
-
 
 @cache
 def point(m: float, g: float, e: float, along: float, across: float, twist: float) -> mbd.Model:

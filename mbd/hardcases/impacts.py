@@ -12,8 +12,6 @@ from mbd.hardcases.case import Figure
 from mbd.hardcases.references import size
 from mbd.results.record import EventRecord
 
-__all__ = ["deepest", "difference", "impact_figures"]
-
 
 @dataclass(frozen=True)
 class Defects:

@@ -12,8 +12,6 @@ from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import second_order, study
 from mbd.hardcases.references import limits_of, numbers, published, size
 
-__all__ = ["CASES"]
-
 RELEASES = {"unilateral": "pull"}
 """What the definition calls a law, by the word of `Penalty`; any other is that of the gap."""
 

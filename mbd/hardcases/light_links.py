@@ -9,8 +9,6 @@ from mbd.hardcases.case import ROUND_OFF, Curve, Figure, HardCase, Outcome, defi
 from mbd.hardcases.references import size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "dumbbell"]
-
 P5 = "p5-light-link-in-space"
 PHASE_FACTOR = 0.5
 """Error of the phase that is allowed to schemes of order two, over (ω dt)² ω t [-]."""

@@ -14,8 +14,6 @@ from mbd.hardcases.crossings import falls
 from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import is_undamped
 
-__all__ = ["CASES", "long_pendulum"]
-
 J12, QUICK = "j12-long-time-1e5-periods", "j12-long-time-1e3-periods"
 STEPS_PER_PERIOD = 100
 """Steps in a period [-]."""

@@ -16,8 +16,6 @@ from mbd.hardcases.crossings import falls
 from mbd.hardcases.references import quantity
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "bob_on_link", "heavy_below_light"]
-
 J4, J5 = "j4-mass-ratio-1e6", "j5-near-massless-link"
 RESOLVING = {2: ((1e-6, 2.5e-7), 5e-7), 3: ((1e-6, 5e-7), 1e-6), 8: ((2e-6, 1e-6), 2e-6)}
 """Steps [s] that resolve the snap of the light mass through the straight line, in minimal and in absolute coordinates,

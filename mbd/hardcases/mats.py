@@ -13,8 +13,6 @@ from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.convergence import error_curve, study
 from mbd.hardcases.references import accuracy, numbers, published
 
-__all__ = ["CASES"]
-
 STIFFER = (1.0, 10.0)
 """Stiffness over that of the definition."""
 

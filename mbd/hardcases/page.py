@@ -19,8 +19,6 @@ from mbd.view.curves import extremes
 from mbd.view.report import made_with
 from mbd.view.style import CYCLE, rules
 
-__all__ = ["write_page"]
-
 DPI, COLORS = 96, 16
 """Of plots: all of them together are less than a megabyte."""
 

@@ -12,8 +12,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.references import size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "pushed_table"]
-
 P6 = "p6-four-legged-table-pushed"
 ORDERS = ((0, 1, 2, 3), (2, 0, 3, 1))
 """Orders in which the legs are given."""

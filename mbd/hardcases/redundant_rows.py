@@ -15,8 +15,6 @@ from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "bricard", "parallel_cranks"]
-
 J2, B4 = "j2-parallel-fourbar-redundant", "b4-iftomm-a04-bricard"
 CRANK, PLACE, ENERGY = 0.4, 0.1, 0.05
 """Factors of the allowance of errors of order 2, with √(g/L): of the crank angle, of P3, of the energy."""

@@ -11,8 +11,6 @@ from mbd.hardcases.convergence import EPS, force_floor
 from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "block", "table"]
-
 J11, J11B = "j11-four-legged-table", "j11b-block-two-contacts"
 UNTIL, STEPS = 10.0, (1e-2, 1e-3)
 """Time of rest, and the steps it is tried with [s]."""

@@ -12,8 +12,6 @@ from mbd.hardcases.case import Curve, Figure, Outcome, hard_case
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, size
 
-__all__ = ["CASES"]
-
 KINDS = ("frictionless", "sticking")
 """The two laws at the end that strikes, in the order of the reference energies."""
 

@@ -11,8 +11,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.references import size
 from mbd.joints.quaternions import rotation_of
 
-__all__ = ["CASES", "coin", "free_body", "gimbal", "top"]
-
 P1, P2, P3, P4 = "p1-free-body-1000s", "p2-gimbal-lock", "p3-top-through-vertical", "p4-coin-near-flat"
 ADAPTIVE = ("RadauIIA", "RungeKutta853")
 SECOND_ORDER = {"schemes": "those of order two would take some ten million steps to keep nine digits"}

@@ -17,8 +17,6 @@ from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import accuracy, numbers, published, quantity, size
 from mbd.hardcases.stepped import stepped_figures, within_steps
 
-__all__ = ["CASES"]
-
 SETTLING_PERIODS = 8.0
 """Periods after which the error of the first steps of a scheme in positions only has died out."""
 

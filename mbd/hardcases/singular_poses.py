@@ -15,8 +15,6 @@ from mbd.hardcases.crossings import crossing
 from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "equal_slider_crank", "parallelogram"]
-
 J3, J3B = "j3-slider-crank-equal-lengths", "j3b-fourbar-flattening"
 ENERGY_JUMP_RTOL = 1e-6
 """Relative change of energy that one passage of a singular pose may make [-]."""

@@ -14,8 +14,6 @@ from mbd.hardcases.convergence import allowance, study
 from mbd.hardcases.references import distance_to, quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "knife_edge", "sleigh"]
-
 D1, D2 = "d1-chaplygin-sleigh", "d2-knife-edge-incline"
 SLEIGH, EDGE, FORCE = 0.4, 1.0, 0.01
 """Factors of the allowance of errors: of the sleigh, of the knife edge, of its multiplier, which has order 3."""

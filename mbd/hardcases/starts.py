@@ -12,8 +12,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.references import Reference, quantity, size
 from mbd.hardcases.schemes import DAMPED, EVERY
 
-__all__ = ["CASES", "bob", "four_bar_that_cannot_close"]
-
 J14, J15 = "j14-inconsistent-initial", "j15-infeasible-constraints"
 NUMBER = r"(-?[\d.]+(?:e[-+]?\d+)?)"
 NUMBER_RTOL = 1e-5

@@ -8,8 +8,6 @@ import mbd
 from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.schemes import EVERY, is_explicit
 
-__all__ = ["CASES", "rolling_ball", "sliding_block"]
-
 P8 = "p8-straight-slide-and-steady-roll"
 
 

@@ -12,8 +12,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome
 from mbd.hardcases.references import numbers, published, quantity, size
 from mbd.hardcases.schemes import EVERY, holds_positions_only
 
-__all__ = ["CASES", "followed", "switched"]
-
 LEG, ROD = "j19-leg-driven-by-a-table", "j20-torque-that-jumps"
 INDEX_3_TOLERANCE = 1e-2
 """The same of schemes that hold positions only, whose multipliers have an error of dt² [-]."""

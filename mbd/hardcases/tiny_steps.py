@@ -15,8 +15,6 @@ from mbd.hardcases.convergence import EPS, deviation, force_floor, study
 from mbd.hardcases.references import quantity
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "circle"]
-
 J1 = "j1-tiny-steps-index3"
 ERROR_CONSTANT = 0.5
 """C of the multiplier error C dt² over m g²/L; the worst scheme needs about half of it [-]."""

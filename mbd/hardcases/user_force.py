@@ -12,8 +12,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome, definition
 from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "pushed_particle"]
-
 J16 = "j16-nan-user-force"
 STEPS = (0.01, 0.003, 0.0007)
 """One that ends at the instant of the fault and two that step over it [s]."""

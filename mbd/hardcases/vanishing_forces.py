@@ -12,8 +12,6 @@ from mbd.hardcases.case import Curve, Figure, HardCase, Outcome
 from mbd.hardcases.references import numbers, quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "cardan", "slider_crank"]
-
 J21, P7 = "j21-moved-and-held", "p7-balanced-cardan"
 STEPS = (1e-3, 2e-4)
 """Steps of the slider-crank [s]."""

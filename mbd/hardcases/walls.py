@@ -13,8 +13,6 @@ from mbd.hardcases.convergence import study
 from mbd.hardcases.impacts import deepest, impact_figures
 from mbd.hardcases.references import limits_of, numbers, published, size
 
-__all__ = ["CASES"]
-
 
 @cache
 def double_pendulum(

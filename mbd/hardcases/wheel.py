@@ -12,8 +12,6 @@ from mbd.hardcases.convergence import EPS
 from mbd.hardcases.references import quantity, size
 from mbd.hardcases.schemes import EVERY
 
-__all__ = ["CASES", "rolling_wheel"]
-
 D3 = "d3-rolling-wheel"
 STEPS = (0.5, 0.1, 0.013, 0.001)
 """Of very different sizes, one that does not divide the time [s]."""

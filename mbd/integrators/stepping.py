@@ -23,11 +23,6 @@ from mbd.kernel.stepping.restart import consistent
 from mbd.kernel.translation.interpreted import InterpretedScheme
 from mbd.state import Mode, State
 
-__all__ = [
-    "SchemeMemory", "fill_coefficients", "memory_lengths", "own_scheme", "set_numbers", "start_of",
-    "step_of",
-]  # fmt: skip
-
 CARRIED = ("aux", "slope", "lam_slope", "shift", "shift_change", "past_stages")
 """Arrays from which a scheme makes its next step."""
 JUDGING = ("scale", "weight", "left", "clock", "detail", "state")

@@ -24,16 +24,6 @@ if TYPE_CHECKING:  # the trees of the kernel's functions are made only where it 
     from mbd.compile.host import Host
     from mbd.trees.tree import Function
 
-__all__ = [
-    "compiled",
-    "kernel_c_source",
-    "kernel_functions",
-    "kernel_object",
-    "kernel_text",
-    "object_of",
-    "source_digest",
-]
-
 ENTRY = "mbd_kernel"
 
 APART = (

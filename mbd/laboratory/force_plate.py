@@ -22,8 +22,6 @@ from mbd.forces.samples import Samples
 from mbd.laboratory.recording import MIN_PLATE_LOAD, PlateRecord, Recording
 from mbd.tape.node import Scalar
 
-__all__ = ["ForcePlate", "all_plates", "loaded_model", "wrenches"]
-
 PARTS = tuple(f"{kind}.{axis}" for kind in ("force", "moment") for axis in "xyz")
 """Components of what a plate does, about the origin of the ground."""
 

@@ -38,8 +38,6 @@ from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 from mbd.topology.plan import plan
 
-__all__ = ["inverse_dynamics"]
-
 MAX_LOADS, SETTLED = 60, 1e-13
 """How often forces in pins and their friction are solved for in a loop, and the change at which that ends [-]."""
 

@@ -20,8 +20,6 @@ from mbd.laboratory.splines import derivatives
 from mbd.results.record import Record
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["InverseKinematics", "stops_of"]
-
 
 class InverseKinematics:
     """The motion of a model that comes nearest to a recording.

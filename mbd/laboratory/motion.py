@@ -25,8 +25,6 @@ from mbd.laboratory.splines import GROUP, Spline
 from mbd.notes import doubt
 from mbd.results.trajectory import Trajectory
 
-__all__ = ["Motion", "motion_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Motion:

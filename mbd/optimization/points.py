@@ -20,8 +20,6 @@ from mbd.gait.derivatives import parameter_value
 from mbd.sensitivity.result import Sensitivities
 from mbd.simulation.interrupted import stopped
 
-__all__ = ["FunctionSource", "GaitSource", "Point", "Source", "gait_numbers", "slope_by_differences"]
-
 DIFFERENCE_STEP = 1e-3
 """Difference of an unknown, over its value or its scale, at which numbers without derivatives are found again [-]."""
 SMOOTH_DIFFERENCE_STEP = 1e-5

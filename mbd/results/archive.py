@@ -25,21 +25,6 @@ from mbd.dataclass import dataclass
 from mbd.errors import MbdError, TrajectoryError
 from mbd.free_memory import available, size_in_words
 
-__all__ = [
-    "Arrays",
-    "Head",
-    "Members",
-    "Unreadable",
-    "file_to_read",
-    "named_file",
-    "plain",
-    "read",
-    "shrinks",
-    "write",
-    "write_whole",
-    "writing",
-]
-
 COMPRESSION = 1
 """Level of zlib: higher levels take five times as long for a few percent [-]."""
 SAMPLE, WORTH = 1 << 15, 0.5

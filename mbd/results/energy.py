@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from mbd.equations.equations import Equations
     from mbd.tape.node import Node
 
-__all__ = ["doubted_ledger", "kinds_of_work", "ledger"]
-
 
 def ledger(columns: ModelColumns) -> Ledger:
     """The energy ledger of a run.

@@ -21,8 +21,6 @@ from mbd.results.states import pack_state, unpack
 from mbd.results.violation import Violation
 from mbd.state import State, malformed
 
-__all__ = ["SUFFIX", "Archive", "load", "save"]
-
 FORMAT, VERSION = "mbd run", 1
 
 SUFFIX = ".mbd.npz"

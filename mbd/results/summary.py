@@ -15,8 +15,6 @@ from mbd.results.ledger import Ledger
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["cost", "entries", "facts", "of_the_swing", "text"]
-
 COLUMNS = 100
 """Width of what is printed; longer lines go on below [-]."""
 

@@ -32,8 +32,6 @@ from mbd.tape.evaluate import evaluate
 from mbd.tape.node import Tape
 from mbd.tape.tracing import traced_scalar
 
-__all__ = ["Asked", "EndState", "Table", "Wanted", "names_in", "request_of", "with_inputs"]
-
 Wanted = str | Mapping[str, Mapping[str, Any]]
 
 

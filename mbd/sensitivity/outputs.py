@@ -15,8 +15,6 @@ from mbd.sensitivity.programs import Programs
 from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.tape.node import Node
 
-__all__ = ["Lines", "lines_of", "taken_apart", "usual"]
-
 RESULT_RTOL = 1e-7
 """Difference of a result from that of the run, over its size, that is round-off [-]."""
 

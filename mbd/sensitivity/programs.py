@@ -41,8 +41,6 @@ from mbd.equations.programs import switched_balance
 from mbd.tape.derivatives import jvps
 from mbd.tape.node import Node, Scalar
 
-__all__ = ["Columns", "Programs", "Sparse", "State", "watched_nodes"]
-
 EMPTY: Mapping[int, int] = MappingProxyType({})
 RESULT_SEPARATOR = "\n"
 """Between names of results that one program lists; no name has it."""

@@ -16,8 +16,6 @@ from mbd.sensitivity.run_data import refused
 from mbd.tape.node import Node, Tape
 from mbd.tape.sympy import lower
 
-__all__ = ["after_reset", "reset_expressions"]
-
 
 class Named(Mapping[str, Node]):
     """Any named quantity as an expression."""

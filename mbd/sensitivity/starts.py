@@ -25,10 +25,6 @@ from mbd.sensitivity.tangent.printer import LANES
 from mbd.sensitivity.tangent_names import expanded, refuse_parts, start_names
 from mbd.sensitivity.transitions import stored_at_start
 
-__all__ = [
-    "Direction", "directions", "programs_of", "restitution_names", "restitutions_of", "start_tangent", "unknown_name",
-]  # fmt: skip
-
 Flags = NDArray[np.bool_]
 
 

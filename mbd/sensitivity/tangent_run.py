@@ -28,8 +28,6 @@ from mbd.simulation.marching import Run
 from mbd.simulation.run.call_table import BOUND, PLACES
 from mbd.simulation.run.stepper import Stepper
 
-__all__ = ["TangentRun", "TangentStepper"]
-
 DIRECTIONS = LANES - 1
 """Directions of one run: the last derivative is that by the size of a step."""
 WITH_DERIVATIVES = frozenset(TABLE.real_arrays) - {"shift1"}

@@ -12,8 +12,6 @@ from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from mbd.tape.node import Node, Scalar, Tape
 from mbd.tape.operations import CONDITIONS, value
 
-__all__ = ["gradient", "jvp", "jvps", "live", "rebuild", "substitute", "vjp"]
-
 _FLAT = CONDITIONS | {"floor", "sign"}
 """Operations whose derivative is zero wherever it exists."""
 

@@ -17,8 +17,6 @@ from mbd.testing.findings import Findings, Verdict
 from mbd.testing.measures import Build, balance, between, relates_bodies, scope_of, turn_of, unsaid
 from mbd.testing.scope import FreeScope
 
-__all__ = ["check_force"]
-
 
 def check_force(
     force: Force | Build,

@@ -21,8 +21,6 @@ from mbd.testing.equations import equation_laws
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.scope import FreeScope, Numbers, skew
 
-__all__ = ["check_joint"]
-
 EYE = np.eye(3)
 DIFFERENCE_STEP = 1e-4
 SOMEWHERE = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)

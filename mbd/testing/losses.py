@@ -13,8 +13,6 @@ from mbd.tape.derivatives import jvp
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.scope import FreeScope
 
-__all__ = ["check_loss"]
-
 LOSS_NAME = "knee loss"
 
 Numbers = np.ndarray[Any, np.dtype[np.float64]]

@@ -11,8 +11,6 @@ from mbd.dataclass import dataclass
 from mbd.integrators.base import Point, System, Terms
 from mbd.state import Mode, State
 
-__all__ = ["PROBLEMS", "Problem", "broken", "problem"]
-
 
 @dataclass(frozen=True)
 class Problem:

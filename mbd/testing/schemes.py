@@ -24,8 +24,6 @@ from mbd.state import State
 from mbd.testing.findings import Findings, Verdict
 from mbd.testing.integrators import observed_order
 
-__all__ = ["check_scheme"]
-
 WITHIN, HIGH = 0.15, 0.75
 """How near the observed order must come to the promised one, and so above 5, where few halvings reach round-off."""
 RUN_LENGTH = 0.6

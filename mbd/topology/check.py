@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from mbd.constraints.machine import Machine
     from mbd.topology.description import Description
 
-__all__ = ["faults", "machine_faults", "parameter_check", "quantities", "require_valid", "rule_faults"]
-
 
 def faults(model: Description) -> list[str]:
     """All faults of a model, one sentence each."""

@@ -22,8 +22,6 @@ from mbd.topology.held_forces import reactions_read
 if TYPE_CHECKING:
     from mbd.topology.description import Description
 
-__all__ = ["Plan", "is_planar", "plan", "uncut"]
-
 
 @dataclass(frozen=True)
 class Plan:

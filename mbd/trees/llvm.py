@@ -14,8 +14,6 @@ from mbd.errors import CapabilityError
 from mbd.trees import tree
 from mbd.trees.trigonometry import WIDTHS, sincos
 
-__all__ = ["HEAD", "LLVM", "Body", "Straight", "Value", "helpers"]
-
 LLVM = {"bool": "i1", "int": "i64", "real": "double", "ints": "ptr", "reals": "ptr", "kernel": "ptr", "none": "void"}
 HEAD = """\
 declare double @pow(double, double) nounwind nobuiltin willreturn memory(none)

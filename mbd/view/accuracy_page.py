@@ -14,8 +14,6 @@ from mbd.view.template import written
 if TYPE_CHECKING:
     from mbd.analysis.accuracy import Accuracy, Point
 
-__all__ = ["content", "write"]
-
 CONTROLS = """\
 <label>quantity <select id="quantity"><option value="">the largest of all</option></select></label>
 <label>error <select id="which"><option value="errors">largest over time</option>

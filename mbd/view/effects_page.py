@@ -13,8 +13,6 @@ from mbd.view.template import written
 if TYPE_CHECKING:
     from mbd.analysis.effects import Contribution, Effects
 
-__all__ = ["content", "write"]
-
 CONTROLS = """\
 <label>output <select id="output"><option value="">the largest of all</option></select></label>
 <label>order <select id="order"><option value="model">as in the model</option><option value="change">change</option>

@@ -26,8 +26,6 @@ from mbd.view.template import filled, part, written
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["content", "kept", "write"]
-
 MAX_FRAME_RATE = 60.0
 """Most pictures per second of run [1/s]."""
 

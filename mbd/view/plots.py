@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["contacts", "drawing", "energy", "histories", "phase_portrait", "portrayed"]
-
 MAX_EVENT_LINES = 60
 """Events beyond this number are left to the contact bars, so that lines do not hide the curves."""
 

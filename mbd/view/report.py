@@ -24,8 +24,6 @@ from mbd.view.beside import beside
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["draw", "machine", "made_with", "record", "versions", "write"]
-
 FORMAT, VERSION = "mbd record", 1
 """Of the record, see docs/files.md."""
 

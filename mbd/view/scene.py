@@ -22,8 +22,6 @@ from mbd.view.solids import Hinge, Solid, Stop, hinges, limbs, rotations, solids
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Scene", "Touch", "scene"]
-
 RADIUS_RTOL = 0.02
 """Radii that differ less, over the radius, are one [-]."""
 

@@ -9,8 +9,6 @@ import numpy as np
 
 import mbd
 
-__all__ = ["FORMS", "WITH_ROWS", "DoublePendulum"]
-
 
 @dataclass(frozen=True)
 class Sizes:

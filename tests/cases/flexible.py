@@ -8,8 +8,6 @@ import numpy as np
 
 import mbd
 
-__all__ = ["NAMES", "flexible_slider_crank"]
-
 NAMES = ("crank", "rod", "slider", "bend", "wave", "middle", "end")
 """φ₁, φ₂, x₃; two lateral sine modes, longitudinal displacements of the rod's middle and end node."""
 

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Step", "Walker", "slope_angles"]
-
 Numbers = NDArray[np.float64]
 SETTINGS: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
 FALLEN = 0.5

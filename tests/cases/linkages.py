@@ -7,8 +7,6 @@ import numpy as np
 import mbd
 from mbd.hardcases import redundant_rows
 
-__all__ = ["four_bar", "four_bars", "parallel_cranks", "upright"]
-
 
 def rod(name: str, length: float = 1.0, mass: float = 1.0) -> mbd.Link:
     """A thin uniform rod."""

@@ -3,8 +3,6 @@
 import mbd
 from mbd.integrators.family import NewmarkFamily
 
-__all__ = ["INDEX_3", "SCHEMES", "WITH_ROWS", "name_of"]
-
 SCHEMES: list[NewmarkFamily] = [
     mbd.Newmark(),
     mbd.HHT(alpha=0.05),

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 import mbd
 from tests.problems import integrated
 
-__all__ = ["Sleigh", "blade_row", "rolling_wheel", "tractor"]
-
 
 def blade_row(vx: Any, vy: Any, angle: Any) -> Any:
     """Velocity to the right of a blade, ``v_x sin θ − v_y cos θ``."""

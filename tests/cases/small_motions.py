@@ -4,8 +4,6 @@ import numpy as np
 
 import mbd
 
-__all__ = ["PLAIN", "at_rest", "four_bar", "moving", "on_spring", "pendulums"]
-
 PLAIN = "python"
 """The backend here: models are looked at once."""
 

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 import mbd
 from tests.problems import case
 
-__all__ = ["asymmetric_body", "coin", "double_pendulum", "spun", "tree"]
-
 Made = tuple[mbd.Model, mbd.State]
 Numbers = NDArray[np.float64]
 DOWN = (0.0, 0.0, -9.81)

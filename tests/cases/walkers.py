@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 import mbd
 from tests.cases.gaits import FALLEN
 
-__all__ = ["SIDES", "Strike", "compass", "end_at_fall", "kneed", "standing", "strikes"]
-
 SIDES = (("left", "right"), ("right", "left"))
 
 

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 import mbd
 from tests.problems import integrated
 
-__all__ = ["RimlessWheel"]
-
 
 @dataclass(frozen=True)
 class RimlessWheel:

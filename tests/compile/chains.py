@@ -10,8 +10,6 @@ from mbd.tape.derivatives import jvp
 from mbd.tape.functions import cos, sin
 from mbd.tape.node import Node, Scalar, Tape
 
-__all__ = ["Chain", "chain", "compile_functions"]
-
 
 @dataclass(frozen=True)
 class Chain:

@@ -22,8 +22,6 @@ from mbd.tape.derivatives import live
 from mbd.tape.node import CONDITIONS, Node, Tape
 from mbd.tape.operations import value
 
-__all__ = ["COMPILER", "Graph", "against", "by_c", "by_llvm", "close", "graphs", "inputs_of", "run"]
-
 Call = Callable[[Vector, Vector, Vector], None]
 
 KINDS = (("t", 1), ("c", 2), ("q", 2), ("x", 2), ("v", 2), ("z", 1), ("a", 2), ("s", 1), ("lam", 1), ("anchor", 1),

@@ -7,8 +7,6 @@ from mbd.bodies.base import Frame
 from mbd.constraints import Closing, Constraint, Drag, Equation, Law
 from mbd.joints.base import Joint
 
-__all__ = ["Clutch", "Foot", "OneWayBearing", "Sole"]
-
 
 @dataclass(frozen=True)
 class Sole(Constraint):

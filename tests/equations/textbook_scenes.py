@@ -10,8 +10,6 @@ from sympy import cos, sin
 
 import mbd
 
-__all__ = ["SCENES", "Twins"]
-
 G = 9.81
 
 

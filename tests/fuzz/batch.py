@@ -16,8 +16,6 @@ from typing import Any
 from tests.fuzz.scenes import STRUCTURES
 from tests.fuzz.structures import DRIVEN, SPACE
 
-__all__ = ["main", "run_batch", "summary"]
-
 COMMAND = [sys.executable, "-m", "tests.fuzz", "--worker"]
 """A worker, begun in the checkout."""
 CHECKOUT = Path(__file__).parents[2]

@@ -27,8 +27,6 @@ from tests.fuzz.geometry import (
 )
 from tests.fuzz.readings import Readings, coordinates
 
-__all__ = ["Bodies", "Mass", "joint_motion", "mass_of"]
-
 X, Y, Z = np.eye(3)
 
 

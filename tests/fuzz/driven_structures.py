@@ -14,8 +14,6 @@ from tests.fuzz.parts import add_loads, any_body, any_frame, any_joint
 from tests.fuzz.spatial_structures import free_tree
 from tests.fuzz.tree_poses import pose
 
-__all__ = ["DRIVEN_KINDS"]
-
 Made = tuple[mbd.Model, dict[str, Any]]
 
 

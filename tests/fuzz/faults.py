@@ -9,8 +9,6 @@ import numpy as np
 
 from tests.fuzz.geometry import Array
 
-__all__ = ["Fault", "Faults"]
-
 
 @dataclass(frozen=True)
 class Fault:

@@ -18,8 +18,6 @@ from mbd.constraints.surfaces import Surface
 from tests.fuzz.geometry import of_quaternion
 from tests.fuzz.spatial_structures import any_orientation
 
-__all__ = ["Form", "other_form"]
-
 
 @dataclass
 class Form:

@@ -8,8 +8,6 @@ import numpy as np
 from tests.fuzz.bodies import Bodies
 from tests.fuzz.geometry import Array
 
-__all__ = ["Gap"]
-
 
 @dataclass
 class Gap:

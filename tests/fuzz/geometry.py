@@ -8,11 +8,6 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "Array", "Attitude", "Signal", "Twist", "ball", "cross", "fixed", "hat", "inverse", "matrix_of", "of_quaternion",
-    "product", "shift", "turn", "twist",
-]  # fmt: skip
-
 Array: TypeAlias = NDArray[np.float64]
 
 

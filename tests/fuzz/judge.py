@@ -14,8 +14,6 @@ from tests.fuzz.loads import loads
 from tests.fuzz.readings import Readings, readings
 from tests.fuzz.stiffness import unknown_force
 
-__all__ = ["Judgement", "judge"]
-
 MOST = 48
 """Rows at which forces are balanced, at most."""
 FEW = 12

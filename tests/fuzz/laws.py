@@ -13,18 +13,6 @@ from tests.fuzz.loads import Loads
 from tests.fuzz.quantities import gap_of, named, value_of
 from tests.fuzz.round_bodies import edge_gap
 
-__all__ = [
-    "balance",
-    "closure",
-    "constraints",
-    "contacts",
-    "drives",
-    "energies",
-    "places",
-    "kinks",
-    "size_of",
-]
-
 HELD = 1e-7
 """What rows may miss, over the size of the mechanism [-]."""
 ROUND_OFF = 1e-15

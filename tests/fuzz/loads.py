@@ -16,8 +16,6 @@ from tests.fuzz.quantities import TINY, gap_of, named, triple, user_gap, value_o
 from tests.fuzz.round_bodies import edge_gap
 from tests.fuzz.turning import ball_spring, bushing
 
-__all__ = ["Load", "loads"]
-
 
 @dataclass
 class Load:

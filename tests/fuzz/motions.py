@@ -9,8 +9,6 @@ import numpy as np
 
 import mbd
 
-__all__ = ["any_jump", "any_motion"]
-
 
 def any_motion(rng: random.Random, start: float, size: float) -> tuple[Any, str]:
     """A value of a drive that begins at `start`, and which kind of motion it is."""

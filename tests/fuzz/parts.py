@@ -11,10 +11,6 @@ import mbd
 from mbd.bodies.base import Body, Frame
 from mbd.joints.base import Joint
 
-__all__ = [
-    "add_event", "add_loads", "any_axis", "any_body", "any_contact", "any_frame", "any_joint", "smooth_loss",
-]  # fmt: skip
-
 
 def any_axis(rng: random.Random) -> tuple[float, float, float]:
     """A direction in space."""

@@ -13,8 +13,6 @@ from mbd.joints.base import Joint
 from mbd.topology.plan import plan
 from tests.fuzz.geometry import Array, Attitude, Signal
 
-__all__ = ["Readings", "names_for", "readings"]
-
 BEFORE = 1e-12
 """How much earlier than a jump its left side is read, over the time and a second [-]."""
 

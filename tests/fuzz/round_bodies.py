@@ -11,8 +11,6 @@ from tests.fuzz.bodies import Bodies
 from tests.fuzz.gap import Gap
 from tests.fuzz.geometry import Array
 
-__all__ = ["ball_gap", "edge_gap", "over_plane", "turning_gap"]
-
 
 def over_plane(body: str, p: Array, plane: Any, bodies: Bodies) -> Gap:
     """n · (p − p_F − u t) − offset of a place of a body, pushing back on the body that carries the plane."""

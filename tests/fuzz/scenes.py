@@ -9,8 +9,6 @@ from typing import Any
 import mbd
 from tests.fuzz.structures import DRIVEN, SPACE, Structure, structure
 
-__all__ = ["STRUCTURES", "Scene", "scene"]
-
 STRUCTURES = 160
 """How many mechanisms there are if nothing else is said; scenes with numbers equal modulo this share one."""
 

@@ -11,8 +11,6 @@ import mbd
 from tests.fuzz.parts import add_loads, any_axis, any_body, any_frame, any_joint
 from tests.fuzz.tree_poses import close_loop, pose
 
-__all__ = ["SPATIAL_KINDS", "turned_four_bar"]
-
 Made = tuple[mbd.Model, dict[str, Any]]
 
 

@@ -13,8 +13,6 @@ from tests.fuzz.quantities import gap_of
 from tests.fuzz.readings import Readings
 from tests.fuzz.turning import rotation_vector
 
-__all__ = ["crossings", "error_share", "fading", "impacts", "motion", "openings", "passive"]
-
 PASSIVE = ("joint loss", "damper", "friction", "penalty", "impact")
 """Kinds of parts of the ledger that only take energy."""
 FEW = 4

@@ -9,8 +9,6 @@ from tests.fuzz.bodies import Bodies, mass_of
 from tests.fuzz.geometry import Array
 from tests.fuzz.quantities import gap_of
 
-__all__ = ["unknown_force"]
-
 
 def unknown_force(bodies: Bodies, tol: float, h: Array, reach: float) -> Array:
     """What forces may miss where positions are off by `tol` [m, rad], rates by ``tol/h``: ``tol min(K + C/h, M/h²)``.

@@ -25,8 +25,6 @@ from tests.fuzz.parts import (
 from tests.fuzz.spatial_structures import SPATIAL_KINDS
 from tests.fuzz.tree_poses import close_loop, pose
 
-__all__ = ["DRIVEN", "KINDS", "SPACE", "Structure", "structure"]
-
 
 @dataclass
 class Structure:

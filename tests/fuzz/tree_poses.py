@@ -11,8 +11,6 @@ from tests.fuzz.geometry import Array
 from tests.fuzz.parts import any_frame
 from tests.fuzz.readings import Readings
 
-__all__ = ["close_loop", "pose", "scalars"]
-
 
 def scalars(position: dict[str, Any]) -> dict[str, float]:
     """Coordinates by name, quaternions part by part."""

@@ -7,8 +7,6 @@ import numpy as np
 import mbd
 from tests.fuzz.geometry import Array, hat
 
-__all__ = ["ball_spring", "bushing", "rotation_vector"]
-
 
 def rotation_vector(R: Array) -> Array:
     """Angle times axis (n, 3), the angle between 0 and π."""

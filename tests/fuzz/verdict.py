@@ -16,8 +16,6 @@ from tests.fuzz.forms import Form, other_form
 from tests.fuzz.judge import SHARE, between, judge
 from tests.fuzz.scenes import STRUCTURES, Scene, scene
 
-__all__ = ["verdict"]
-
 
 def verdict(number: int, structures: int = STRUCTURES, forms: bool = False) -> dict[str, Any]:
     """How the scene of a number ended, of so many mechanisms; with `forms` compared with another form of it.

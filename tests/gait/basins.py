@@ -8,8 +8,6 @@ import numpy as np
 import mbd
 from tests.problems import case
 
-__all__ = ["LETTERS", "classes", "grid", "start_of", "walker"]
-
 LETTERS = {"walks": "W", "falls forward": "F", "falls backward": "B"}
 
 

@@ -12,8 +12,6 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-__all__ = ["Walker", "mirrored"]
-
 EXACT, NEARLY = {"rtol": 1e-12, "atol": 1e-14}, {"rtol": 1e-8, "atol": 1e-10}
 AHEAD = 0.1
 """How far the swinging foot is ahead of the other before it may strike [m]."""

@@ -8,8 +8,6 @@ from typing import Any
 import mbd
 from tests.cases.walkers import SIDES, end_at_fall
 
-__all__ = ["SLOPE", "simplest", "slope_of", "two_sided"]
-
 
 def slope_of(g: float) -> dict[str, Any]:
     """The slope as a function that gives gravity."""

@@ -8,8 +8,6 @@ from mbd.integrators import Integrator, Point, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
 from mbd.state import State
 
-__all__ = ["ProjectedMidpoint", "SemiImplicitEuler"]
-
 
 def rows_of(system, state, mode) -> int:
     """How many rows are active: as many as there are multipliers."""

@@ -11,8 +11,6 @@ from mbd.bodies.base import Frame
 from mbd.joints.base import Joint, JointLoss, Label
 from mbd.tape.functions import atan2, cos, sin, sqrt, where
 
-__all__ = ["CayleyBall", "QuaternionBall", "product", "rotation"]
-
 SMALL = 0.25
 """θ² below which functions of it are their series [rad²]."""
 BERNOULLI = (1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600,

@@ -26,8 +26,6 @@ from mbd.simulation.run.stepper import Stepper
 from tests.kernel.test_room_to_log import sliders
 from tests.simulation.wild import wild_scene
 
-__all__ = ["between_guards", "guard_every_call", "wild"]
-
 PAGE = mmap.PAGESIZE
 NO_ACCESS = 0
 

@@ -6,8 +6,6 @@ import numpy as np
 
 import mbd
 
-__all__ = ["differences", "end", "off"]
-
 
 def end(model, start, scheme, name, change, parameters=None, **settings):
     """(q, v, t) at the end of a run whose start or parameter `name` is changed; and its events."""

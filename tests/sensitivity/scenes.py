@@ -6,8 +6,6 @@ import mbd
 from mbd.sensitivity.derivative import final_state_derivative
 from tests.sensitivity.differences import differences, off
 
-__all__ = ["judged"]
-
 ROUND_OFF = 2e-12
 """What iterations of a run and round-off leave of its end [m, rad, s]."""
 

@@ -9,8 +9,6 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.sensitivity.derivative import final_state_derivative
 from mbd.sensitivity.tangent_names import place_names
 
-__all__ = ["all_names", "judged"]
-
 
 def all_names(model):
     """Of every direction of the configuration, and of every velocity."""

@@ -2,8 +2,6 @@
 
 import mbd
 
-__all__ = ["SCENES"]
-
 
 def _bar(name, length=1.0):
     return mbd.Link(name, length=length, **mbd.rod(mass=1.0, length=length).link)

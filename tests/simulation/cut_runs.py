@@ -14,8 +14,6 @@ from tests.kernel.test_twin import rubber_ball, served_pendulum
 from tests.simulation.mechanisms import ball, box, falling, kneed_walker, kneed_walker_start, pendulum
 from tests.simulation.test_singular_poses import four_bars
 
-__all__ = ["PARTS", "SCENES", "assert_halves_are_the_whole", "driven_point", "halves", "scene"]
-
 PARTS = ("time", "q", "v", "z", "a", "s", "lam", "closed")
 
 

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-__all__ = ["broken_laws"]
-
 AT_ONSET = 5e-7
 """Speed [m/s] that stands for the slip in the direction in which sliding begins, with a little room."""
 

@@ -6,8 +6,6 @@ import mbd
 from mbd.compile.mechanisms import mechanism_of
 from tests.simulation.mechanisms import G
 
-__all__ = ["block", "brick", "check_friction", "driven", "four_bar", "phases", "rod", "stops"]
-
 
 def block(mu: float | None, slope: float = 0.0, reverse: bool = False) -> mbd.Model:
     """A block that cannot turn on a plane with the slope 'tilt', its contact 'foot'; downhill is 'place.x' > 0."""

@@ -12,8 +12,6 @@ import numpy as np
 import mbd
 from tests.simulation.wild import wild_scene
 
-__all__ = ["complaints", "verdict"]
-
 ADVICE = re.compile(r"; |: |use |try |give |leave |hold |raise |name |move |change |make |lower |lock ")
 """A message that tells what to try has a second part."""
 

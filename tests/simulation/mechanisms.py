@@ -2,10 +2,6 @@
 
 import mbd
 
-__all__ = [
-    "G", "ball", "box", "falling", "kneed_walker", "kneed_walker_start", "pendulum", "point", "run", "two_balls",
-]  # fmt: skip
-
 G = 9.81
 """Gravity [m/s²]."""
 

@@ -26,8 +26,6 @@ from mbd.results.trajectory import Trajectory
 from mbd.simulation.run import remembered
 from mbd.state import Memory, State
 
-__all__ = ["changed_file", "changed_memory", "outcome_of_file", "outcome_of_memory", "scene", "use"]
-
 NUMBERS = (0, -1, 1, 2, 3, 17, -9, 1 << 31, 1 << 62, -(1 << 63))
 REALS = (0.0, -1.0, 1e-300, 1e300, np.nan, np.inf, -np.inf, 0.37)
 WORDS: tuple[Any, ...] = (None, True, -1, 1 << 70, 1e999, "", "x", "\x1b[2J", [], {}, [1, [2]], {"array": "q"})

@@ -8,8 +8,6 @@ from typing import Any
 
 import mbd
 
-__all__ = ["BALANCED", "DRIVEN", "Scene", "Units", "balanced", "driven", "shaft"]
-
 
 @dataclass(frozen=True)
 class Units:

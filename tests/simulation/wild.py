@@ -17,8 +17,6 @@ from mbd.integrators import Integrator
 from mbd.results.trajectory import Trajectory
 from tests.simulation.wild_shapes import SHAPES, Shape
 
-__all__ = ["WildScene", "wild_scene"]
-
 SCHEMES: tuple[Integrator, ...] = (
     mbd.HHT(0.05), mbd.HHT(0.3), mbd.GeneralizedAlpha(0.9), mbd.GeneralizedAlpha(0.0), mbd.GeneralizedAlpha(1.0),
     mbd.Newmark(), mbd.Newmark(0.3025, 0.6), mbd.HHT(0.1, formulation="index3"),

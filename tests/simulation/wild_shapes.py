@@ -9,8 +9,6 @@ from typing import Any
 import mbd
 from mbd.testing.mechanisms import random_loop, random_scene, random_tree
 
-__all__ = ["SHAPES", "Shape"]
-
 
 @dataclass(frozen=True)
 class Shape:

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = ["operations", "total"]
-
 
 def operations(outputs: Iterable[Node]) -> dict[str, int]:
     """Number of operations of each kind that the outputs need, shared ones once; inputs and constants are free.

@@ -13,8 +13,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import BALL, CHAINS, ELASTIC, FOUR_BARS, LEG, WHEEL, G, Scene
 from benchmarks.peers.systems import space_dart
 
-__all__ = ["attempts", "first_step", "version"]
-
 D = dart.dynamics
 DOWN_TURN = (0.0, -1.0, 0.0)
 

@@ -29,8 +29,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import ANDREWS, CHAINS, COMPASS, ELASTIC, FOUR_BARS, LEG, WHEEL, G, Scene
 from benchmarks.peers.systems import space_drake
 
-__all__ = ["attempts", "first_step", "version"]
-
 AXIS = np.array([0.0, -1.0, 0.0])
 GIVE_UP = 8.0
 """Seconds of processor time after which a run is given up."""

@@ -41,8 +41,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import ANDREWS, BALL, CHAINS, ELASTIC, FOUR_BARS, LEG, STOP, G, Scene
 from benchmarks.peers.systems import space_exudyn
 
-__all__ = ["attempts", "first_step", "version"]
-
 SOLVERS = exu.DynamicSolverType
 REVOLUTE, SLIDE_Y = exu.JointType.RevoluteZ, exu.JointType.PrismaticY
 

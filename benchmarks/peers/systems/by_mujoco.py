@@ -27,8 +27,6 @@ from benchmarks.peers.scenes import (
 )  # fmt: skip
 from benchmarks.peers.systems import space_mujoco
 
-__all__ = ["attempts", "first_step", "version"]
-
 HINGE = '<joint type="hinge" axis="0 -1 0" {}/>'
 HARD, HARD_LIMIT = 'solimp="0.9999 0.9999 0.001"', 'solimplimit="0.9999 0.9999 0.001"'
 RESETS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)

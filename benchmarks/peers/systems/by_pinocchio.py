@@ -13,8 +13,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import ANDREWS, CHAINS, ELASTIC, FOUR_BARS, G, Scene
 from benchmarks.peers.systems import space_pinocchio
 
-__all__ = ["attempts", "first_step", "version"]
-
 Accelerate = Callable[[Any, Any], Any]
 
 

@@ -14,8 +14,6 @@ from benchmarks.peers.references import FINEST, IMPACTS, rhs_of
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.systems.compiled import compiled
 
-__all__ = ["attempts", "version"]
-
 TOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 BY_EVENTS = (1e-4, 1e-7, 1e-10, 1e-12)
 

@@ -17,8 +17,6 @@ from benchmarks.peers.equations import Problem, problem
 from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import Scene
 
-__all__ = ["attempts", "compiled", "version"]
-
 A, B, LATE, EARLY = tableau.A[:12, :12].copy(), tableau.B.copy(), tableau.E5.copy(), tableau.E3.copy()
 SUBSTEPS = {"S3b": (10, 30, 100, 300), "S5": (200, 500, 1000), "S5b": (100, 1000, 10000)}
 OF_CHAINS = {"S1": (10, 20, 50, 100, 200, 500), "S1d": (10, 20, 50, 100, 200)}

@@ -17,8 +17,6 @@ from benchmarks.peers.space import tree
 from benchmarks.stopwatch import kernel_watched
 from mbd.compile import background
 
-__all__ = ["attempts", "first_step", "once", "version"]
-
 BY_HINGES = ("S7_top", "S7_double", "S7_chain")
 """Trees of ball joints that are tried with three hinges for each, too."""
 APART = 1e-5

@@ -12,8 +12,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.space import TREES, Part, Tree, centers, rotation, tree
 
-__all__ = ["attempts"]
-
 D = dart.dynamics
 STEPS = {
     "S7_top": (1e-3, 1e-4, 2e-5), "S7_double": (0.01, 0.001, 2e-4), "S7_chain": (0.002, 2e-4, 5e-5),

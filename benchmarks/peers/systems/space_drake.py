@@ -25,8 +25,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.space import TREES, Part, Tree, centers, rotation, tree
 
-__all__ = ["attempts"]
-
 ACCURACIES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 STEPS = {"S7_top": (2.5e-3, 5e-4), "S7_double": (0.01, 0.001), "S7_chain": (0.005, 5e-4), "S7_human": (0.0125, 0.0025)}
 

@@ -27,8 +27,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.space import COIN, TREES, Tree, centers, rotation, tree
 
-__all__ = ["attempts"]
-
 SOLVERS = exu.DynamicSolverType
 HINGES = (exu.JointType.RevoluteX, exu.JointType.RevoluteY, exu.JointType.RevoluteZ)
 SLIDES = (exu.JointType.PrismaticX, exu.JointType.PrismaticY, exu.JointType.PrismaticZ)

@@ -13,8 +13,6 @@ from benchmarks.peers.race import Attempt, Outcome, Sweep, seconds
 from benchmarks.peers.scenes import Scene
 from benchmarks.peers.space import TREES, Part, Tree, centers, tree
 
-__all__ = ["attempts"]
-
 STEPS = {
     "S7_top": (0.025, 0.0125, 0.01, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4),
     "S7_double": (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001),

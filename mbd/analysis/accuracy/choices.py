@@ -28,8 +28,6 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Plan", "label", "plan"]
-
 PROBES = (2000, 20000, 200000)
 """Steps of the run that looks for time scales, until one succeeds."""
 PROBE_STEP = 1e-3

@@ -22,8 +22,6 @@ from mbd.integrators import Integrator
 from mbd.progress import Progress, share_bar
 from mbd.state import State
 
-__all__ = ["OPTIONS", "accuracy", "folds", "retimed", "with_orders"]
-
 MAX_ROUNDS, MIN_TIMED_SECONDS = 10, 0.3
 """Rounds over all points, the quickest first, that time each once more until it took this much time [s]."""
 

@@ -24,8 +24,6 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["Point", "Subject", "measured"]
-
 CLOCK = perf_counter if sys.platform == "win32" else thread_time
 """Processor time of the thread [s]; wall time where the system counts the other in steps of 16 ms."""
 

@@ -27,8 +27,6 @@ from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.simulation.run.plain import MechanismSystem
 from mbd.state import Mode, State
 
-__all__ = ["Method", "RungeKuttaReference"]
-
 Method = Literal["DOP853", "Radau"]
 
 METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}

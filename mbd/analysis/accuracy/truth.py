@@ -24,8 +24,6 @@ from mbd.state import State
 if TYPE_CHECKING:
     from mbd.results.trajectory import Trajectory
 
-__all__ = ["MIN_REPORTED_OVER_BOUND", "MAX_INSTANTS", "Truth", "truth"]
-
 TIGHT, LOOSE = 1e-12, 1e-10
 """Tolerances of the reference and of the run that bounds its error [-]."""
 MAX_INSTANTS = 400

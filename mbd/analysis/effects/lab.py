@@ -30,8 +30,6 @@ from mbd.simulation.simulate import simulate
 from mbd.state import State
 from mbd.topology.description import Description
 
-__all__ = ["effects"]
-
 EACH, STEPS = 0.25, (500, 20000)
 """A timed run takes about this long [s], but has at least and at most so many steps."""
 OPTIONS = ("contact", "impact", "locate", "parameters", "rest_speed", "backend")

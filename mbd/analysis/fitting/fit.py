@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-__all__ = ["Fit", "bounds", "fit"]
-
 SPANS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)
 """Parts of the measured time that are fitted before all of it where the order of events changes [-]."""
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-__all__ = ["GaitReport", "Walk", "gait_report", "symmetry_of"]
-
 Definition = tuple[str, Callable[[float, float], float]]
 
 DEFINITIONS: dict[str, Definition] = {

@@ -14,8 +14,6 @@ from mbd.gait.return_map import ReturnMap
 from mbd.simulation.batch.starts import columns_of, places_of
 from mbd.simulation.run.user_calls import call_user
 
-__all__ = ["Grid", "Study", "grid_of", "study_of"]
-
 Start = Callable[[Mapping[str, Vector]], Mapping[str, Any]]
 """From columns of the axes to columns of coordinates, rates and parameters."""
 MAX_STARTS = 100_000_000

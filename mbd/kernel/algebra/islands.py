@@ -8,8 +8,6 @@ from mbd.kernel.algebra.redundancy import shared
 from mbd.kernel.records import DependentRows, LinearAlgebra
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["find_islands", "gather_island", "saddle_entry"]
-
 
 def saddle_entry(K: DependentRows, u: int, v: int, together: bool) -> float:
     """Entry (u, v) of [M R; B 0], the rows in K.rows behind the coordinates, with shares of dependent rows in R."""

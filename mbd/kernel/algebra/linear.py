@@ -8,10 +8,6 @@ from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = [
-    "eliminate", "factor", "largest_entry", "round_off", "solve", "solve_again", "solve_definite", "sum_of_sizes",
-]  # fmt: skip
-
 
 def factor(A: Reals, n: int, pivots: Integers) -> int:
     """LU factors of the row-major n×n matrix A, in place, inverse pivots on the diagonal; 0, or 1 + the bad column."""

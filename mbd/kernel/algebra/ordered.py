@@ -11,11 +11,6 @@ from mbd.kernel.algebra.linear import solve
 from mbd.kernel.records import Equations, Model, Motion, Reals
 from mbd.kernel.tangent_rules import is_differentiated, solve_plain, takes_part
 
-__all__ = [
-    "OF_ACCELERATIONS", "OF_TANGENT", "SYMMETRIC", "clear_tangent", "columns_at", "factor_ordered", "order_at",
-    "solve_held", "solve_kkt", "solve_ordered", "weakest_pivot",
-]  # fmt: skip
-
 OF_TANGENT, OF_ACCELERATIONS, SYMMETRIC = range(3)
 """Where values come from: the matrix of a step, row-major; the program `accelerations`; that with Bᵀ in place of R."""
 

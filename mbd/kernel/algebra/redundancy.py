@@ -14,12 +14,6 @@ from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import ContactRows, DependentRows, Equations, Frictions, Model, Reals, Singular
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = [
-    "JOINT_SHARE", "MIN_LIMIT_SHARE", "clear_dependent", "find_dependence", "find_dependent", "find_shares",
-    "shared", "sharing", "spread", "take_shares",
-]  # fmt: skip
-
-
 SHORT_ROW_RATIO = 1e-2
 """Length of a row over that of the longest of its unit below which it comes after the others [-].
 

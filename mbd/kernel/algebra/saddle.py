@@ -15,8 +15,6 @@ from mbd.kernel.codes import CONFLICT, DEPENDENT, EPS, NOT_FINITE
 from mbd.kernel.records import Balance, DependentRows, Equations
 from mbd.kernel.tangent_rules import is_differentiated
 
-__all__ = ["correct_positions", "correct_velocities", "factor_saddle", "solve_at", "solve_rows"]
-
 COMPATIBILITY_RTOL = 1e-6
 """Part of the terms of rows that a row which depends on others may be missed by, for errors of positions [-]."""
 ROW_RTOL = 64.0 * EPS

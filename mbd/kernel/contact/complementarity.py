@@ -27,8 +27,6 @@ from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, ContactForces, Contacts, DependentRows, Motion
 from mbd.kernel.stepping.restart import active_rows, largest_force, refresh_scales
 
-__all__ = ["complementarity"]
-
 MAX_NEWTON = 12
 """Changes of all branches at once before and after the solution over cones [-]."""
 MAX_CONE_MISFIT = 0.1

@@ -20,8 +20,6 @@ from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 from mbd.kernel.stepping.restart import active_rows, load_accelerations
 from mbd.kernel.tangent_rules import takes_part
 
-__all__ = ["keep_branches", "solve_cones"]
-
 
 def solve_cones(K: Balance, level: int, allowed: float) -> int:
     """1 if all that may choose obeys its law, with K.jump, K.impulse and branches in place; 0 if nothing was found.

@@ -13,8 +13,6 @@ from mbd.kernel.contact.branches import is_on, solve_directed
 from mbd.kernel.contact.cones import aim, aim_along, leads_group
 from mbd.kernel.records import Balance, ContactForces, ContactRows
 
-__all__ = ["MAX_GROUP_SIZE", "fill_tangents", "misses", "turn_directions"]
-
 DIFFERENCE_ANGLE = 1e-6
 """Angle by whose effect slopes are measured [rad]."""
 MAX_TURN = 0.5

@@ -21,8 +21,6 @@ from mbd.kernel.contact.discs import DISC_SIZE, disc_length, minimize_within_dis
 from mbd.kernel.records import Balance, Complementarity, ContactForces, ContactRows, Frictions, Reals
 from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 
-__all__ = ["keep_in_cones"]
-
 MIN_WEIGHT_RATIO = 1e-4
 """w of such a foot over the largest limit [-]."""
 

@@ -24,8 +24,6 @@ from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.codes import EPS
 from mbd.kernel.records import Integers, Reals
 
-__all__ = ["CONE_RTOL", "EQUAL", "PUSH", "STEADY", "cone_places", "cone_solve"]
-
 PUSH, EQUAL, STEADY = -1, -2, -3
 """In `owner`: a contact that pushes, one that is held, and friction whose limit no unknown changes."""
 CONE_RTOL = 1e-10

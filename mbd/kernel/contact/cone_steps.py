@@ -33,11 +33,6 @@ from mbd.kernel.events.locate import locate
 from mbd.kernel.records import Frictions, Guards, Kernel, Switching
 from mbd.kernel.stepping.trial_step import try_step, turns
 
-__all__ = [
-    "ONSET_STEP_GROWTH", "ONSET_STEP_RATIO", "SLIDES_ON", "approached_end", "come_to_zero", "keeps_direction",
-    "shorter_turn", "slides_at_first", "slides_on", "slides_until_event", "speeds_up",
-]  # fmt: skip
-
 MAX_STEP_SHARE = 0.5
 """Part of the time in which γ would reach zero, or turn by a radian, that a step may take [-]."""
 ONSET_STEP_RATIO = 0.1

@@ -9,8 +9,6 @@ from mbd.kernel.contact.cones import HOLD_DIRECTION, leads_group, product_of, sp
 from mbd.kernel.records import Balance, ContactForces, Switching
 from mbd.kernel.stepping.restart import evaluate, stepping_rows
 
-__all__ = ["MIN_STEPS_TO_REST", "STABILITY_SHARE", "estimated_turn_rate"]
-
 STABILITY_SHARE = 2.0
 """Step times the estimated rate at which friction turns directions that explicit schemes take [-].
 

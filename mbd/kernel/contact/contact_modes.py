@@ -31,8 +31,6 @@ from mbd.kernel.stepping.restart import (
     take_consistent,
 )
 
-__all__ = ["resolve_contact_modes"]
-
 NEAR_REST_SPEED = 1e-7
 """The same along a friction that an event found at rest; index 3 may have moved it as velocities became consistent."""
 

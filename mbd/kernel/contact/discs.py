@@ -11,8 +11,6 @@ from mbd.kernel.algebra.linear import factor, solve
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import Complementarity
 
-__all__ = ["DISC_SIZE", "disc_length", "disc_slack", "minimize_within_discs"]
-
 DISC_SIZE = 4
 """Numbers of a disc: three t_i and ℓ_i [-]."""
 GAP_REDUCTION = 0.1

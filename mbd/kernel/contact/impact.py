@@ -33,8 +33,6 @@ from mbd.kernel.records import ContactForces, Contacts, Switching
 from mbd.kernel.stepping.restart import row_speed
 from mbd.kernel.tangent_rules import note_order, note_zero
 
-__all__ = ["impact"]
-
 MAX_IMPACTS = 1000
 """Impacts of the sequential law at one instant [-]."""
 

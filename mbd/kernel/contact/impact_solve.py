@@ -9,11 +9,6 @@ from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 from mbd.kernel.stepping.restart import capture, evaluate, row_speed
 from mbd.kernel.tangent_rules import note_edges
 
-__all__ = [
-    "energy_gain", "gather", "is_held_through", "let_rebound", "loosen", "loss_elsewhere", "loss_in", "prepare",
-    "relative_gain", "restitution_of", "solve_impact", "speed", "start_over", "strikes",
-]  # fmt: skip
-
 
 def prepare(K: Balance) -> None:
     """K.acc at the instant, directions of sliding and of sticking where contacts are now; all frictions begin stuck.

@@ -13,8 +13,6 @@ from mbd.kernel.contact.impact_solve import energy_gain, gather, prepare, solve_
 from mbd.kernel.records import ContactForces, Switching
 from mbd.kernel.stepping.restart import row_speed
 
-__all__ = ["stop_slide"]
-
 APPROACH_REDUCTION = 0.1
 """Approach of each regularized impact over the one before, the first over the speed of the slide [-]."""
 MAX_REDUCTIONS = 4

@@ -25,8 +25,6 @@ from mbd.kernel.records import Balance, ContactForces, ContactRows, Guards, Real
 from mbd.kernel.stepping.candidate import accept_candidate, carry
 from mbd.kernel.stepping.restart import consistent, displace, evaluate, is_held, take_consistent
 
-__all__ = ["keep", "closes_below_surface", "must_release", "put_back", "rebound", "strike"]
-
 MAX_DEPTH_OVER_ROUND_OFF = 1e4
 """Depth over the round-off of a gap at which a correction of positions has failed [-]."""
 HELD_ROW_RTOL = 1024.0 * EPS

@@ -22,8 +22,6 @@ from mbd.kernel.contact.cones import (
 from mbd.kernel.records import ContactRows, Frictions, Guards, Reals, Switching
 from mbd.kernel.stepping.restart import largest_force
 
-__all__ = ["hold_all", "hold_for_step", "pulls", "release", "turned_in_plane"]
-
 
 def hold_for_step(K: Switching, h: float) -> None:
     """Which directions a step of size h holds; all of them where an explicit scheme would be unstable."""

@@ -11,8 +11,6 @@ from mbd.kernel.stepping.accept_restart import event_at_start, event_candidate, 
 from mbd.kernel.stepping.restart import largest_force
 from mbd.kernel.stepping.scales import FORCE_ULPS
 
-__all__ = ["bracket", "flag_of"]
-
 MAX_HALVINGS = 12
 """How often a step is halved to see a friction slide, or a contact part, that has just begun to [-]."""
 

@@ -21,8 +21,6 @@ from mbd.kernel.hooks import call
 from mbd.kernel.records import Guards, Model, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate, is_held
 
-__all__ = ["TRUSTED_CHANGE", "condition_round_off", "guard_round_off"]
-
 NUMBER_ULPS = 4.0
 """Round-off of a number, in units of its last place [-]."""
 ROW_ULPS = 64.0

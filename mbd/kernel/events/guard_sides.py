@@ -19,17 +19,6 @@ from mbd.kernel.events.guard_round_off import guard_round_off
 from mbd.kernel.events.guards import gap_tolerance, is_waiting, is_watched
 from mbd.kernel.records import Events, Guards, Switching
 
-__all__ = [
-    "find_crossings",
-    "find_passed",
-    "is_at_event",
-    "keep_at_zero",
-    "log_crossings",
-    "next_crossing",
-    "settle_sides",
-    "striking_contact",
-]
-
 AWAITS_EVENT = 2
 """Of K.passing: the guard is at zero at the event of another one, and has its own next."""
 REACH_SHARE = 1e-3

@@ -17,8 +17,6 @@ from mbd.kernel.stepping.candidate import accept_guards, carry
 from mbd.kernel.stepping.charts import find_chart_end, leave_chart
 from mbd.kernel.stepping.restart import compose, consistent, fill_block
 
-__all__ = ["copy_candidate", "copy_ends", "interpolate_candidate", "parts_to_take"]
-
 INTERPOLATION_ULPS = 16.0
 """Distance over the round-off of a position below which the interpolant need not meet it at the end of a step [-]."""
 

@@ -45,12 +45,6 @@ from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 from mbd.kernel.stepping.restart import consistent, evaluate, fill_block, largest_force
 from mbd.kernel.stepping.scales import FORCE_ULPS, speed_round_off, unseen_force
 
-__all__ = [
-    "gap_scale", "gap_tolerance", "goes_back", "guard_value", "is_waiting", "is_watched", "judge",
-    "pull_round_off", "update_armed", "update_side", "update_sides", "watch",
-]  # fmt: skip
-
-
 DOUBTFUL_SHARE = 0.25
 """Part of the forces below which the sign of a multiplier of index 3 is asked of consistent accelerations [-]."""
 NEAR_TURN_RATIO = 1e-3

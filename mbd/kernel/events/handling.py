@@ -28,8 +28,6 @@ from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.observe import is_awaited, store_row
 from mbd.kernel.stepping.starting import restart_after_event
 
-__all__ = ["handle_event", "land"]
-
 
 def same_instant(K: Guards) -> bool:
     """Count switches without progress in time; true when there were too many, or when they repeat themselves."""

@@ -12,8 +12,6 @@ from mbd.kernel.contact.impact_solve import loss_elsewhere
 from mbd.kernel.records import Contacts, Reals, Switching
 from mbd.kernel.stepping.restart import evaluate
 
-__all__ = ["AFTER", "BEFORE", "BESIDE", "is_followed_by_impulse", "push"]
-
 BEFORE, BESIDE, AFTER = 0, 1, 2
 """Orders of impulses, as `mbd.constraints.impulse.ORDERS` has them."""
 

@@ -26,8 +26,6 @@ from mbd.kernel.events.guards import (
 from mbd.kernel.records import Events, Guards, Kernel, Switching
 from mbd.kernel.stepping.trial_step import try_step
 
-__all__ = ["find_jump", "jumps_over_stop", "locate"]
-
 MAX_UNEXPLAINED_TURN = 0.5
 """What rates at both ends of a step miss of the change of an angle, where it may have jumped between them [rad]."""
 EARLIER, LATER = -2, -1

@@ -5,8 +5,6 @@ from mbd.kernel.events.guards import gap_tolerance, guard_value
 from mbd.kernel.records import ContactRows, Kernel
 from mbd.kernel.stepping.accept_restart import event_candidate
 
-__all__ = ["enough", "refine"]
-
 NOT_TRUSTED = 1e300
 """What `interpolated` gives where its move is not to be trusted."""
 

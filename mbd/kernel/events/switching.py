@@ -25,8 +25,6 @@ from mbd.kernel.stepping.accept_restart import project_velocity
 from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 from mbd.kernel.stepping.restart import active_rows, capture, consistent, evaluate, largest_force
 
-__all__ = ["switch"]
-
 COMMON_REST_SHARE = 1e-3
 """Part of dt within which contacts that come to rest do so together [-]."""
 

@@ -13,9 +13,6 @@ from mbd.kernel.events.guards import watch
 from mbd.kernel.records import Events, Guards, Switching
 from mbd.kernel.stepping.restart import evaluate
 
-__all__ = ["begins_now", "find_due", "has_happened", "is_allowed", "is_due", "settle_fresh", "take_transitions"]
-
-
 NEXT_ROUND = 2
 """Mark of what transitions are looked for by in the round that follows."""
 

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from mbd.errors import nearest
 
-__all__ = ["Integers", "Place", "Reals", "Record", "Table", "formula", "integers", "place", "reals"]
-
 Reals: TypeAlias = NDArray[np.float64]
 """A flat array of float64."""
 Integers: TypeAlias = NDArray[np.int64]

@@ -29,8 +29,6 @@ from mbd.kernel.schemes.stages import (
 )
 from mbd.kernel.tangent_rules import is_differentiated, solve_plain
 
-__all__ = ["correct_coupled_rates", "couple_stages", "coupled_step", "stage_weight"]
-
 MIN_CORRECTION_PART = 1e-3
 """Part of a correction below which none reduces the residuals [-]."""
 MIN_DECREASE = 0.1

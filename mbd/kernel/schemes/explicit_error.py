@@ -6,8 +6,6 @@ from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.records import Memory, Steps
 
-__all__ = ["explicit_error", "hold_error"]
-
 
 def explicit_error(K: Memory, h: float) -> None:
     """K.error: local error by the embedded formulas, ``h e₅ · |e₅| / √(|e₅|² + |e₃|²/100)`` (Hairer et al., II.10).

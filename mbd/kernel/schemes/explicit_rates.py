@@ -12,8 +12,6 @@ from mbd.kernel.stepping.free_rates import NOT_CLEAR, free_rates
 from mbd.kernel.stepping.mass_ratios import polish_rates, polish_with_rows
 from mbd.kernel.stepping.restart import consistent, evaluate
 
-__all__ = ["explicit_rates", "rates_at_end"]
-
 
 def explicit_rates(K: Balance, t: float) -> int:
     """Rates at (q1, y1), in K.jump; where friction follows multipliers by the iteration of `consistent`."""

@@ -10,13 +10,6 @@ from mbd.kernel.records import Equations, Model, Motion, Reals, Settings, Singul
 from mbd.kernel.stepping.restart import compose, note_scales
 from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 
-__all__ = [
-    "MAX_CURVATURE", "MAX_ITERATIONS", "MAX_RATE_ERROR", "MAX_UNCHECKED_ERROR", "MAX_UNEXPLAINED_CHANGE",
-    "MIN_HALVED_RESIDUAL", "MIN_RATE_SHARE", "MIN_RETRY_SHARE", "finish", "is_below_floors", "is_small",
-    "note_fastest", "overturns", "predict", "residual_size", "roughly", "runs_away", "shift_growth", "soundness_at",
-    "weigh_by_accelerations",
-]  # fmt: skip
-
 MAX_ITERATIONS = 50
 """Newton iterations, halvings included, after which a step counts as failed; one that converges takes one to three."""
 MAX_UNCHECKED_ERROR = 0.01

@@ -32,8 +32,6 @@ from mbd.kernel.stepping.restart import (
     take_consistent,
 )
 
-__all__ = ["SCHEME", "newmark_accept", "newmark_error", "newmark_resume", "newmark_start", "newmark_step"]
-
 MAX_MULTIPLIER_ERROR_RATIO = 16.0
 """Error of multipliers of a step, over their change in it, that is taken into account [-].
 

@@ -50,8 +50,6 @@ from mbd.kernel.tangent_rules import (
     note_solution,
 )
 
-__all__ = ["PIVOTS_SEARCHED", "BAD_FACTORS", "solve_step"]
-
 MAX_FIXED_ORDER = 2
 """Tangents of a step that straight-line code may factor: where it takes more, pivots are searched for."""
 PIVOTS_SEARCHED = MAX_FIXED_ORDER + 1

@@ -66,8 +66,6 @@ from mbd.kernel.stepping.restart import (
 from mbd.kernel.stepping.scales import FORCE_ULPS, add_force_floors
 from mbd.kernel.tangent_rules import NOT_FOLLOWED, follow_stages, further_corrections, is_differentiated
 
-__all__ = ["SCHEME", "radau_accept", "radau_start", "radau_step"]
-
 MAX_CONTRACTION = 0.5
 """Part of the residual left by a correction above which the matrices are made again."""
 

@@ -36,8 +36,6 @@ from mbd.kernel.stepping.restart import (
 )
 from mbd.kernel.tangent_rules import follow_rates
 
-__all__ = ["complete"]
-
 CHECK_POINT = 0.4
 """Part of a step, amid the widest gap between stages, at which a second estimate looks at the balance [-]."""
 

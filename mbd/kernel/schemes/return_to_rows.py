@@ -11,8 +11,6 @@ from mbd.kernel.singular.newmark_step import VELOCITY_RTOL
 from mbd.kernel.stepping.restart import displace, evaluate, raise_scales
 from mbd.kernel.tangent_rules import follow_factors, follow_solution, is_differentiated
 
-__all__ = ["return_to_rows"]
-
 
 def return_to_rows(K: DependentRows, t1: float) -> int:
     """The nearest positions with h = 0 and velocities with ḣ = 0, in the metric of M, in place of (q1, y1)."""

@@ -32,8 +32,6 @@ from mbd.kernel.stepping.restart import (
 )
 from mbd.kernel.tangent_rules import follow_move, follow_rates, follow_stage, is_differentiated
 
-__all__ = ["SCHEME", "explicit_scheme", "runge_kutta_accept", "runge_kutta_start", "runge_kutta_step"]
-
 
 def runge_kutta_start(K: SingularSteps) -> int:
     """Sizes of forces and rows at the consistent state; the scheme remembers nothing but its rates."""

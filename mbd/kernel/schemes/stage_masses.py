@@ -38,8 +38,6 @@ from mbd.kernel.schemes.stages import (
     load_stage,
 )
 
-__all__ = ["correct_by_own_masses"]
-
 
 def correct_by_own_masses(K: Kernel, m: int, h: float, t1: float, renew: bool, slow: bool) -> float:
     """`correct_stages`; of bodies that turn freely for residuals over the masses of their own stages.

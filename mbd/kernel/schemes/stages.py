@@ -42,12 +42,6 @@ from mbd.kernel.schemes.stage_layout import (
 from mbd.kernel.schemes.stage_matrices import matrices, solve_pair, solve_real
 from mbd.kernel.stepping.restart import share_loads
 
-__all__ = [
-    "apply_changes", "correct_positions_where_off", "correct_rates", "correct_stages", "evaluate_stages", "hold_block",
-    "keep_shared_loads", "load_stage", "predict_stages", "retreat_stages",
-]  # fmt: skip
-
-
 MAX_EXTRAPOLATION = 4.0
 """Size of a step over that of the last above which its stages predict nothing: a parabola would go far astray [-]."""
 

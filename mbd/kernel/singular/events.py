@@ -18,8 +18,6 @@ from mbd.kernel.stepping.candidate import accept_guards
 from mbd.kernel.stepping.observe import store_state
 from mbd.kernel.stepping.restart import evaluate
 
-__all__ = ["find_passed_events", "log_passed_events", "may_pass_events", "refuses"]
-
 REGULAR_RTOL = 0.05
 """What is left of a row, over the longest row, above which no singular configuration is near [-]."""
 WELL_CONDITIONED_RTOL = 1e-3

@@ -10,8 +10,6 @@ from mbd.kernel.algebra.column_weights import counted_inertia, least_inertia
 from mbd.kernel.algebra.roots import sqrt
 from mbd.kernel.records import DependentRows, Singular, SingularSteps
 
-__all__ = ["gram_norms", "pivoted_gram_norms"]
-
 SQUARED_ROW_RTOL = 1e-15
 """Square of a scaled row below which it is round-off of its terms [-]."""
 

@@ -35,8 +35,6 @@ from mbd.kernel.stepping.restart import (
 from mbd.kernel.stepping.scales import still_speed
 from mbd.kernel.tangent_rules import further_corrections, is_differentiated
 
-__all__ = ["misses", "singular_newmark_step", "steps_by_pivot", "steps_to_singularity"]
-
 MAX_STEPS_AWAY = 4.0
 """Steps to a singular configuration, at the present speed, below which positions alone are held [-]."""
 MIN_STEPS_AWAY = 0.2

@@ -23,14 +23,6 @@ from mbd.kernel.schemes.stage_layout import A2_, CHANGES, PAIR, STAGE_LAM, STAGE
 from mbd.kernel.schemes.stages import hold_block, load_stage
 from mbd.kernel.stepping.restart import compose, evaluate
 
-__all__ = [
-    "MAX_NOISY_STEPS_AWAY",
-    "spans_singularity",
-    "is_beside_singularity",
-    "solve_singular_stages",
-    "replace_row_rates",
-]
-
 MAX_STEPS_AWAY = 2.0
 """Steps to or from a singularity within which rows change too much from stage to stage for one matrix [-]."""
 MAX_NOISY_STEPS_AWAY = 1000.0

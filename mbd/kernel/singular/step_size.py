@@ -28,11 +28,6 @@ from mbd.kernel.schemes.iteration import note_fastest
 from mbd.kernel.singular.gram_norms import gram_norms
 from mbd.kernel.stepping.restart import compose, evaluate, fill_block
 
-__all__ = [
-    "NOISE_RTOL", "MAX_NOISE", "forget_row_norms", "is_resolved", "accept_row_norms", "row_norms", "larger_motion",
-    "note_row_norms", "singular_step_size", "noise_share", "noise_coefficient", "is_too_noisy",
-]  # fmt: skip
-
 MAX_STEPS_CHECKED = 3.5
 """Steps to a singularity, as the last step tells, below which is looked closer [-]."""
 MAX_CERTAIN_STEPS = 6.0

@@ -12,8 +12,6 @@ from mbd.kernel.stepping.candidate import accept_candidate, revert_candidate
 from mbd.kernel.stepping.restart import active_rows, consistent, evaluate, largest_force, stepping_rows, take_consistent
 from mbd.kernel.stepping.trial_step import try_step
 
-__all__ = ["event_candidate", "event_at_start", "project_velocity", "put_on_rows", "accept_for_restart"]
-
 
 def project_velocity(K: Balance, t: float, q: Reals, y: Reals, m: int, dropping: bool) -> int:
     """The nearest velocities to y, in the metric of M, with B v + h_t = 0 on the m rows in K.rows.

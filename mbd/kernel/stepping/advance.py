@@ -28,8 +28,6 @@ from mbd.kernel.stepping.starting import find_mode, restart
 from mbd.kernel.stepping.step_retry import is_shortened, part_end, step_end, tried_step
 from mbd.kernel.tangent_rules import held_at_end
 
-__all__ = ["advance"]
-
 
 def begin(K: Kernel) -> int:
     """What comes before a step: room for its rows, a start of the scheme, code of the mode; −1 if it can be taken."""

@@ -18,8 +18,6 @@ from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.growth import MAX_GROWTH, leave_rows_alone, take_back
 from mbd.kernel.stepping.restart import consistent, evaluate
 
-__all__ = ["crosses_barrier"]
-
 PLACES_A_SIDE = 11
 """Places along D on either side of its middle: seven sixteenths, then halves of what is left, and its end."""
 

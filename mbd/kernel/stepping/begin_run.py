@@ -9,8 +9,6 @@ from mbd.kernel.records import Guards, Kernel, Mechanism, Switching
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.restart import fill_block, refresh_scales
 
-__all__ = ["begin_run", "judge_start"]
-
 LONG_AGO = float("-inf")
 """When the last switch was, before any [s]."""
 MAX_START_DEPTH = 1e-6

@@ -4,8 +4,6 @@ from typing import Any
 
 from mbd.kernel.records import Events, Guards, Kernel, State
 
-__all__ = ["accept_guards", "accept_candidate", "carry", "revert_candidate"]
-
 
 def carry(values: Any, kept: Any, place: int, count: int, out: bool) -> int:
     """Copy one array to its place among what is kept (`out`), or back; where the next one goes."""

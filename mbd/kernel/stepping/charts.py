@@ -12,8 +12,6 @@ from mbd.kernel.hooks import call_on
 from mbd.kernel.records import Model, Motion, Reals
 from mbd.kernel.stepping.candidate import carry
 
-__all__ = ["divides_further", "find_chart_end", "leave_chart", "turned_end", "turns_too_far", "wants_row", "whole_step"]
-
 QUARTER_TURN = 1.5707963267948966
 """Way of a joint at the speed with which a step begins, above which the step is divided [rad]."""
 MIN_TURN = 0.1

@@ -12,8 +12,6 @@ from mbd.kernel.stepping.accept_restart import accept_for_restart
 from mbd.kernel.stepping.candidate import accept_guards
 from mbd.kernel.stepping.contact_step import relax_pace
 
-__all__ = ["conclude"]
-
 MAX_SHORTENED = 5
 """Shortened steps, less half the full ones between them, after which a mechanism with rows is stuck.
 

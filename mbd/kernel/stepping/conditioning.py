@@ -16,8 +16,6 @@ from mbd.kernel.records import Balance, Report
 from mbd.kernel.stepping.mass_ratios import find_imbalance, polish_with_rows
 from mbd.kernel.stepping.restart import stepping_rows
 
-__all__ = ["refine_accelerations", "is_ill_conditioned"]
-
 CORRECTED_PIVOT_RTOL = 1e-6
 """Smallest pivot of the scaled matrix below which solutions are corrected [-]."""
 MAX_ERROR = 0.1

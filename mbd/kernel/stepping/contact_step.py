@@ -13,8 +13,6 @@ from mbd.kernel.events.guards import gap_tolerance, watch
 from mbd.kernel.records import Guards, Switching
 from mbd.kernel.stepping.restart import compose, consistent, fill_block
 
-__all__ = ["find_pace", "relax_pace"]
-
 MAX_SHARE = 0.2
 """Share above which an impact has too few steps: half a period has π/√share, seven [-]."""
 TARGET_SHARE = 0.02

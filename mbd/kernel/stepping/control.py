@@ -31,8 +31,6 @@ from mbd.kernel.singular.step_size import is_too_noisy, noise_share, singular_st
 from mbd.kernel.stepping.restart import compose, consistent, fill_block, lower_scales
 from mbd.kernel.stepping.trial_step import try_step
 
-__all__ = ["controlled_step", "first_step", "smallest_step"]
-
 MIN_STEP_RATIO = 1e-10
 """Shortest step over the longest [-]."""
 SAFETY_FACTOR = 0.9

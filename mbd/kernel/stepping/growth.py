@@ -17,8 +17,6 @@ from mbd.kernel.records import Guards, Kernel, SchemeAbilities, Switching
 from mbd.kernel.stepping.restart import consistent, stepping_rows
 from mbd.kernel.stepping.scales import still_energy
 
-__all__ = ["is_unstable", "leave_rows_alone", "note_unforeseen", "outgrows"]
-
 MAX_GROWTH = 0.8
 """ζ in a whole step that the trapezoidal rule still follows; less where the error of a scheme is larger [-]."""
 TRAPEZOID_ERROR = 1.0 / 12.0

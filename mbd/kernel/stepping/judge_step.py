@@ -33,8 +33,6 @@ from mbd.kernel.stepping.step_retry import is_shortened, tried_step
 from mbd.kernel.stepping.trial_step import try_step
 from mbd.kernel.tangent_rules import follow_candidate, follow_event, follows_rows
 
-__all__ = ["MAX_SHORTENINGS", "end_crossing", "end_timer", "judge_step"]
-
 MAX_SHORTENINGS = 5
 """Tries of shorter steps as sliding begins or ends [-]."""
 ESTIMATE_EXCESS = 10.0

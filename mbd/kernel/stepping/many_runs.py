@@ -13,8 +13,6 @@ from mbd.kernel.stepping.advance import advance
 from mbd.kernel.stepping.begin_run import begin_run
 from mbd.kernel.stepping.candidate import carry
 
-__all__ = ["march_many"]
-
 NEVER = float("inf")
 """When a run ends that is not to end [s]."""
 

@@ -17,8 +17,6 @@ from mbd.kernel.stepping.free_rates import NOT_CLEAR, rates_in_block
 from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.stepping.scales import still_energy
 
-__all__ = ["peaks_within"]
-
 MIN_RISE = 1.5
 """Accelerations within a step over those at its ends below which there is nothing to be found [-]."""
 MAX_RISE = 100.0

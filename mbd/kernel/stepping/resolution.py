@@ -30,8 +30,6 @@ from mbd.kernel.stepping.poles import peaks_within
 from mbd.kernel.stepping.restart import compose, consistent, evaluate, fill_block
 from mbd.kernel.stepping.scales import still_energy
 
-__all__ = ["judge_change"]
-
 BULGE_SHARE = 0.5
 """Error of a rate over dt times the largest way of slopes from a line, where forces begin within a step [-]."""
 MAX_UNEXPLAINED_ENERGY = 0.5

@@ -22,13 +22,6 @@ from mbd.kernel.records import (
 from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
 from mbd.kernel.stepping.scales import load_accepted, note_extent, restore_iterate
 
-__all__ = [
-    "active_rows", "add_shares", "capture", "compose", "consistent", "displace", "evaluate", "fill_block",
-    "holds_rows", "largest_force", "load_accelerations", "lower_scales", "lower_to_step", "measure_accepted",
-    "minimum_norm_multipliers", "note_scales", "raise_scales", "refresh_scales", "restore_scales", "retain_scales",
-    "row_speed", "share_loads", "stepping_rows", "take_consistent",
-]  # fmt: skip
-
 MAX_MAGNITUDE_RATIO = 100.0
 """Magnitudes over those of the accepted state above which they are lowered again, and the most in one step [-]."""
 MAX_ROW_GROWTH = 16.0

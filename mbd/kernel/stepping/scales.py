@@ -24,11 +24,6 @@ from mbd.kernel.codes import ACCELERATIONS, EPS, SCALES
 from mbd.kernel.hooks import call
 from mbd.kernel.records import Equations, Motion
 
-__all__ = [
-    "FORCE_ULPS", "HORIZON_STEPS", "add_force_floors", "load_accepted", "note_extent", "restore_iterate", "size_of",
-    "speed_round_off", "still_energy", "still_speed", "unseen_force",
-]  # fmt: skip
-
 HORIZON_STEPS = 1000.0
 """Steps in which the least force that counts would move a coordinate by its own size [-]."""
 FORCE_ULPS = 4096.0

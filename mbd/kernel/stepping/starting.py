@@ -21,8 +21,6 @@ from mbd.kernel.stepping.restart import (
     take_consistent,
 )
 
-__all__ = ["find_mode", "restart", "restart_after_event", "still_dependent"]
-
 
 def find_mode(K: DependentRows) -> int:
     """Number of the mode of the closed contacts and dependent rows, −1 if its code is not made yet.

@@ -23,8 +23,6 @@ from mbd.kernel.stepping.resolution import judge_change
 from mbd.kernel.stepping.restart import consistent, lower_scales
 from mbd.kernel.stepping.trial_step import try_step
 
-__all__ = ["is_shortened", "part_end", "step_end", "tried_step"]
-
 MIN_TURNING_SHARE = 1e-3
 """The same of a step that is too long for how friction in a plane turns with a slow γ [-]."""
 RETRY_FACTOR = 0.6180339887498949

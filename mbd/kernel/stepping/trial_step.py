@@ -27,8 +27,6 @@ from mbd.kernel.stepping.restart import (
     minimum_norm_multipliers,
 )
 
-__all__ = ["try_step", "turns"]
-
 SLIP_RTOL = 256.0 * EPS
 """Part of the terms of γ below which it is round-off [-]."""
 MAX_ROW_RATE = 1e-2

@@ -7,8 +7,6 @@ from pathlib import Path
 from mbd.errors import nearest
 from mbd.trees.tree import kind_of
 
-__all__ = ["called", "expected", "no_function", "no_value", "shown", "statement", "unknown_field"]
-
 STATEMENTS = "an assignment, a call, if, while, for … in range(…), break, continue, pass or return"
 
 INSTEAD: dict[type[ast.AST], str] = {

@@ -30,8 +30,6 @@ from mbd.laboratory.models.osim_functions import Linear, function_of
 from mbd.laboratory.models.xml import Element
 from mbd.laboratory.quaternion_rates import UNIT_LENGTH_ATOL
 
-__all__ = ["connect", "end_at", "joints_of", "tree_of", "turned"]
-
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 MOTIONS: dict[str, tuple[tuple[str, tuple[float, float, float]], ...]] = {
     "WeldJoint": (),

@@ -28,8 +28,6 @@ from mbd.sensitivity.tangent.interpreted import Table, interpreted
 from mbd.sensitivity.tangent.printer import tangent_text
 from mbd.trees.tree import Function
 
-__all__ = ["entry", "keep_optimized", "own_rules", "plain_entry"]
-
 PARTS = (
     words,
     follow_candidates,

@@ -6,8 +6,6 @@ from mbd.kernel.records import Kernel, Reals
 from mbd.kernel.stepping.restart import consistent, evaluate, fill_block
 from mbd.sensitivity.tangent.words import derivative_of, is_differentiated, solve_plain, solved_program, without_tangent
 
-__all__ = ["follow_factors", "follow_move", "follow_rates", "follow_solution", "follow_stage"]
-
 BALANCE = 9
 """The function behind those of `mbd.kernel.codes`: M v̇ + f + R λ and B v̇ + γ of all rows, of derivatives alone."""
 

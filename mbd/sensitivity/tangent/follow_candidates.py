@@ -24,8 +24,6 @@ from mbd.sensitivity.tangent.words import (
     without_tangent,
 )
 
-__all__ = ["follow_candidate", "follow_event", "follows_rows", "held_at_end"]
-
 
 def follows_rows(K: Kernel) -> bool:
     """Whether rows between events are stored with their derivatives; those at events are in any case."""

@@ -7,8 +7,6 @@ from mbd.kernel.contact.impact_solve import is_held_through, speed
 from mbd.kernel.records import Kernel
 from mbd.sensitivity.tangent.words import edge_place, largest_derivative, without_tangent
 
-__all__ = ["EDGE", "NO_REBOUND", "TIE", "note_edges", "note_order", "note_zero"]
-
 EDGE, TIE, NO_REBOUND = 1.0, 2.0, 3.0
 """What is noted: who is on an edge between two branches, who come equally fast, and whose restitution is zero."""
 

@@ -24,8 +24,6 @@ from mbd.sensitivity.tangent.words import (
     without_tangent,
 )
 
-__all__ = ["follow_matrix", "follow_newton", "further_corrections", "note_matrix", "note_solution"]
-
 
 def note_matrix(K: Kernel) -> None:
     """The inputs that Newton's matrix is made from, into K.starts."""

@@ -37,9 +37,6 @@ from mbd.sensitivity.tangent.words import (
     without_tangent,
 )
 
-__all__ = ["follow_stages"]
-
-
 MAX_SHARE_LEFT = 0.5
 """Part of the last correction of derivatives above which stages take matrices of their own [-]."""
 

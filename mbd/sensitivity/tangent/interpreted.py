@@ -16,8 +16,6 @@ from mbd.kernel.records import Kernel
 from mbd.sensitivity.tangent.printer import LANES, TangentBody, is_called_plain
 from mbd.trees import tree
 
-__all__ = ["Pair", "Table", "interpreted"]
-
 
 class Dual:
     """A real with its derivatives (`LANES`,)."""

@@ -22,8 +22,6 @@ from mbd.kernel.translation.llvm import TAGS, Body, tags
 from mbd.trees import tree
 from mbd.trees.llvm import HEAD, LLVM, Value
 
-__all__ = ["LANES", "TangentBody", "is_called_plain", "tangent_text"]
-
 WIDTH = 8
 """Derivatives in one vector: a power of 2, as others are taken apart number by number."""
 LANES = 3 * WIDTH

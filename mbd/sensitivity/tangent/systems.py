@@ -18,8 +18,6 @@ from mbd.tape.derivatives import jvps
 from mbd.tape.elimination import factors
 from mbd.tape.node import Node
 
-__all__ = ["System", "balance", "metric", "rates", "step", "turned"]
-
 
 @dataclass(frozen=True)
 class System:

@@ -25,8 +25,6 @@ PRESCRIBED_JUMP = (
     "periodic=True, or let them begin and end at rest with ends='clamped'"
 )
 
-__all__ = ["Named", "apply_reset", "arrive", "begin_controllers", "call_controllers", "reset_faults"]
-
 
 class Named(Mapping[str, float]):
     """Any named quantity at the present state of a run, evaluated when it is asked for."""

@@ -16,8 +16,6 @@ from mbd.simulation.run.data import RunData
 from mbd.simulation.run.remembered import damage, out_of_range, sealed
 from mbd.state import Memory, State
 
-__all__ = ["carry_on", "memory_of", "memory_of_end", "take_up", "without_memory"]
-
 OPTIONS = ("dt", "tol", "allowed", "longest", "contact", "impact", "locate", "rest_speed", "backend")
 """Settings that a memory depends on."""
 _options = itemgetter(*OPTIONS)

@@ -18,8 +18,6 @@ from mbd.simulation.run.data import RunData
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
 
-__all__ = ["change_parameters", "residuals_now", "violations_now"]
-
 
 def change_parameters(run: RunData, values: Mapping[str, float], what: str) -> None:
     """New parameter values from now on; the scheme restarts from them if they differ.

@@ -28,8 +28,6 @@ from mbd.simulation.run.plain import MechanismSystem, PlainScheme, loads_act, ro
 from mbd.simulation.run.shelves import Shelves, plan_of
 from mbd.tape.derivatives import live
 
-__all__ = ["Stepper", "is_compiled"]
-
 EVENT_CAPACITY = 512
 """Events that the kernel may log before it hands them over, at least."""
 MAX_IDLE_SIZE = 1 << 22
