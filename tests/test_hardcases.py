@@ -39,7 +39,7 @@ LONG |= {("j6", "RadauIIA")}
 """Cases that take seconds with schemes that others judge quickly."""
 
 
-ALONE = {"a4", "a4c", "b4", "h1", "h1b", "j2", "j4", "j5", "j6", "j13", "j14", "j17"}
+ALONE = {"a4", "a4c", "b2-N2", "b4", "d3", "h1", "h1b", "j2", "j3", "j3b", "j4", "j5", "j6", "j13", "j14", "j16", "j17"}
 """Cases whose laws no file of `tests/cases` tries with other numbers or schemes."""
 
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import mbd
-from tests.cases.linkages import parallel_cranks
+from mbd.hardcases.singular_poses import equal_slider_crank
+from tests.cases.linkages import four_bars, parallel_cranks, upright
 
 PLAIN = "python"
 """The backend here: models are made by the dozen and looked at once."""
@@ -189,3 +190,22 @@ def test_a_description_tells_the_freedom_on_demand():
     faulty = copy.copy(model)
     faulty.joints = [*model.joints, model.joints[0]]
     assert "faults:" in faulty.describe(mobility=True)
+
+
+def test_the_folded_slider_crank_is_singular_and_its_rows_are_named():
+    model, start = equal_slider_crank()
+    assert not mbd.mobility(model, start).singular
+    folded = mbd.assemble(model, {"main.angle": np.pi, "pin.angle": -np.pi})
+    found = mbd.mobility(model, folded)
+    assert found.singular and (found.dof, found.rank, found.rank_here) == (1, 2, 1)
+    assert "singular here: rank 1, 2 at postures nearby" in str(found)
+    assert ["'wrist'" in row.row for row in found.lost] == [True]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_flat_parallelograms_lose_a_row_each(count):
+    model = four_bars(count)
+    assert not mbd.mobility(model, upright(model, count)).singular
+    found = mbd.mobility(model, upright(model, count, angle=0.5 * np.pi))
+    assert found.singular and (found.dof, found.rank - found.rank_here) == (1, count)
+    assert len(found.lost) == count and not found.dependent

@@ -1,4 +1,4 @@
-"""Rows on velocities: what `mbd hardcases` does not judge of d1 (sleigh), d2 (knife edge) and d3 (wheel)."""
+"""Rows on velocities: what `mbd hardcases` does not judge of d1 (sleigh) and d2 (knife edge)."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,11 @@ import mbd
 from mbd.hardcases.sleighs import knife_edge
 from mbd.integrators.family import NewmarkFamily
 from tests.cases.schemes import INDEX_3, SCHEMES, name_of
-from tests.cases.sleighs import Sleigh, rolling_wheel
+from tests.cases.sleighs import Sleigh
 from tests.helpers import assert_second_order
 from tests.problems import case
 
-D1, D2, D3 = case("d1-chaplygin-sleigh"), case("d2-knife-edge-incline"), case("d3-rolling-wheel")
+D1, D2 = case("d1-chaplygin-sleigh"), case("d2-knife-edge-incline")
 EVERY = [*SCHEMES, *INDEX_3, mbd.Newmark(formulation="index3"), mbd.HHT(0.05, form="averaged")]
 """Rows on velocities are held alike in both formulations, so that undamped index 3 serves them too."""
 every_scheme = pytest.mark.parametrize("scheme", EVERY, ids=name_of)
@@ -86,32 +86,3 @@ def test_the_knife_edge_on_an_incline_meets_its_references(scheme: NewmarkFamily
 
     # the averaged form is stepped in plain Python, some milliseconds each
     assert_second_order(errors, 0.04 if is_averaged(scheme) else 0.02, halvings=2 if is_averaged(scheme) else 4)
-
-
-# d3 -----------------------------------------------------------------------------------------------------------------
-SIZES = [D3.definition[name] for name in ("m", "R", "J", "slope", "g")]
-
-
-@pytest.mark.covering
-@pytest.mark.parametrize("held", ["row", "contact", "joint"])
-@every_scheme
-def test_a_rolling_wheel_is_exact_at_any_step(scheme: NewmarkFamily, held: str) -> None:
-    """Constant acceleration, by which every scheme of the family is exact."""
-    model = rolling_wheel(*SIZES, held=held)
-    start = mbd.assemble(model, closed=["road"] if held == "contact" else [])
-    if held != "joint" and scheme.formulation == "index3" and scheme.coefficients.undamped:
-        with pytest.raises(mbd.CapabilityError, match="no damping"):  # beside rows on positions
-            mbd.simulate(model, start, scheme, dt=0.1, until=3.0)
-        return
-    place, angle = ("slide.displacement", "axle.angle") if held == "joint" else ("roll.x", "roll.angle")
-    for dt in 0.1, 0.01:
-        run = mbd.simulate(model, start, scheme, dt=dt, until=3.0)
-        assert run[place][-1] == pytest.approx(D3["x(3 s)"].value, abs=1e-11)
-        assert run[angle][-1] == pytest.approx(-D3["wheel angle"].value, abs=1e-11)
-        assert run[f"{place}.acceleration"] == pytest.approx(D3["acceleration"].value, abs=1e-9)
-        assert run["tyre.force"] == pytest.approx(D3["friction force"].value, abs=1e-9)
-        assert np.abs(run["tyre.residual"]).max() < 1e-10
-        if held != "joint":
-            normal = run["road.force"] if held == "contact" else -run["road.multiplier"]
-            needed = np.abs(run["tyre.force"]) / normal
-            assert needed == pytest.approx(D3["minimum static friction"].value, abs=1e-9)
