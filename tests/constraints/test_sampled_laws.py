@@ -261,3 +261,30 @@ def test_the_energy_ledger_closes_though_each_step_ends_at_a_sample(period: floa
     )
     run = mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 0.0}), mbd.RungeKutta853(), dt=0.01, until=1.0)
     assert abs(run.energy.sums["numerical"]) < 1e-10
+
+
+@pytest.mark.parametrize("law_first", [True, False])
+def test_what_falls_on_one_instant_follows_the_order_of_the_model_however_its_sum_is_rounded(law_first: bool) -> None:
+    """17 periods of 0.05 s and 0.35 s + 0.15 s + 0.35 s are one instant, also for controllers and at the end."""
+    model, _ = arm()
+    model = model.without("PID")
+    seen = list[tuple[float, float, float]]()
+
+    def note(t: float, values: Any, state: Any) -> None:
+        seen.append((t, values["inner.seen"], values["phase"]))
+
+    words = [
+        mbd.SampledLaw("outer", 0.05, {"u": lambda phase: phase}, arguments=["phase"]),
+        mbd.Mode("phase", ("a", "b"), transitions=[
+            mbd.Transition("a", "b", after=0.35), mbd.Transition("b", "a", after=0.15),
+        ]),
+    ]  # fmt: skip
+    inner = mbd.SampledLaw("inner", 0.01, {"seen": lambda u, t: u + 0.0 * t}, arguments=["outer.u", "t"])
+    model.apply(*words[:: 1 if law_first else -1], inner)
+    model.apply(mbd.Controller("note", note, period=0.05, reads=("inner.seen", "phase"), writes=("motor.torque",)))
+    run = mbd.simulate(model, mbd.assemble(model), mbd.RungeKutta853(), dt=0.05, until=10.0)
+    turns = [event.time for event in run.events if event.name.startswith("phase")]
+    assert len(turns) == 40
+    at_turns = [(heard, phase) for t, heard, phase in seen if min(abs(t - turn) for turn in turns) < 1e-9]
+    at_turns.append((run["inner.seen"][-1], run["phase.index"][-1]))
+    assert [heard == phase for heard, phase in at_turns] == [not law_first] * len(at_turns)

@@ -16,6 +16,9 @@ from mbd.kernel.stepping.restart import evaluate
 NEXT_ROUND = 2
 """Mark of what transitions are looked for by in the round that follows."""
 
+SAME_INSTANT = 1024.0 * EPS
+"""Difference of instants, over the time, by which sums of many periods may part them [-]."""
+
 
 def begins_now(K: Guards, e: int) -> bool:
     """Whether the state that timer e leaves begins at the accepted state."""
@@ -23,7 +26,10 @@ def begins_now(K: Guards, e: int) -> bool:
 
 
 def find_due(K: Guards) -> None:
-    """The next instant of a timer, K.due_time and K.due_guard; of several the first in the order of transitions."""
+    """The next instant of a timer, K.due_time and K.due_guard; of several the first in the order of transitions.
+
+    Instants are sums, 17 periods of 0.05 s or 0.35 s + 0.15 s + 0.35 s: those that round-off parts are one.
+    """
     K.due_guard = -1
     for e in range(K.n_guards):
         m = K.guard_machine[e]
@@ -35,14 +41,14 @@ def find_due(K: Guards) -> None:
         if K.guard_timed[e] < 4 and not (K.side[e] < 0.0 and K.guards0[K.at_user + e] > 0.0):
             if not begins_now(K, e) or due - K.time > 8.0 * EPS * max(abs(K.time), K.step):
                 continue  # its instant moves, and is located as that of any guard
-        if K.due_guard < 0 or due < K.due_time:
+        if K.due_guard < 0 or due < K.due_time - SAME_INSTANT * abs(due):
             K.due_time = due
             K.due_guard = e
 
 
 def is_due(K: Guards, t: float) -> bool:
     """Whether the next timer ends at t, which is no earlier, but for round-off."""
-    return bool(K.due_guard >= 0 and K.due_time - t <= 8.0 * EPS * max(abs(t), K.step))
+    return bool(K.due_guard >= 0 and K.due_time - t <= max(SAME_INSTANT * abs(t), 8.0 * EPS * K.step))
 
 
 def is_allowed(K: Guards, e: int) -> bool:

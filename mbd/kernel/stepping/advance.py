@@ -42,12 +42,26 @@ def begin(K: Kernel) -> int:
     if K.until >= K.end:
         near = max(near, K.near_end)
     if K.time >= K.until - near:
-        return DONE
+        status = end_timers(K)
+        return DONE if status < 0 else status
     if K.mode_id < 0:
         K.mode_id = find_mode(K)
         if K.mode_id < 0:
             return NEW_MODE
     return -1
+
+
+def end_timers(K: Kernel) -> int:
+    """What is due at the accepted state, one after the other; −1, or a status for the caller."""
+    status = -1
+    while status < 0 and K.n_machines > 0:
+        find_due(K)
+        if not is_due(K, K.time):
+            return -1
+        status = end_timer(K, 0.0)
+        if status < 0:
+            status = start_again(K)
+    return status
 
 
 def start_again(K: Kernel) -> int:
