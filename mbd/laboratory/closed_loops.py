@@ -25,6 +25,8 @@ MAX_SWEEPS = 6
 """Corrections of all frames from the frames before them, after which one frame follows the other."""
 MAX_CONTRACTION = 0.1
 """Part of its distance to the solution that a Newton step from the frame before may leave, in the basin of it [-]."""
+FAR, PARTS = 0.2, 32
+"""Part of a change from frame to frame by which the rates at both may miss it [-]; parts in which one is followed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,8 @@ def close_loops(
        to the solution of 2., the frame lies on another branch of the loop: it and those behind it are solved again from
        their guesses. As each frame then follows from those before it, this is what one frame after another would give.
     4. Where `MAX_SWEEPS` of this do not suffice, one frame after another is solved.
+    5. Where the rates at two frames do not tell the change between them, the frames are far apart, or on two branches:
+       the second is then followed from the first in parts, along which the known coordinates change evenly.
 
     Where the missing coordinates enter the rows linearly, as motions that are functions of coordinates and couplers do,
     one Newton step is exact, and 3. and 4. are left out.
@@ -130,9 +134,9 @@ def close_loops(
         q[1:] = rows.newton(time[1:], q[1:], v[1:])
         if rows.inverse is None:
             _follow(rows, time, q, v)
+            _follow_far(rows, time, q, v)
     free = list(rows.free)
-    h, rate, _, B = rows.at(time, q, v)
-    v[:, free] += rows.solved(B, rate)
+    h, _, _, B = _with_rates(rows, time, q, v)
     _, _, bias, _ = rows.at(time, q, v)
     a[:, free] += rows.solved(B, np.einsum("kij,kj->ki", B, a) + bias)
     return ClosedFrames(q, v, a, np.abs(h))
@@ -158,6 +162,34 @@ def _follow(rows: _Rows, time: Vector, q: Matrix, v: Matrix) -> None:
     for k in range(right, count):
         q[k, own] = _foreseen(q, k, k + 1, own)[0]
         q[k : k + 1] = rows.newton(time[k : k + 1], q[k : k + 1], v[k : k + 1])
+
+
+def _with_rates(rows: _Rows, time: Vector, q: Matrix, v: Matrix) -> tuple[Matrix, ...]:
+    """The rows, with the rates of the missing coordinates put into v."""
+    found = rows.at(time, q, v)
+    v[:, list(rows.free)] += rows.solved(found[3], found[1])
+    return found
+
+
+def _follow_far(rows: _Rows, time: Vector, q: Matrix, v: Matrix) -> None:
+    """Follow frames in parts from those before them where the rates at both do not tell the change between them."""
+    own, rate = list(rows.own), v.copy()
+    _with_rates(rows, time, q, rate)
+    speed, step = rate[:, list(rows.free)], np.diff(time)[:, None]
+    change, foreseen = np.diff(q[:, own], axis=0), 0.5 * step * (speed[:-1] + speed[1:])
+    size = np.abs(change) + 0.5 * step * (np.abs(speed[:-1]) + np.abs(speed[1:]))
+    near = np.abs(change - foreseen) <= FAR * size + HALF_PRECISION_RTOL * np.maximum(1.0, np.abs(q[1:, own]))
+    moved = False
+    for k in range(1, len(q)):
+        if near[k - 1].all() and not moved:
+            continue
+        way = np.linspace(q[k - 1], q[k], PARTS + 1)
+        for part in range(1, PARTS + 1):
+            way[part, own] = _foreseen(way, part, part + 1, own)[0]
+            instant = time[k - 1 : k] + part / PARTS * step[k - 1]
+            way[part] = rows.newton(instant, way[part : part + 1], v[k : k + 1])[0]
+        moved = bool(np.abs(way[-1] - q[k]).max() > HALF_PRECISION_RTOL * max(1.0, np.abs(q[k]).max()))
+        q[k] = way[-1]
 
 
 def _foreseen(q: Matrix, first: int, last: int, own: list[int]) -> Matrix:

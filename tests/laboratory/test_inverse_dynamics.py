@@ -266,6 +266,30 @@ def test_a_loop_follows_its_branch_at_all_frames_at_once(monkeypatch, sweeps):
     assert np.abs(np.diff(at_once[0].q, axis=0)).max() < 0.3
 
 
+@pytest.mark.parametrize("step", [150, 180, 210])
+def test_frames_far_apart_are_on_the_branch_of_frames_close_together(step):
+    """A crank that turns by up to 1.5 rad from frame to frame; the slider could also be on the other side of it."""
+    model = mbd.Model("slider-crank")
+    crank = mbd.Link("crank", mass=0.8, length=0.11, center=0.05, inertia=0.002)
+    rod = mbd.Link("rod", mass=1.1, length=0.37, center=0.2, inertia=0.012)
+    slider = mbd.PointMass("slider", mass=0.9)
+    model.connect(
+        mbd.Revolute("drive", model.ground.origin, crank.start),
+        mbd.Revolute("pin", crank.end, rod.start),
+        mbd.Prismatic("rail", model.ground.origin, slider.origin),
+        mbd.Revolute("wrist", rod.end, slider.origin),
+    )
+    time_ = np.linspace(0.0, 6.0, 2001)
+    angle = 0.3 + 2.2 * time_ + 0.3 * np.sin(1.3 * time_)
+    motion = {"time": time_, "drive.angle": angle, "drive.rate": 2.2 + 0.39 * np.cos(1.3 * time_),
+              "drive.acceleration": -0.507 * np.sin(1.3 * time_)}  # fmt: skip
+    dense = mbd.inverse_dynamics(model, motion, joints=["drive"])
+    assert np.abs(np.diff(dense["rail.displacement"])).max() < 2e-3
+    found = mbd.inverse_dynamics(model, {name: values[::step] for name, values in motion.items()}, joints=["drive"])
+    for name in ("drive.moment", "rail.displacement", "pin.angle"):
+        assert found[name] == pytest.approx(dense[name][::step], abs=1e-9), name
+
+
 def test_motions_that_are_functions_of_coordinates_have_their_values_and_rates():
     """A slider that follows sin of an angle, and one that follows the square of the slider."""
     model = mbd.Model("follower")
