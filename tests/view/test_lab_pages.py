@@ -1,9 +1,6 @@
 """Pages of ``mbd accuracy`` and ``mbd effects``: one file each, without a network; their scripts do what they say."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,8 +10,7 @@ from mbd.analysis.effects import Effects
 from mbd.analysis.effects.contribution import Change, Contribution, Together
 from mbd.analysis.effects.timing import Timing
 from mbd.view.effects_page import content
-
-CHROMIUM = Path("/usr/bin/chromium")
+from tests.view.pages import opened
 
 
 @pytest.fixture(scope="module")
@@ -45,25 +41,6 @@ def lab() -> Accuracy:
         Point("b", 0.2, failure="<fell>"),
     )
     return Accuracy("swing", ("pin.angle",), points, None)
-
-
-@contextmanager
-def opened(page: Path) -> Iterator[Any]:
-    """A tab of a browser with a page; nothing is logged as an error, and nothing else is asked for."""
-    api = pytest.importorskip("playwright.sync_api")
-    if not CHROMIUM.exists():
-        pytest.skip("needs Chromium")
-    with api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"])
-        tab = browser.new_context(offline=True).new_page()
-        complaints, requests = [], []
-        tab.on("console", lambda message: complaints.append(message.text))
-        tab.on("pageerror", lambda error: complaints.append(str(error)))
-        tab.on("request", lambda request: requests.append(request.url))
-        tab.goto(page.as_uri())
-        yield tab
-        browser.close()
-    assert complaints == [] and len(requests) == 1
 
 
 def assert_alone(page: str) -> None:

@@ -5,7 +5,6 @@ import json
 import warnings
 import zipfile
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 from unicodedata import category
 
@@ -19,6 +18,7 @@ from mbd.results import archive
 from mbd.results.at_state import instant
 from mbd.view.page import html
 from tests.comparisons import at_least, compared
+from tests.view.pages import Elements
 
 ODD = ("_left", "$m", "$a$ b_c^{", r"50 \frac", "a & b < c", "колено", "膝")
 CONTROL = ("a\x1b[2Jb", "a\nb", "a\rb", "a\x00", "a\u202eb", "a\x9b", "a\u2028b", "\ud800x")
@@ -104,23 +104,6 @@ HARMFUL = (
 NAMES = st.lists(st.sampled_from(HARMFUL) | st.characters(), min_size=1, max_size=8).map("".join)
 
 
-class Elements(HTMLParser):
-    """Tags and texts of a page or table."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[str] = []
-        self.texts: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-        self.texts.append("")
-
-    def handle_data(self, data):
-        self.texts[-1:] = [self.texts[-1] + data] if self.texts else []
-
-
 def posed(name: str) -> mbd.Trajectory:
     """A mechanism all of whose parts have a name, as a run of one row."""
     model = mbd.Model(name)
@@ -133,7 +116,7 @@ def posed(name: str) -> mbd.Trajectory:
 @cache
 def tags_of_a_plain_name() -> tuple[list[str], list[str]]:
     run = posed("plain")
-    return Elements(html(run)).tags, Elements(run._repr_html_()).tags
+    return Elements(html(run)).names, Elements(run._repr_html_()).names
 
 
 @at_least(10)
@@ -149,9 +132,9 @@ def test_any_name_is_refused_or_kept_in_pages_tables_and_files(name, tmp_path_fa
         return
     compared()
     page, shown = Elements(html(run)), Elements(run._repr_html_())
-    assert (page.tags, shown.tags) == tags_of_a_plain_name()
-    assert page.texts[page.tags.index("title")].startswith(name)
-    data = json.loads(page.texts[page.tags.index("script")])
+    assert (page.names, shown.names) == tags_of_a_plain_name()
+    assert page.texts[page.names.index("title")].startswith(name)
+    data = json.loads(page.scripts[0])
     assert data["name"] == name and data["points"][0]["name"] == f"{name} body.{name}"
     assert any(name in text for text in shown.texts)
     loaded = mbd.load(run.save(tmp_path_factory.mktemp("named") / "run"))

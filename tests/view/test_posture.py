@@ -11,6 +11,7 @@ from mbd.errors import ModelError
 from mbd.results.at_state import instant
 from mbd.view.camera import FIRST, camera
 from mbd.view.scene import scene
+from tests.helpers import one_body
 
 pytest.importorskip("matplotlib")
 
@@ -101,9 +102,7 @@ def test_what_has_no_bodies_cannot_be_drawn():
 
 
 def test_a_wheel_its_road_and_a_blade_are_drawn():
-    model = mbd.Model("scooter")
-    wheel = mbd.RigidBody("wheel", mass=1.0, inertia=0.01)
-    model.connect(mbd.Planar("free", model.ground.origin, wheel.origin))
+    model, wheel = one_body(mbd.RigidBody("wheel", mass=1.0, inertia=0.01), mbd.Planar, "free")
     model.constrain(
         mbd.Unilateral("road", mbd.touchdown(wheel.origin, lambda x: 0.1 * x * x), friction=0.0),
         mbd.Rolling("tyre", wheel.origin, 0.2), mbd.KnifeEdge("edge", wheel.point(0.3, 0.0)),
@@ -117,9 +116,7 @@ def test_a_wheel_its_road_and_a_blade_are_drawn():
 
 
 def test_the_picture_of_a_state_shows_the_forces_of_contacts_that_are_closed(tmp_path):
-    model = mbd.Model("block on a plane")
-    block = mbd.RigidBody("block", 2.0, (0.1, 0.1, 0.1))
-    model.connect(mbd.Planar("slide", model.ground.origin, block.origin))
+    model, block = one_body(mbd.RigidBody("block", 2.0, (0.1, 0.1, 0.1)), mbd.Planar, "slide")
     corners = [block.point(x, -0.1, 0.0, name=f"corner {k}") for k, x in enumerate((-0.2, 0.2))]
     model.constrain(*(mbd.Unilateral(f"foot {k}", mbd.touchdown(each)) for k, each in enumerate(corners)))
     feet = ["foot 0", "foot 1"]

@@ -18,7 +18,9 @@ from mbd.view.forms import equal_inertia, mesh
 from mbd.view.page import kept
 from mbd.view.scene import scene
 from mbd.view.solids import quaternions, rotations
-from tests.view.test_page import CHROMIUM, Elements, unpacked
+from tests.helpers import one_body
+from tests.view.pages import Elements, opened
+from tests.view.test_page import unpacked
 
 ANGLE = st.floats(-3.2, 3.2)
 PIN, TIP = (0.02, 0.25, -0.03), (0.0, -0.25, 0.0)
@@ -112,9 +114,7 @@ def test_solids_of_the_geometry_words_are_drawn_as_they_are():
 
 def shown(name: str, form: str = "", **contact: Any) -> Any:
     """The scene of a body of three equal moments that touches a plane, at one instant."""
-    model = mbd.Model(name)
-    body = mbd.RigidBody("body", 1.0, (0.004, 0.004, 0.004), form=form)
-    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", 1.0, (0.004, 0.004, 0.004), form=form), mbd.Free, "float", title=name)
     if contact:
         model.constrain(mbd.Unilateral("touch", contact["of"](body), friction=0.3))
     return scene(instant(model, mbd.assemble(model, {"float.y": 0.3, "float.x": 0.1}, backend="python")), 1)
@@ -163,9 +163,7 @@ def test_a_solid_lighter_than_air_that_hides_the_mechanism_is_not_drawn():
 
 
 def test_the_force_of_a_ball_acts_where_it_touches():
-    model = mbd.Model("rolling ball")
-    ball = mbd.RigidBody("ball", **mbd.sphere(0.2, 0.05).body)
-    model.connect(mbd.Free("float", model.ground.origin, ball.origin))
+    model, ball = one_body(mbd.RigidBody("ball", **mbd.sphere(0.2, 0.05).body), mbd.Free, "float")
     model.constrain(mbd.Unilateral("touch", mbd.sphere_touchdown(ball.origin, 0.05), friction=0.3))
     start = mbd.assemble(model, {"float.y": 0.05}, {"float.x": 1.0}, closed=["touch"])
     picture = scene(mbd.simulate(model, start, mbd.GeneralizedAlpha(0.9), dt=2e-3, until=0.02), 4)
@@ -337,15 +335,8 @@ def test_a_file_of_chosen_names_has_no_solids(tmp_path):
 @pytest.mark.slow
 def test_the_camera_turns_in_a_browser(tmp_path):
     """Needs playwright and Chromium; drags, keys, buttons and the wheel move the camera, no error is logged."""
-    api = pytest.importorskip("playwright.sync_api")
-    path = pendulum().page(tmp_path / "page.html")
-    with api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"])
-        context = browser.new_context(offline=True, reduced_motion="reduce", viewport={"width": 390, "height": 844})
-        tab, complaints = context.new_page(), []
-        tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
-        tab.on("pageerror", lambda error: complaints.append(str(error)))
-        tab.goto(path.as_uri() + "#t=0.2")
+    path, small = pendulum().page(tmp_path / "page.html"), {"width": 390, "height": 844}
+    with opened(path, "#t=0.2", reduced_motion="reduce", viewport=small) as tab:
         tab.click("#camera [data-move=side]")
         assert tab.inner_text("#seen") == "seen from the side"
         tab.focus("#scene")
@@ -363,5 +354,3 @@ def test_the_camera_turns_in_a_browser(tmp_path):
         ink = f"c => {pixels}.filter((x, i) => i % 4 == 3 && x).length"
         assert tab.eval_on_selector("#scene", ink) > 2000
         assert tab.evaluate("document.documentElement.scrollWidth") <= 390
-        browser.close()
-    assert complaints == []
