@@ -4,8 +4,6 @@ A step of a linear oscillator is linear in all that the scheme carries from step
 numbers in its memory. Unit changes of each give the matrix.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import replace
 from typing import Any

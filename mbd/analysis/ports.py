@@ -1,7 +1,5 @@
 """Inputs and outputs of a linearization by name: what an input is, and where it acts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ fetch its code with every task too, which takes longer than most runs. So tasks 
 what a process has once made of a hash it uses again; a process forked from one that has the model itself uses that.
 """
 
-from __future__ import annotations
-
 import io
 import pickle
 from collections import OrderedDict

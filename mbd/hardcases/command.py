@@ -1,7 +1,5 @@
 """``mbd hardcases``: judge, print the table, write the page."""
 
-from __future__ import annotations
-
 import shutil
 import signal
 import sys

@@ -1,7 +1,5 @@
 """A leg whose joints are driven and held, with steps that follow a tolerance (j18): inverse dynamics."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mbd

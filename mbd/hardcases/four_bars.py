@@ -1,7 +1,5 @@
 """N parallelograms side by side, whose flat poses have more freedoms than any other pose: b2 for N = 1, 2, 10, 40."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import partial

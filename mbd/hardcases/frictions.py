@@ -1,7 +1,5 @@
 """Dry friction in a joint (a4), friction that follows the force in a pin (a4c), and a rod that jams (j13)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """A flyball governor whose rods are held by stiff spring-dampers: b5."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """A point whose foot sticks where it strikes, and bounces over a saddle (g7)."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Masses that differ by a million or vanish: j4 and j5."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

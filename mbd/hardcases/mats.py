@@ -1,7 +1,5 @@
 """A mass that falls on a very stiff spring (j6)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

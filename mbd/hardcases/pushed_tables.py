@@ -1,7 +1,5 @@
 """A table on four legs with friction, which more legs hold than are needed: p6."""
 
-from __future__ import annotations
-
 from math import cos, sin
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Mechanisms with more rows than they need: j2, whose cranks are one too many, and b4, which the count would freeze."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

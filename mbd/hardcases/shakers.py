@@ -1,7 +1,5 @@
 """A mass on a vibrating table (j10)."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import cache

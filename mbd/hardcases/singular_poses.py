@@ -1,7 +1,5 @@
 """Linkages that pass singular configurations and another branch of motions begins: j3 and j3b."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

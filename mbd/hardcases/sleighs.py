@@ -1,7 +1,5 @@
 """Bodies on a blade, which lets them slide along it but not sideways: d1 and d2."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """What time prescribes: a leg that follows samples (j19), and a torque that jumps again and again (j20)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A pendulum in x and y under ever smaller steps: j1."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

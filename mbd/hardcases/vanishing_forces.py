@@ -1,7 +1,5 @@
 """Mechanisms in which forces vanish: one that its drive has moved and holds (j21), balanced shafts (p7)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

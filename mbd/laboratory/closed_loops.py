@@ -1,7 +1,5 @@
 """Coordinates that rows determine: closed loops, couplers and motions that are functions, at all frames at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Moments from motion: the equations of motion read backwards, frame by frame."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

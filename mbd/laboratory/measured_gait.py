@@ -1,7 +1,5 @@
 """Strides, numbers and curves of a gait that was measured, for the report in which simulations stand beside it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

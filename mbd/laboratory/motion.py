@@ -1,7 +1,5 @@
 """A motion in a model's own coordinates: positions, velocities and accelerations at each frame."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Forces of muscles from motion: static optimization, frame by frame."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace

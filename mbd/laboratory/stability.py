@@ -1,7 +1,5 @@
 """Margin of stability: how far the extrapolated center of mass lies inside the edge of the support."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

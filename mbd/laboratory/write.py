@@ -1,7 +1,5 @@
 """Recordings to files of other programs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory

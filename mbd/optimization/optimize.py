@@ -1,7 +1,5 @@
 """`mbd.optimize`: the unknowns that make a run or a gait best."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any

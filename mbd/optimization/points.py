@@ -1,7 +1,5 @@
 """Numbers and their derivatives at trial values of the unknowns: from gaits, from runs, from a user's function."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """An objective and constraints over numbers, as scaled functions of scaled unknowns, with every trial kept."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """Methods of scipy.optimize over a problem whose trials may fail: then the step is shortened, from the best so far."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

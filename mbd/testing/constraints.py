@@ -1,7 +1,5 @@
 """Laws of constraints: where, what law and when, in the equations and along runs."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws of losses."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws of schemes behind `mbd.simulate`: those of machine code, and those with a step in Python."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import field
 from functools import cache

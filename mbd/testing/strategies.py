@@ -3,8 +3,6 @@
 Everything random is made from a seed, so a failing example prints as short as ``random_tree(seed=7, bodies=2, …)``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

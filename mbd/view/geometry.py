@@ -1,7 +1,5 @@
 """The scene of a page as plain lists."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Self-contained HTML pages: a folder's page.html with its style, its data and its script put in."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Models whose equations do not fit into the free memory are refused before anything is derived."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

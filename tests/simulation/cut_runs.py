@@ -1,7 +1,5 @@
 """Scenes for runs that are cut in two, and the comparison of the halves with the whole."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """One run of each kind of word in three forms: interpreted, cut in two, and read from a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache

@@ -1,7 +1,5 @@
 """One run in space in two forms: kept in a file, cut in two, interpreted, in a batch, between its rows."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from collections.abc import Callable

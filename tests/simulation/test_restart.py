@@ -1,7 +1,5 @@
 """A run that is cut in two is the same run: to the bit, with everything that the next step depends on."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The accuracy lab: a reference, then every scheme with every step against it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext

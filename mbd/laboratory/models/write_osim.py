@@ -1,7 +1,5 @@
 """Models written as ``.osim`` of the format 40000, which OpenSim 4 opens."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any
