@@ -9,7 +9,7 @@ import numpy as np
 import mbd
 from mbd.testing.scope import FreeScope, skew
 
-__all__ = ["SECOND_ORDER", "FreeScope", "altered", "assert_second_order", "halved", "skew"]
+__all__ = ["SECOND_ORDER", "FreeScope", "altered", "assert_second_order", "halved", "one_body", "skew"]
 
 SECOND_ORDER = (3.6, 4.4)
 """How many times an error of second order may fall as dt is halved; 4 in the limit."""
@@ -35,3 +35,11 @@ def altered(run: mbd.Trajectory, column: str, where: Any, change: Callable[[Any]
     values = getattr(run.record, column).copy()
     values[where] = change(values[where])
     return mbd.Trajectory(replace(run.record, **{column: values}))
+
+
+def one_body(body: Any, joint: Any, name: str, title: str = "", **how: Any) -> tuple[mbd.Model, Any]:
+    """A model of one body on a joint to the ground, and the body; `how` has words of the model and of the joint."""
+    own = {word: how.pop(word) for word in ("gravity", "cut", "tunable") if word in how}
+    model = mbd.Model(title or body.name, **own)
+    model.connect(joint(name, model.ground.origin, body.start if isinstance(body, mbd.Link) else body.origin, **how))
+    return model, body

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import mbd
+from tests.helpers import one_body
 
 
 def pendulum(**joint: Any) -> tuple[mbd.Model, mbd.Revolute]:
@@ -108,9 +109,7 @@ def ball_joint() -> mbd.Model:
 def test_grams_of_a_person_and_percents_of_friction_are_doubted() -> None:
     with pytest.warns(mbd.MbdWarning, match="masses are in kg"):
         mbd.human(mass=70000.0, height=1.75)
-    model = mbd.Model("disk that falls flat")
-    disk = mbd.RigidBody("disk", **mbd.disk(1.0, 0.1, axis="y").body)
-    model.connect(mbd.Free("float", model.ground.origin, disk.origin))
+    model, disk = one_body(mbd.RigidBody("disk", **mbd.disk(1.0, 0.1, axis="y").body), mbd.Free, "float")
     edge = mbd.disk_touchdown(disk.origin, 0.1, axis=(0, 1, 0))
     model.constrain(mbd.Unilateral("edge", edge, friction=30.0))
     with pytest.warns(mbd.MbdWarning, match="friction of 'edge' is 30"):
@@ -275,8 +274,7 @@ def test_a_ball_joint_is_asked_for_an_angle():
 
 def forearm(**muscle: Any) -> tuple[mbd.Model, mbd.Muscle]:
     """An arm that hangs from its elbow, and a muscle of 600 N on it."""
-    model, arm = mbd.Model("forearm"), mbd.Link("forearm", mass=1.5, length=0.35, center=0.16, inertia=0.016)
-    model.connect(mbd.Revolute("elbow", model.ground.origin, arm.start))
+    model, arm = one_body(mbd.Link("forearm", mass=1.5, length=0.35, center=0.16, inertia=0.016), mbd.Revolute, "elbow")
     points = (model.ground.point(0.02, 0.30), arm.point(0.03, -0.04))
     biceps = mbd.Muscle("biceps", points, max_force=600.0, excitation=0.3, **muscle)
     model.apply(biceps)
@@ -317,8 +315,7 @@ def test_a_muscle_whose_path_becomes_shorter_than_its_tendon_puts_its_run_in_dou
 # units and orders that other programs have --------------------------------------------------------------------------
 def runner(stiffness: float) -> mbd.Model:
     """A point mass of 80 kg on a spring leg."""
-    model, body = mbd.Model("runner"), mbd.PointMass("body", mass=80.0)
-    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("body", mass=80.0), mbd.Translation, "place", title="runner")
     model.constrain(
         mbd.SpringLeg("leg", body.origin, stiffness, 1.0, np.radians(68.0)),
         mbd.Event("apex", mbd.measure("place.y.rate"), direction=-1),

@@ -9,14 +9,13 @@ from hypothesis import given, settings, strategies as st
 
 import mbd
 from mbd.errors import TrajectoryError
+from tests.helpers import one_body
 
 xarray = pytest.importorskip("xarray")
 
 
 def bouncing(until: float = 1.2) -> mbd.Trajectory:
-    model = mbd.Model("ball")
-    point = mbd.PointMass("mass", mass=1.0)
-    model.connect(mbd.Translation("flight", model.ground.origin, point.origin, axes="xy"))
+    model, point = one_body(mbd.PointMass("mass", mass=1.0), mbd.Translation, "flight", title="ball", axes="xy")
     model.constrain(mbd.Unilateral("floor", mbd.touchdown(point.origin), restitution=0.5))
     start = mbd.assemble(model, position={"flight.y": 1.0}, velocity={"flight.x.rate": 0.3})
     return mbd.simulate(model, start, dt=1e-2, until=until, backend="python")
@@ -132,9 +131,7 @@ def test_a_storage_file_gives_back_the_numbers_of_the_run(run, tmp_path):
 
 
 def test_a_motion_has_its_angles_in_degrees(tmp_path):
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
-    model.connect(mbd.Revolute("left hip", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=1.0), mbd.Revolute, "left hip", title="pendulum")
     swing = mbd.simulate(model, mbd.assemble(model, {"left hip.angle": 0.3}), dt=0.05, until=0.5, backend="python")
     names = ["left hip.angle", "left hip.rate", "rod.end.x"]
     for ending, factor, said in ((".mot", 180.0 / np.pi, "yes"), (".sto", 1.0, "no")):

@@ -18,6 +18,7 @@ from mbd.integrators import Integrator, StepReport, StepResult
 from mbd.integrators.base import consistent_rates
 from mbd.results.matching import aligned
 from mbd.view.accuracy import clear, frontier
+from tests.helpers import one_body
 from tests.simulation.test_energy import chain
 
 G = 9.81
@@ -55,9 +56,7 @@ class SymplecticEuler(Integrator):
 
 def pendulum(angle=2.0):
     """A point mass on a rod of 1 m, released from rest."""
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=1.0), mbd.Revolute, "pin", title="pendulum")
     return model, mbd.assemble(model, position={"pin.angle": angle})
 
 
@@ -68,9 +67,7 @@ def swing(t, angle=2.0):
 
 
 def ball(speed=0.0, restitution=0.5):
-    model = mbd.Model("ball")
-    mass = mbd.PointMass("ball", mass=2.0)
-    model.connect(mbd.Translation("fall", model.ground.origin, mass.origin, axes="y"))
+    model, mass = one_body(mbd.PointMass("ball", mass=2.0), mbd.Translation, "fall", axes="y")
     model.constrain(mbd.Unilateral("floor", mbd.height(mass.origin), restitution=restitution))
     return model, mbd.assemble(model, position={"fall.y": 1.0}, velocity={"fall.y": speed})
 
@@ -163,10 +160,8 @@ def test_a_bouncing_ball_is_exact_for_schemes_of_order_two_and_the_lab_says_so()
 
 def test_impacts_do_not_hide_the_order():
     """A pendulum rebounds from a wall: without matching of its hits, errors would be those of the jumps."""
-    model = mbd.Model("pendulum at a wall")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
-    pin = mbd.Revolute("pin", model.ground.origin, rod.start)
-    model.connect(pin)
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=1.0), mbd.Revolute, "pin")
+    pin = model.joints[0]
     model.constrain(mbd.Unilateral("wall", mbd.extension(pin), restitution=0.8))
     start = mbd.assemble(model, position={"pin.angle": 0.5})
     result = mbd.accuracy(model, start, 3.0, None, [mbd.HHT(alpha=0.05)], [0.02, 0.01, 0.005])
@@ -202,9 +197,7 @@ def test_a_step_too_large_is_listed_and_the_others_go_on():
 
 def test_a_quantity_that_a_run_has_no_number_for_has_no_small_error():
     """What is left of the last hundredth of the energy has no root any more where a scheme damps."""
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=1.0)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=1.0), mbd.Revolute, "pin", title="pendulum")
     least = 0.99 * G * (1.0 - np.cos(0.6))
     model.observe(
         "margin",

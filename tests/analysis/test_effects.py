@@ -15,6 +15,7 @@ from mbd.analysis.effects.scenes import Scene, reduced
 from mbd.errors import ModelError, UnknownNameError
 from mbd.results.trajectory import EventRecord
 from tests.equations import mechanisms
+from tests.helpers import one_body
 
 OUTPUTS = ("hip.angle", "knee.angle")
 
@@ -186,9 +187,7 @@ def test_dry_friction_is_an_effect_beside_the_loss():
 
 
 def test_friction_of_a_contact_can_be_left_out_alone():
-    model = mbd.Model("block")
-    block = mbd.PointMass("block", mass=1.0)
-    model.connect(mbd.Translation("block at", model.ground.origin, block.origin))
+    model, block = one_body(mbd.PointMass("block", mass=1.0), mbd.Translation, "block at")
     model.constrain(mbd.Unilateral("floor", mbd.touchdown(block.origin), friction=0.3))
     start = mbd.assemble(model, closed="floor", velocity={"block at.x": 1.0})
     slides = model.without("floor friction")
@@ -276,10 +275,7 @@ def test_what_is_hardly_compared_is_not_left_out():
 
 def test_an_output_that_is_no_number_without_an_effect_is_no_small_change():
     """A stop keeps the angle below 0.5, and with it under the root of what is observed."""
-    model = mbd.Model("stopped")
-    rod = mbd.Link("rod", 1.0, length=1.0, center=1.0)
-    pin = mbd.Revolute("pin", model.ground.origin, rod.start)
-    model.connect(pin)
+    model, _ = one_body(mbd.Link("rod", 1.0, length=1.0, center=1.0), mbd.Revolute, "pin")
     model.constrain(mbd.Penalty("stop", mbd.measure(lambda a: 0.45 - a, "pin.angle", unit="rad"), stiffness=1e4))
     model.observe("room", lambda a: 1.0 + 1e-9 * mbd.sqrt(0.5 - a), "pin.angle")
     start = mbd.assemble(model, {"pin.angle": -0.6})

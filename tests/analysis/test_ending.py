@@ -6,6 +6,7 @@ import pytest
 import mbd
 from mbd.analysis.ending import ending
 from mbd.cli import Script
+from tests.helpers import one_body
 
 
 def standing(tilt: float) -> mbd.Trajectory:
@@ -22,9 +23,7 @@ def standing(tilt: float) -> mbd.Trajectory:
 
 def sliding(mass: float, until: float) -> mbd.Trajectory:
     """A block that dry friction brings to rest after v/(μ g)."""
-    model = mbd.Model("block")
-    block = mbd.PointMass("block", mass=mass)
-    model.connect(mbd.Translation("place", model.ground.origin, block.origin))
+    model, block = one_body(mbd.PointMass("block", mass=mass), mbd.Translation, "place")
     model.constrain(mbd.Unilateral("floor", mbd.touchdown(block.origin), friction=0.5))
     start = mbd.assemble(model, closed=["floor"], velocity={"place.x.rate": 1.0})
     return mbd.simulate(model, start, dt=1e-2, until=until, backend="python")
@@ -88,9 +87,7 @@ def test_walkers_walk():
 def test_files_give_the_same_summary_and_failures_say_so(tmp_path):
     run = standing(0.05)
     assert mbd.load(run.save(tmp_path / "rod")).summary() == run.summary()
-    model = mbd.Model("mass")
-    mass = mbd.PointMass("mass", mass=1.0)
-    model.connect(mbd.Translation("place", model.ground.origin, mass.origin))
+    model, mass = one_body(mbd.PointMass("mass", mass=1.0), mbd.Translation, "place")
     model.apply(mbd.Applied("pull", mass.origin, force=lambda t: (mbd.sqrt(0.1 - t), 0.0)))
     failed = mbd.simulate(model, mbd.assemble(model), dt=1e-2, until=1.0, on_failure="return", backend="python")
     assert failed.summary().startswith(f"mass: failed: {failed.message}") and ending(failed) == ["in motion"]

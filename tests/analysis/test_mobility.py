@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.hardcases.singular_poses import equal_slider_crank
 from tests.cases.linkages import four_bars, parallel_cranks, upright
+from tests.helpers import one_body
 
 PLAIN = "python"
 """The backend here: models are made by the dozen and looked at once."""
@@ -103,9 +104,7 @@ def test_redundant_loops_in_any_order_of_joints_have_the_same_rank(count):
 
 # what it says ---------------------------------------------------------------------------------------------------------
 def pendulum():
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, rod = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=0.5), mbd.Revolute, "pin", title="pendulum")
     return model, rod
 
 
@@ -146,9 +145,7 @@ def test_velocity_rows_and_a_lagrangian_are_counted():
     )
     found = mbd.mobility(bead)
     assert (found.dof, found.grubler, str(found.dependent[0])) == (1, 0, "'double' depends on 'ring'")
-    sledge = mbd.Model("sledge")
-    body = mbd.RigidBody("body", mass=1.0, inertia=0.1)
-    sledge.connect(mbd.Planar("place", sledge.ground.origin, body.origin))
+    sledge, body = one_body(mbd.RigidBody("body", mass=1.0, inertia=0.1), mbd.Planar, "place", title="sledge")
     sledge.constrain(mbd.KnifeEdge("blade", body.origin))
     assert (mbd.mobility(sledge).dof, mbd.mobility(sledge).grubler) == (2, 2)
 

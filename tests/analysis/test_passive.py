@@ -14,6 +14,7 @@ from mbd.errors import MbdError
 from mbd.hardcases.schemes import SCHEMES
 from mbd.results.ledger import SPENT, Ledger
 from mbd.testing.mechanisms import random_scene
+from tests.helpers import one_body
 
 
 def gains(ledger: Ledger) -> dict[str, float]:
@@ -30,9 +31,7 @@ def gains(ledger: Ledger) -> dict[str, float]:
 @functools.cache
 def falling(**law) -> mbd.Model:
     """A ball of 1 kg above a stop of 2e4 N/m, on which it would lie for 20 ms."""
-    model = mbd.Model("ball")
-    body = mbd.PointMass("ball", mass=1.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model, body = one_body(mbd.PointMass("ball", mass=1.0), mbd.Prismatic, "fall", axis=(0, 1, 0))
     model.constrain(mbd.Penalty("stop", mbd.height(body.origin), stiffness=2e4, **law))
     return model
 
@@ -113,9 +112,7 @@ class Rubber(mbd.Penalty):
 
 def bounced(dt: float, stiffness: float, store: int = 1) -> mbd.Trajectory:
     """A ball of 1 kg that falls 0.7 m onto rubber."""
-    model = mbd.Model("ball")
-    body = mbd.PointMass("ball", mass=1.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model, body = one_body(mbd.PointMass("ball", mass=1.0), mbd.Prismatic, "fall", axis=(0, 1, 0))
     model.constrain(Rubber("stop", mbd.height(body.origin), stiffness=stiffness))
     start = mbd.assemble(model, position={"fall.displacement": 0.7})
     return mbd.simulate(model, start, mbd.RungeKutta853(), dt=dt, until=1.0, store=store, on_failure="return")

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 import mbd
+from tests.helpers import one_body
 from tests.problems import case
 
 J10 = case("j10-chatter-on-vibrating-table")
@@ -13,9 +14,7 @@ G, M = J10.definition["g"], J10.definition["m"]
 
 def ball_on(ground, mass=M, gravity=(0.0, -G, 0.0), axes="y", **contact):
     """A point over a ground, with the contact 'table'."""
-    model = mbd.Model("ball", gravity=gravity)
-    ball = mbd.PointMass("ball", mass=mass)
-    model.connect(mbd.Translation("flight", model.ground.origin, ball.origin, axes=axes))
+    model, ball = one_body(mbd.PointMass("ball", mass=mass), mbd.Translation, "flight", gravity=gravity, axes=axes)
     model.constrain(mbd.Unilateral("table", mbd.touchdown(ball.origin, ground), **contact))
     return model
 
@@ -110,9 +109,7 @@ def test_a_plane_that_rises_evenly_is_a_lift():
 
 
 def test_a_mat_on_the_table_is_charged_apart_from_the_table():
-    model = mbd.Model("mat")
-    ball = mbd.PointMass("ball", mass=M)
-    model.connect(mbd.Translation("flight", model.ground.origin, ball.origin, axes="y"))
+    model, ball = one_body(mbd.PointMass("ball", mass=M), mbd.Translation, "flight", title="mat", axes="y")
     pad = mbd.touchdown(ball.origin, lambda t: 0.02 * mbd.sin(20.0 * t))
     model.constrain(mbd.Penalty("mat", pad, stiffness=5e3, damping=20.0, release="pull"))
     run = mbd.simulate(model, mbd.assemble(model, position={"flight.y": 0.1}), mbd.HHT(0.0), dt=2e-4, until=1.0)
@@ -142,8 +139,7 @@ def test_a_point_that_sticks_on_a_wave_rides_it_and_feels_its_slope():
 @pytest.mark.parametrize(("axes", "friction"), [("xy", mbd.Stribeck(0.4, 0.2, 0.5) + mbd.Viscous(0.05)), ("xyz", 0.3)])
 def test_the_ledger_closes_on_ground_that_tilts_as_feet_slide_over_it(axes, friction):
     """Friction acts along the slope of now, which is not that where the foot came down."""
-    model, point = mbd.Model("tilting"), mbd.PointMass("foot", M)
-    model.connect(mbd.Translation("place", model.ground.origin, point.origin, axes=axes))
+    model, point = one_body(mbd.PointMass("foot", M), mbd.Translation, "place", axes=axes)
     hill = {"xy": lambda x, t: 0.3 * x * mbd.sin(3.0 * t), "xyz": lambda x, z, t: 0.3 * (x + z * t) * mbd.sin(3.0 * t)}
     model.constrain(mbd.Unilateral("slope", mbd.touchdown(point.origin, hill[axes]), friction=friction))
     start = mbd.assemble(model, velocity={f"place.{axis}": 3.0 for axis in axes[::2]}, closed="slope")

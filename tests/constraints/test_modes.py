@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import mbd
 from mbd.errors import ModelError, SimulationError
+from tests.helpers import one_body
 
 G = 9.81
 
@@ -226,10 +227,8 @@ def test_derivatives_go_through_transitions_timers_and_memories() -> None:
 
 def hopper(*transitions: mbd.Transition, **more: Any) -> tuple[mbd.Model, mbd.State]:
     """A mass that falls on the floor, waits, and is thrust up for a time."""
-    model = mbd.Model("hopper")
-    body = mbd.PointMass("body", mass=80.0)
-    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, axis="y")
-    model.connect(rail)
+    model, body = one_body(mbd.PointMass("body", mass=80.0), mbd.Prismatic, "rail", title="hopper", axis="y")
+    rail = model.joints[0]
     model.constrain(
         mbd.Unilateral("floor", mbd.height(body.origin)),
         mbd.Mode(
@@ -266,9 +265,7 @@ def test_a_contact_closes_waits_for_a_timer_and_is_thrust_off_for_a_time() -> No
 @pytest.mark.parametrize("order", ["", "before", "with", "after"])
 def test_a_mode_of_closings_and_openings_is_that_of_the_contact(order: str, restitution: float) -> None:
     """Also where it opens as it closes: in a rebound, or as an impulse lifts it or keeps it from striking."""
-    model = mbd.Model("ball")
-    ball = mbd.PointMass("ball", mass=1.0)
-    model.connect(mbd.Prismatic("rail", model.ground.origin, ball.origin, axis=(0, 1, 0)))
+    model, ball = one_body(mbd.PointMass("ball", mass=1.0), mbd.Prismatic, "rail", axis=(0, 1, 0))
     changes = [mbd.Transition("off", "on", on="floor"), mbd.Transition("on", "off", on="floor opened")]
     model.constrain(
         mbd.Unilateral("floor", mbd.height(ball.origin), restitution=restitution),
@@ -441,10 +438,8 @@ def mode(*transitions: mbd.Transition, **more: Any) -> mbd.Mode:
       lambda j: mbd.Motor("two", j, force=lambda x: x, arguments=["one.force"])], "'two.force' is what a law gives"),
 ])  # fmt: skip
 def test_bad_names_of_modes_are_errors_at_build(words: Any, message: str) -> None:
-    model = mbd.Model("slider")
-    body = mbd.PointMass("body", mass=1.0)
-    rail = mbd.Prismatic("rail", model.ground.origin, body.origin)
-    model.connect(rail)
+    model, _ = one_body(mbd.PointMass("body", mass=1.0), mbd.Prismatic, "rail", title="slider")
+    rail = model.joints[0]
 
     def built() -> mbd.State:
         model.apply(*(make(rail) for make in words))
@@ -457,9 +452,7 @@ def test_bad_names_of_modes_are_errors_at_build(words: Any, message: str) -> Non
 @pytest.mark.parametrize("wait", [-0.4, 0.0, 0.05])
 def test_a_remembered_time_that_is_not_positive_is_due_at_once(wait: float) -> None:
     """States that last 0.3 s and the remembered time, by turns."""
-    model = mbd.Model("slider")
-    body = mbd.PointMass("body", mass=1.0)
-    model.connect(mbd.Prismatic("rail", model.ground.origin, body.origin))
+    model, _ = one_body(mbd.PointMass("body", mass=1.0), mbd.Prismatic, "rail", title="slider")
     stored = mbd.measure(lambda x, wait: wait + 0.0 * x, "rail.displacement", "m.wait")
     changes = [T("a", "b", after=0.3), T("b", "a", after="m.stored")]
     model.apply(mbd.Mode("m", ("a", "b"), transitions=changes, remembers={"stored": stored}, numbers={"wait": wait}))
@@ -475,9 +468,7 @@ def test_a_remembered_time_that_is_not_positive_is_due_at_once(wait: float) -> N
 @pytest.mark.parametrize("integrator", [mbd.HHT(), mbd.RungeKutta853(), mbd.RadauIIA()], ids=repr)
 def test_a_time_that_is_not_positive_on_entry_is_due_at_once_also_as_a_run_begins(integrator, wait, speed, after):
     """The slider moves evenly, x = wait + speed t: a timer of x, begun at s, ends at once or where t − s = x(t)."""
-    model = mbd.Model("slider")
-    body = mbd.PointMass("body", mass=1.0)
-    model.connect(mbd.Prismatic("rail", model.ground.origin, body.origin))
+    model, _ = one_body(mbd.PointMass("body", mass=1.0), mbd.Prismatic, "rail", title="slider")
     stored = mbd.measure(lambda x, wait: wait + 0.0 * x, "rail.displacement", "m.wait")
     changes = [T("a", "b", after=0.3), T("b", "a", after=after)]
     model.apply(mbd.Mode(

@@ -9,15 +9,14 @@ import pytest
 import mbd
 from mbd.constraints import Closing, Constraint, Drag, Equation, Law
 from tests.constraints.own import Clutch, Foot, OneWayBearing, Sole
+from tests.helpers import one_body
 
 g, LOOSE = 9.81, {"rtol": 1e-9, "atol": 1e-10}
 
 
 def sliding():
     """A block that slides on its sole and stops."""
-    model = mbd.Model("sliding foot")
-    foot = mbd.PointMass("foot", 2.0)
-    model.connect(mbd.Translation("p", model.ground.origin, foot.origin))
+    model, foot = one_body(mbd.PointMass("foot", 2.0), mbd.Translation, "p")
     model.constrain(Sole("sole", foot.origin, 1e5))
     rest = -((2.0 * g / 1e5) ** (2.0 / 3.0))
     return model, mbd.assemble(
@@ -112,9 +111,7 @@ def test_a_foot_written_anew_moves_as_that_of_the_library(contact):
     """A brick thrown on its two lower corners: bounces, slides, sticks."""
     runs, sides = [], {"left": -0.2, "right": 0.2}
     for make in (Foot, lambda name, point, e, mu: mbd.Unilateral(name, mbd.touchdown(point), e, friction=mu)):
-        model = mbd.Model("brick")
-        brick = mbd.RigidBody("brick", 2.0, (0.1, 0.1, 0.05))
-        model.connect(mbd.Planar("p", model.ground.origin, brick.origin))
+        model, brick = one_body(mbd.RigidBody("brick", 2.0, (0.1, 0.1, 0.05)), mbd.Planar, "p")
         model.constrain(*(make(f"{side} corner", brick.point(x, -0.1), 0.3, 0.4) for side, x in sides.items()))
         place, speed = {"p.x": 0, "p.y": 0.3, "p.angle": 0.3}, {"p.x": 1.5, "p.y": 0, "p.angle": -1}
         start = mbd.assemble(model, position=place, velocity=speed)
@@ -297,9 +294,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("kind", "law", "said"), WRONG.values(), ids=WRONG)
 def test_a_law_that_is_not_what_its_kind_promises_is_refused_by_name(kind, law, said):
-    model = mbd.Model("m")
-    ball = mbd.PointMass("ball", 1.0)
-    model.connect(mbd.Translation("p", model.ground.origin, ball.origin))
+    model, _ = one_body(mbd.PointMass("ball", 1.0), mbd.Translation, "p", title="m")
     model.constrain(Saying("stop", kind, law))
     with pytest.raises(mbd.ModelError, match="'stop") as refused:
         mbd.assemble(model)

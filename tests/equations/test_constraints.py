@@ -8,6 +8,7 @@ from mbd.equations import derive
 from mbd.equations.programs import accelerations, guards
 from tests.equations.mechanisms import furnished, leg, random_tree, walker
 from tests.equations.numbers import at, derivative, inputs
+from tests.helpers import one_body
 
 
 def test_contacts_list_their_rows_normal_first():
@@ -103,9 +104,7 @@ def test_a_rod_reports_its_tension_and_a_prescribed_joint_its_drive():
 
 
 def pin_and(*constraints) -> mbd.Model:
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=0.7, center=0.3)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, rod = one_body(mbd.Link("rod", mass=1.0, length=0.7, center=0.3), mbd.Revolute, "pin")
     model.constrain(*(constraint(model, rod) for constraint in constraints))
     return model
 
@@ -143,9 +142,7 @@ def test_all_faulty_rows_are_told_at_once():
 
 
 def test_rows_that_fold_in_the_plane_are_left_out():
-    model = mbd.Model("closed", cut=["pin"])
-    rod = mbd.Link("rod", mass=1.0, length=0.7, center=0.3)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=0.7, center=0.3), mbd.Revolute, "pin", cut=["pin"])
     assert [row.part for row in derive(model).rows] == ["x", "y"]
 
 

@@ -9,6 +9,7 @@ import sympy
 from sympy import cos, sin
 
 import mbd
+from tests.helpers import one_body
 
 G = 9.81
 
@@ -44,9 +45,7 @@ def coordinates(*names: str) -> list[mbd.Coordinate]:
 def ball(rng: np.random.Generator) -> Twins:
     """A point mass over rough ground and against a wall; it bounces, slides and comes to rest."""
     mass, mu, e, wall = rng.uniform(0.5, 2.0), rng.uniform(0.2, 0.6), rng.uniform(0.2, 0.7), rng.uniform(0.4, 0.9)
-    bodies = mbd.Model("ball")
-    body = mbd.PointMass("body", mass)
-    bodies.connect(mbd.Translation("place", bodies.ground.origin, body.origin))
+    bodies, body = one_body(mbd.PointMass("body", mass), mbd.Translation, "place", title="ball")
     bodies.constrain(
         mbd.Unilateral("floor", mbd.touchdown(body.origin), restitution=e, friction=mu),
         mbd.Unilateral("wall", mbd.separation(body.origin, bodies.ground.point(wall, 0.0), (1, 0, 0)), restitution=0.5),
@@ -67,9 +66,7 @@ def ball(rng: np.random.Generator) -> Twins:
 def stick(rng: np.random.Generator, friction: float | None = None) -> Twins:
     """A rod that falls on its end, which sticks (or slips) and lifts."""
     mass, length, center, inertia = rng.uniform(0.5, 2.0), rng.uniform(0.5, 1.0), 0.3, 0.05
-    bodies = mbd.Model("stick")
-    rod = mbd.Link("rod", mass, length, center, inertia)
-    bodies.connect(mbd.Planar("float", bodies.ground.origin, rod.start))
+    bodies, rod = one_body(mbd.Link("rod", mass, length, center, inertia), mbd.Planar, "float", title="stick")
     bodies.constrain(mbd.Unilateral("foot", mbd.touchdown(rod.end), friction=friction))
     x, y, a = coordinates("x", "y", "a")
     m, g, l, c, i = sympy.symbols("m g l c i")  # noqa: E741

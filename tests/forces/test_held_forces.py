@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 import mbd
 from mbd.joints.losses.base import Loss
+from tests.helpers import one_body
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
 HUB, ARM, ARM_LENGTH, INERTIA, GRAVITY = 2.0, 1.0, 0.25, 0.02, 9.81
@@ -163,9 +164,7 @@ def test_a_loop_gain_of_one_or_more_is_refused_by_name():
 
 
 def test_the_force_and_gap_of_a_penalty_contact_are_functions_of_the_motion():
-    model = mbd.Model("puck")
-    puck = mbd.PointMass("puck", 1.0)
-    model.connect(mbd.Translation("p", model.ground.origin, puck.origin))
+    model, puck = one_body(mbd.PointMass("puck", 1.0), mbd.Translation, "p")
     model.constrain(mbd.Penalty("floor", mbd.touchdown(puck.origin), 1e4, 50.0, friction=0.3))
     reads = ["floor.force", "floor.friction", "floor.gap", "floor.gap_rate"]
     model.apply(mbd.Applied("push", puck.origin, lambda *x: (x[0] + 0.1 * x[1] + x[2] - x[3], 0.0), arguments=reads))
@@ -199,9 +198,8 @@ def test_what_must_follow_the_motion_alone_is_refused_by_name(word, message):
 
 
 def test_a_force_that_a_constraint_has_under_another_name_is_offered():
-    model, load = mbd.Model("winch"), mbd.PointMass("load", 2.0)
-    lift = mbd.Prismatic("lift", model.ground.origin, load.origin, axis="y")
-    model.connect(lift)
+    model, _ = one_body(mbd.PointMass("load", 2.0), mbd.Prismatic, "lift", axis="y")
+    lift = model.joints[0]
     model.constrain(mbd.Bilateral("rope", mbd.measure(lambda y, t: y - 0.1 * t, "lift.displacement", "t")))
     model.apply(mbd.Motor("band", lift, force=lambda tension: 0.1 * tension, arguments=["rope.force"]))
     with pytest.raises(mbd.UnknownNameError, match="'band': no force .* 'rope.force'; did you mean 'rope.multiplier'"):
@@ -209,9 +207,7 @@ def test_a_force_that_a_constraint_has_under_another_name_is_offered():
 
 
 def test_dry_friction_is_read_by_samples_only():
-    model = mbd.Model("block")
-    block = mbd.PointMass("block", 1.0)
-    model.connect(mbd.Translation("p", model.ground.origin, block.origin))
+    model, block = one_body(mbd.PointMass("block", 1.0), mbd.Translation, "p")
     model.constrain(mbd.Unilateral("sole", mbd.touchdown(block.origin), friction=0.5))
     push = mbd.Applied("push", block.origin, lambda f: (0.5 * f, 0.0), arguments=["sole.friction"])
     refused = model.without()

@@ -9,6 +9,7 @@ import pytest
 
 import mbd
 from mbd.forces.muscles.curves import CURVES
+from tests.helpers import one_body
 
 OPENSIM = {  # of OpenSim 4.6; De Groote's by its class of 2016, Millard's by its curves with a least active force of 0
     "de groote": {
@@ -52,10 +53,8 @@ def test_fibers_have_the_velocity_at_which_they_carry_their_load(name, least):
 
 def forearm(**how):
     """A forearm that hangs from an elbow, with a biceps; `how` changes the muscle."""
-    model = mbd.Model("arm")
-    arm = mbd.Link("arm", mass=1.5, length=0.35, center=0.16, inertia=0.016)
-    elbow = mbd.Revolute("elbow", model.ground.origin, arm.start)
-    model.connect(elbow)
+    model, arm = one_body(mbd.Link("arm", mass=1.5, length=0.35, center=0.16, inertia=0.016), mbd.Revolute, "elbow")
+    elbow = model.joints[0]
     points = (model.ground.point(0.0, 0.30), arm.point(0.01, -0.05))
     given = {"max_force": 600.0, "fiber_length": 0.12, "tendon_length": 0.2, "pennation": 0.2} | how
     path = given.pop("path", points)
@@ -65,10 +64,9 @@ def forearm(**how):
 
 def leg_extension(**how):
     """A shank that is extended against its weight by a quadriceps over a patella that moves with the knee."""
-    model = mbd.Model("leg extension")
-    shank = mbd.Link("shank", mass=4.0, length=0.43, center=0.19, inertia=0.06)
-    knee = mbd.Revolute("knee", model.ground.origin, shank.start)
-    model.connect(knee)
+    model, shank = one_body(
+        mbd.Link("shank", mass=4.0, length=0.43, center=0.19, inertia=0.06), mbd.Revolute, "knee", title="leg extension"
+    )
 
     def patella(angle):
         return 0.05 * mbd.cos(0.5 * angle), 0.05 * mbd.sin(0.5 * angle)
@@ -143,9 +141,7 @@ def test_the_moment_arm_is_minus_the_slope_of_the_length(path):
 @pytest.mark.parametrize("curves", ["de groote", "millard"])
 def test_a_muscle_at_rest_carries_its_weight(curves):
     """The load hangs on the muscle alone: F = m g, with the fibers where F_max f_T says."""
-    model = mbd.Model("hanging")
-    load = mbd.PointMass("load", mass=20.0)
-    model.connect(mbd.Translation("rail", model.ground.origin, load.origin, axes="y"))
+    model, load = one_body(mbd.PointMass("load", mass=20.0), mbd.Translation, "rail", title="hanging", axes="y")
     muscle = mbd.Muscle("muscle", (model.ground.point(0.0, 1.0), load.origin), 800.0, 0.1, 0.2, 0.2, 0.3, curves=curves)
     model.apply(muscle)
     start = mbd.assemble(model, {"rail.y": 0.7, "muscle.activation": 0.3, "muscle.fiber_length": 0.11})
@@ -159,9 +155,7 @@ def test_a_muscle_without_damping_is_the_limit_of_small_damping():
     """OpenSim's muscles of De Groote have no damping unless a file gives some."""
     ends = []
     for damping in 0.0, 1e-9:
-        model = mbd.Model("hanging")
-        load = mbd.PointMass("load", mass=20.0)
-        model.connect(mbd.Translation("rail", model.ground.origin, load.origin, axes="y"))
+        model, load = one_body(mbd.PointMass("load", mass=20.0), mbd.Translation, "rail", title="hanging", axes="y")
         points = (model.ground.point(0.0, 1.0), load.origin)
         muscle = mbd.Muscle("muscle", points, 800.0, 0.1, 0.2, 0.2, 0.3, damping=damping)
         model.apply(muscle)

@@ -10,6 +10,7 @@ from scipy.optimize import fsolve
 import mbd
 from mbd.gait.family import energy_of, energy_slope
 from tests.gait.test_gaits_with_modes import walker as torso_walker
+from tests.helpers import one_body
 from tests.spring_mass import MASS, G, derivative, runner_apex, speed_at, until, walker_apex
 
 ANGLE, STIFFNESS = math.radians(68.0), 20e3
@@ -18,8 +19,7 @@ SIDES = ("left", "right")
 
 def runner() -> tuple[mbd.Model, mbd.State]:
     """A point mass on a spring leg, at an apex."""
-    model, body = mbd.Model("runner"), mbd.PointMass("body", MASS)
-    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("body", MASS), mbd.Translation, "place", title="runner")
     model.constrain(mbd.SpringLeg("leg", body.origin, STIFFNESS, 1.0, ANGLE))
     model.constrain(mbd.Event("apex", mbd.measure("place.y.rate"), direction=-1))
     return model, mbd.assemble(model, {"place.y": 1.0}, {"place.x": 5.0, "place.y": 0.0})
@@ -27,8 +27,7 @@ def runner() -> tuple[mbd.Model, mbd.State]:
 
 def walker(stiffness: float = 14e3, angle: float = math.radians(69.0)) -> tuple[mbd.Model, mbd.State]:
     """A point mass on two spring legs, highest over its left foot with 816 J."""
-    model, body = mbd.Model("spring-mass walker"), mbd.PointMass("body", MASS)
-    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("body", MASS), mbd.Translation, "place")
     model.constrain(*(mbd.SpringLeg(f"{side} leg", body.origin, stiffness, 1.0, angle) for side in SIDES))
     model.constrain(mbd.Event("highest", mbd.measure("place.y.rate"), direction=-1))
     start = mbd.assemble(
@@ -172,8 +171,7 @@ def test_a_gait_that_is_alone_has_no_other_energy() -> None:
 @pytest.mark.parametrize("section", ["lowest", "highest", "mat"])
 def test_a_ball_on_a_spring_bounces_with_the_energy_asked_for(section: str) -> None:
     """From any instant, compressed ones too: ``T = 2 v/g + (π + 2 atan(g/(ω v)))/ω`` with ``m v²/2 = E``."""
-    model, ball = mbd.Model("ball"), mbd.PointMass("ball", 1.0)
-    model.connect(mbd.Prismatic("rail", model.ground.origin, ball.origin, axis="y"))
+    model, ball = one_body(mbd.PointMass("ball", 1.0), mbd.Prismatic, "rail", axis="y")
     model.constrain(
         mbd.Penalty("mat", mbd.height(ball.origin), stiffness=1e3),
         *(mbd.Event(name, mbd.measure("rail.rate"), direction=way) for name, way in (("lowest", 1), ("highest", -1))),
@@ -253,8 +251,7 @@ def test_a_branch_ends_where_flights_vanish_within_its_error(seed: int) -> None:
     random = np.random.default_rng(seed)
     angle, speed = math.radians(random.uniform(67.0, 69.0)), random.uniform(4.8, 5.4)
     expected, _ = standing_start(angle, speed, 15e3)
-    model, body = mbd.Model("runner"), mbd.PointMass("body", MASS)
-    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("body", MASS), mbd.Translation, "place", title="runner")
     model.constrain(mbd.SpringLeg("leg", body.origin, 1.05 * expected, 1.0, angle))
     model.constrain(mbd.Event("apex", mbd.measure("place.y.rate"), direction=-1))
     start = mbd.assemble(model, {"place.y": math.sin(angle) + 1e-3}, {"place.x": speed, "place.y": 0.0})

@@ -16,6 +16,7 @@ from mbd.gait.section import Chart
 from mbd.sensitivity.derivative import final_state_derivative
 from tests.cases.walkers import compass, kneed, standing
 from tests.gait.walkers import simplest, simplest_start, slope_of, two_sided
+from tests.helpers import one_body
 from tests.problems import case
 
 MULTIPLIERS = 1e-9
@@ -259,9 +260,7 @@ def test_a_walk_that_falls_scuffs_or_never_strikes_says_so():
 
 @pytest.mark.parametrize(("name", "ends"), [("footfall", False), ("fallen", True)])
 def test_only_an_event_that_ends_the_run_is_a_fall_by_its_name(name, ends):
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", 1.0, length=1.0, center=1.0)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", 1.0, length=1.0, center=1.0), mbd.Revolute, "pin", title="pendulum")
     model.constrain(mbd.Event(name, mbd.measure(lambda a: a, "pin.angle"), terminal=ends))
     run = mbd.simulate(model, mbd.assemble(model, {"pin.angle": 0.4}), dt=0.01, until=1.0)
     assert len(run.events) == 1 and run.status == ends
@@ -410,9 +409,7 @@ def test_wrong_arguments_are_named():
         mbd.limit_cycle(model, start, section="heel strike", functions={"slope": lambda s: {"gamma": s}})
     with pytest.raises(mbd.UnknownNameError, match="no parameter named 'gama'"):
         mbd.limit_cycle(model, start, section="heel strike", wrt=["gama"])
-    lame = mbd.Model("lame")
-    hip = mbd.PointMass("hip", 1.0)
-    lame.connect(mbd.Translation("left trunk", lame.ground.origin, hip.origin))
+    lame, _ = one_body(mbd.PointMass("hip", 1.0), mbd.Translation, "left trunk", title="lame")
     with pytest.raises(mbd.ModelError, match="coordinate 'left trunk.x' has no partner 'right trunk.x'"):
         mirror_of(mechanism_of(lame).equations, ("left", "right"))
 

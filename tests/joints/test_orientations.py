@@ -11,6 +11,7 @@ from mbd.joints.euler import SEQUENCES, euler_angles, from_euler
 from mbd.joints.quaternions import rotation_of
 from mbd.results.at_state import instant
 from mbd.results.columns import ModelColumns
+from tests.helpers import one_body
 
 TURN = Rotation.from_rotvec([0.4, -0.7, 0.3])
 W = float(TURN.as_quat()[3])
@@ -222,9 +223,7 @@ def test_angles_near_their_singularity_are_in_doubt():
 
 
 def test_words_for_rotations_that_are_not_there_are_answered_in_one_sentence():
-    model = mbd.Model("ball")
-    body = mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.25))
-    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    model, _ = one_body(mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.25)), mbd.Free, "float", title="ball")
     for position, velocity, said in (
         ({}, {"float.omega": (1, 2, 3)}, r"^velocity: no rate named 'float.omega'; [^\n]*$"),
         ({"float.position": (1, 2, 3)}, {}, r"^position: no coordinate named 'float.position'; [^\n]*$"),
@@ -257,9 +256,7 @@ def test_words_for_rotations_that_are_not_there_are_answered_in_one_sentence():
 
 
 def test_parts_of_an_orientation_are_evaluated_together_and_each_is_as_if_read_alone(monkeypatch):
-    model = mbd.Model("top")
-    body = mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.3), center=(0.0, -0.2, 0.1))
-    model.connect(mbd.Spherical("ball", model.ground.origin, body.origin))
+    model, _ = one_body(mbd.RigidBody("body", 1.0, (0.1, 0.2, 0.3), center=(0.0, -0.2, 0.1)), mbd.Spherical, "ball")
     start = mbd.assemble(model, velocity={"ball.angular_velocity": (0.3, 2.0, 1.0)})
     run = mbd.simulate(model, start, dt=0.01, until=0.2)
     names = [f"ball.orientation.{part}" for part in "wxyz"]

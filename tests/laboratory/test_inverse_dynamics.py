@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 import mbd
 from mbd.laboratory.splines import derivatives
+from tests.helpers import one_body
 from tests.laboratory.newton_euler import inertia_of, inverse, rotation
 
 
@@ -168,10 +169,8 @@ def test_a_box_that_slides_in_space_has_no_residual():
 
 
 def test_states_of_forces_are_those_of_the_run():
-    model = mbd.Model("rod")
-    rod = mbd.Link("rod", mass=2.0, length=1.0, center=0.5, inertia=0.3)
-    pin = mbd.Revolute("pin", model.ground.origin, rod.start)
-    model.connect(pin)
+    model, _ = one_body(mbd.Link("rod", mass=2.0, length=1.0, center=0.5, inertia=0.3), mbd.Revolute, "pin")
+    pin = model.joints[0]
     model.apply(mbd.DCMotor("motor", pin, resistance=1.0, inductance=0.01, constant=0.1, voltage=1.0))
     run = mbd.simulate(model, mbd.assemble(model, position={"pin.angle": 0.8}), mbd.RadauIIA(), tol=1e-8, until=0.3)
     found = mbd.inverse_dynamics(model, run)
@@ -370,9 +369,7 @@ def test_a_forward_run_driven_by_the_moments_returns_to_the_motion():
 
 
 def test_velocities_are_those_of_the_spline_through_the_values():
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=0.5), mbd.Revolute, "pin", title="pendulum")
     t = np.linspace(0.0, 1.0, 31) ** 1.1
     signal = mbd.Samples(t, np.sin(4.0 * t), "spline")
     by_values = mbd.inverse_dynamics(model, {"time": t, "pin.angle": np.sin(4.0 * t)})
@@ -451,9 +448,7 @@ def test_a_frame_of_a_person_takes_at_most_twenty_microseconds():
     ],
 )
 def test_a_motion_that_is_none_is_named(motion, words):
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=0.5), mbd.Revolute, "pin", title="pendulum")
     with pytest.raises(mbd.ModelError, match=words):
         mbd.inverse_dynamics(model, motion)
 

@@ -7,6 +7,7 @@ import pytest
 
 import mbd
 from tests.forces.test_wrapping import SURFACES, elbow
+from tests.helpers import one_body
 
 INERTIA = (0.05, 0.04, 0.03, 0.002, -0.003, 0.001)
 
@@ -184,9 +185,7 @@ def test_surfaces_of_paths_come_back(surface, tmp_path):
 
 
 def test_the_activation_of_a_muscle_comes_back(tmp_path):
-    model = mbd.Model("arm")
-    arm = mbd.RigidBody("arm", 1.0, (0.01, 0.01, 0.01, 0.0, 0.0, 0.0))
-    model.connect(mbd.Revolute("elbow", model.ground.origin, arm.origin))
+    model, arm = one_body(mbd.RigidBody("arm", 1.0, (0.01, 0.01, 0.01, 0.0, 0.0, 0.0)), mbd.Revolute, "elbow")
     points = (model.ground.point(0.0, 0.3), arm.point(0.02, -0.05))
     model.apply(mbd.Muscle("biceps", points, 600.0, 0.1, 0.2, excitation=0.4, damping=0.0))
     mbd.write_model(model, tmp_path / "arm.osim")
@@ -238,9 +237,7 @@ def test_a_body_welded_to_the_ground_askew_is_the_root_link_in_axes_of_the_groun
 @pytest.mark.parametrize("suffix", [".urdf", ".osim"])
 def test_a_planar_model_is_written_with_inertias_that_others_accept(suffix, tmp_path):
     """Links of the plane have a moment about z alone, which no body in space has."""
-    model = mbd.Model("arm")
-    arm = mbd.Link("arm", mass=1.0, length=0.3, center=0.15, inertia=0.01)
-    model.connect(mbd.Revolute("elbow", model.ground.origin, arm.start))
+    model, _ = one_body(mbd.Link("arm", mass=1.0, length=0.3, center=0.15, inertia=0.01), mbd.Revolute, "elbow")
     report = mbd.write_model(model, tmp_path / f"arm{suffix}")
     assert "moments of 'arm' about x and y" in "; ".join(report.approximated)
     read = mbd.read_model(tmp_path / f"arm{suffix}").model

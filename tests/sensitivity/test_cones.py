@@ -7,6 +7,7 @@ import pytest
 
 import mbd
 from tests.comparisons import at_least, compared
+from tests.helpers import one_body
 from tests.sensitivity.turns import judged
 from tests.simulation.test_cones import on_incline, thrown
 
@@ -34,9 +35,7 @@ def test_a_block_slides_along_a_curve_and_comes_to_rest(scheme):
 
 @pytest.mark.parametrize("scheme", [RADAU, HHT], ids=repr)
 def test_a_block_in_a_plane_holds_where_it_comes_to_rest(scheme):
-    model = mbd.Model("block", gravity=(2.0, -9.81, 0.0))
-    mass = mbd.PointMass("block", mass=2.0)
-    model.connect(mbd.Translation("slide", model.ground.origin, mass.origin))
+    model, mass = one_body(mbd.PointMass("block", mass=2.0), mbd.Translation, "slide", gravity=(2.0, -9.81, 0.0))
     model.constrain(mbd.Unilateral("foot", mbd.touchdown(mass.origin), friction=0.4))
     start = mbd.assemble(model, velocity={"slide.x": 1.0}, closed="foot")
     assert_as_differences(["stuck"], model, start, scheme, ways=1, parameters=["gravity.x"], dt=5e-3, until=0.8)
@@ -54,9 +53,7 @@ def test_a_mass_that_strikes_slides_on_or_sticks(friction):
 @cache
 def box(friction):
     """A floating box above the ground."""
-    model = mbd.Model("box")
-    body = mbd.RigidBody("box", 1.0, (0.02, 0.03, 0.04))
-    model.connect(mbd.Free("free", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("box", 1.0, (0.02, 0.03, 0.04)), mbd.Free, "free")
     for k, place in enumerate([(0.1, 0.1, 0.2), (-0.1, -0.1, 0.2), (0.1, -0.15, -0.2)]):
         model.constrain(mbd.Unilateral(f"foot {k}", mbd.touchdown(body.point(*place)), friction=friction))
     position = {"free.y": 0.4, "free.orientation": ("xyz", (0.3, 0.2, 0.1))}
@@ -162,9 +159,7 @@ def test_a_foot_of_a_sled_that_turns_comes_to_rest_before_the_others():
 def test_a_ball_that_begins_to_roll_keeps_five_sevenths_of_a_change_of_its_velocity(dt):
     """v = v₀ − 2 u₀/7 with u = v − R ω × n, whatever held direction the step before it grips has taken."""
     random, radius = np.random.default_rng(29), 0.03
-    model = mbd.Model("ball")
-    ball = mbd.RigidBody("ball", **mbd.sphere(0.2, radius).body)
-    model.connect(mbd.Free("roll", model.ground.origin, ball.origin))
+    model, ball = one_body(mbd.RigidBody("ball", **mbd.sphere(0.2, radius).body), mbd.Free, "roll")
     model.constrain(mbd.Unilateral("cloth", mbd.sphere_touchdown(ball.origin, radius), friction=0.25))
     for _ in range(2):
         spin = tuple(float(each) for each in random.uniform(-40.0, 40.0, 3))

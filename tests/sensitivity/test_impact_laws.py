@@ -6,6 +6,7 @@ from hypothesis import example, given, settings, strategies as st
 
 import mbd
 from mbd.sensitivity.derivative import final_state_derivative
+from tests.helpers import one_body
 from tests.sensitivity.differences import differences
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
@@ -29,9 +30,7 @@ def chain(restitutions):
 
 def corner(e, bounce=0.8):
     """A rod whose upper end comes to a wall as its lower one slides along a rough floor."""
-    model = mbd.Model("corner")
-    body = mbd.RigidBody("rod", mass=1.2, inertia=0.13)
-    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("rod", mass=1.2, inertia=0.13), mbd.Planar, "place", title="corner")
     model.constrain(
         mbd.Unilateral("floor", mbd.touchdown(body.point(-0.5, 0.0)), restitution=e, friction=0.3),
         mbd.Unilateral(
@@ -197,9 +196,7 @@ def test_a_restitution_of_zero_is_named_where_a_change_of_it_gives_an_impulse_ba
 @pytest.mark.parametrize("law", ["newton", *LAWS])
 def test_a_ball_that_just_sticks_as_it_strikes_has_two_derivatives(law, axes, kick):
     """It sticks by −μ v_y up to v_x, and loses no more beyond: ∂v_x⁺/∂v_x is 0 below and 1 above."""
-    model = mbd.Model("thrown", gravity=(0, 0, 0))
-    ball = mbd.PointMass("ball", mass=1.3)
-    model.connect(mbd.Translation("place", model.ground.origin, ball.origin, axes=axes))
+    model, ball = one_body(mbd.PointMass("ball", mass=1.3), mbd.Translation, "place", gravity=(0, 0, 0), axes=axes)
     model.constrain(
         mbd.Unilateral("floor", mbd.touchdown(ball.origin), friction=0.5, restitution=0.0),
         mbd.Impulse("kick", ball.origin, kick, "floor", direction=(1, 0), order="with"),

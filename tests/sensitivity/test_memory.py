@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mbd
+from tests.helpers import one_body
 
 CLOSE = {"tolerance": 1e-12}
 SCHEMES = (
@@ -21,8 +22,7 @@ def shank(loss):
 
 def puck():
     """A foot that sticks to rubber and slides on it by turns."""
-    model, body = mbd.Model("rubber"), mbd.PointMass("puck", 2.0)
-    model.connect(mbd.Translation("slide", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("puck", 2.0), mbd.Translation, "slide", title="rubber")
     rubber = mbd.Bristles(0.4, 5e3, 80.0)
     model.constrain(mbd.Penalty("mat", mbd.touchdown(body.origin), 2e4, 200.0, friction=rubber))
     model.apply(mbd.Applied("pull", body.origin, (lambda t: 12.0 * mbd.sin(3.0 * t), lambda t: 0.0 * t)))
@@ -31,8 +31,7 @@ def puck():
 
 def thrown():
     """A foot that slides on rubber, and off it again: there no bristle is loaded, and neither side of its kink is."""
-    model, body = mbd.Model("thrown"), mbd.PointMass("puck", 1.0)
-    model.connect(mbd.Translation("flight", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("puck", 1.0), mbd.Translation, "flight", title="thrown")
     rubber = mbd.Bristles(0.4, 2e3, 15.0)
     model.constrain(mbd.Penalty("mat", mbd.touchdown(body.origin), 3e3, 20.0, friction=rubber))
     return model, mbd.assemble(model, {"flight.y": 0.1}, {"flight.x": 1.0}), 0.25, "flight.x"
@@ -40,9 +39,7 @@ def thrown():
 
 def dropped(make):
     """A body that falls on a stop."""
-    model, body = mbd.Model("dropped"), mbd.PointMass("body", 1.0)
-    rail = mbd.Prismatic("rail", model.ground.origin, body.origin, axis=(0, 1, 0))
-    model.connect(rail)
+    model, body = one_body(mbd.PointMass("body", 1.0), mbd.Prismatic, "rail", title="dropped", axis=(0, 1, 0))
     model.constrain(make(mbd.height(body.origin)))
     return model, mbd.assemble(model, {"rail.displacement": 0.1}), 1.0, "rail.displacement"
 

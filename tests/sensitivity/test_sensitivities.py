@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mbd
+from tests.helpers import one_body
 from tests.sensitivity.differences import differences, off
 from tests.simulation.mechanisms import ball, kneed_walker, kneed_walker_start, pendulum
 
@@ -80,9 +81,7 @@ def test_a_folded_parameter_becomes_an_input():
 
 
 def test_a_folded_parameter_is_derived_for_once():
-    model = mbd.Model("swing")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5)
-    model.connect(mbd.Revolute("pin", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=0.5), mbd.Revolute, "pin")
     start = mbd.assemble(model, {"pin.angle": 0.5})
     ask = {"dt": 0.01, "until": 0.1, "wrt": ["rod.mass"]}
     one, two = (mbd.sensitivities(model, start, **ask).run.record.equations for _ in range(2))
@@ -150,9 +149,7 @@ def test_two_events_at_one_instant_are_named():
 
 
 def test_a_graze_is_named():
-    model = mbd.Model("graze")
-    bob = mbd.PointMass("bob", 1.0)
-    model.connect(mbd.Translation("place", model.ground.origin, bob.origin))
+    model, _ = one_body(mbd.PointMass("bob", 1.0), mbd.Translation, "place", title="graze")
     start_height = 1e-14
     model.constrain(mbd.Unilateral("roof", mbd.measure(lambda y: 1.0 - start_height - y, "place.y")))
     speed = np.sqrt(2.0 * 9.81)
@@ -305,9 +302,7 @@ def test_a_reset_by_sympy_expressions_is_differentiated():
 
 
 def test_a_restitution_is_refused_as_an_unknown_with_what_serves():
-    model = mbd.Model("ball")
-    ball = mbd.PointMass("ball", mass=2.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, ball.origin, axis="y"))
+    model, ball = one_body(mbd.PointMass("ball", mass=2.0), mbd.Prismatic, "fall", axis="y")
     model.constrain(mbd.Unilateral("floor", mbd.height(ball.origin), restitution=0.5))
     start = mbd.assemble(model, {"fall.displacement": 1.0})
     with pytest.raises(mbd.UnknownNameError, match="'floor.restitution' is a number of the model.*wrt="):
@@ -318,9 +313,7 @@ def test_a_restitution_is_refused_as_an_unknown_with_what_serves():
 @pytest.mark.parametrize("until", ["floor", "landing"])
 def test_an_event_at_the_gap_of_a_contact_happens_with_it(until):
     """A fall from x: √(2 x/g) and −√(2 g x), of which e comes back."""
-    model = mbd.Model("ball")
-    ball = mbd.PointMass("ball", mass=2.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, ball.origin, axis="y"))
+    model, ball = one_body(mbd.PointMass("ball", mass=2.0), mbd.Prismatic, "fall", axis="y")
     model.constrain(
         mbd.Unilateral("floor", mbd.height(ball.origin), restitution=0.5),
         mbd.Event("landing", mbd.height(ball.origin), direction=-1),

@@ -17,6 +17,7 @@ from mbd.sensitivity.tangent_run import TangentRun
 from mbd.simulation.interrupted import stopped
 from mbd.testing.mechanisms import random_scene
 from tests.gait.test_gaits_with_modes import walker as walker_with_modes
+from tests.helpers import one_body
 from tests.sensitivity.differences import differences, off
 from tests.sensitivity.test_cones import box
 from tests.sensitivity.turns import judged
@@ -155,8 +156,7 @@ def test_a_walker_by_every_scheme():
 )
 def test_steps_that_take_several_of_newtons_matrices(inertia, height, wave, pose):
     """A light body slides over a hill: positions are corrected in the metric of the last matrix, not of the first."""
-    model, body = mbd.Model("sledge"), mbd.RigidBody("body", 2.5, inertia)
-    model.connect(mbd.Planar("flight", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", 2.5, inertia), mbd.Planar, "flight")
     runner = mbd.touchdown(body.point(-0.2, -0.1), lambda x: height * mbd.sin(wave * x))
     model.constrain(mbd.Unilateral("runner", runner, friction=0.0))
     position = dict(zip(("flight.x", "flight.angle"), pose, strict=True))
@@ -168,8 +168,7 @@ def test_steps_that_take_several_of_newtons_matrices(inertia, height, wave, pose
 
 def test_a_disk_that_rolls_and_leans_by_schemes_that_correct_positions():
     """Positions are corrected along rows on positions, across those on velocities, whose directions change as well."""
-    model, body = mbd.Model("coin"), mbd.RigidBody("body", 2.0, (0.01, 0.01, 0.02))
-    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", 2.0, (0.01, 0.01, 0.02)), mbd.Free, "float")
     model.constrain(mbd.Bilateral("edge", mbd.disk_touchdown(body.origin, 0.14, axis=(0, 0, 1))))
     model.constrain(mbd.Rolling("grip", body.origin, 0.14, axis=(0, 0, 1)))
     position = {"float.orientation": ((1.0, 0.0, 0.0), 0.3)}
@@ -209,9 +208,7 @@ def test_a_floating_box_that_strikes_and_slides_by_nonsmooth_steps(scheme):
 @pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit])
 def test_an_interruption_is_no_failure_of_the_derivatives(raised, monkeypatch):
     """Ctrl-C ends searches and fits that go on where a run has no derivative."""
-    model = mbd.Model("pendulum")
-    rod = mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1)
-    model.connect(mbd.Revolute("hip", model.ground.origin, rod.start))
+    model, _ = one_body(mbd.Link("rod", mass=1.0, length=1.0, center=0.5, inertia=0.1), mbd.Revolute, "hip")
     start, calls = mbd.assemble(model, {"hip.angle": 0.3}), []
     run = mbd.simulate(model, start, mbd.HHT(), dt=1e-3, until=2.0)
     collect = TangentRun.collect

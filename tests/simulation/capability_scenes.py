@@ -1,6 +1,7 @@
 """A small scene for each law of the capability table: its model, start, end, and the number that is compared."""
 
 import mbd
+from tests.helpers import one_body
 
 
 def _bar(name, length=1.0):
@@ -14,8 +15,7 @@ def _pendulum(loss=None):
 
 
 def _ball(**law):
-    model, ball = mbd.Model("ball"), mbd.PointMass("ball", 1.0)
-    model.connect(mbd.Translation("flight", model.ground.origin, ball.origin))
+    model, ball = one_body(mbd.PointMass("ball", 1.0), mbd.Translation, "flight")
     model.constrain(mbd.Unilateral("floor", mbd.touchdown(ball.origin), **law))
     start = mbd.assemble(model, position={"flight.y": 0.1}, velocity={"flight.x": 1.0})
     return model, start, 0.35, "flight.x"
@@ -29,8 +29,7 @@ def tree():
 
 def rows_on_positions():
     """A rod to the ground in place of a joint."""
-    model, ball = mbd.Model("rod"), mbd.PointMass("ball", 1.0)
-    model.connect(mbd.Translation("flight", model.ground.origin, ball.origin))
+    model, ball = one_body(mbd.PointMass("ball", 1.0), mbd.Translation, "flight", title="rod")
     model.constrain(mbd.Bilateral("rod", mbd.distance(model.ground.origin, ball.origin), value=1.0))
     return model, mbd.assemble(model, position={"flight.x": 0.6, "flight.y": -0.8}), 0.5, "flight.x"
 
@@ -46,8 +45,7 @@ def rows_on_velocities():
 
 def rolling():
     """A wheel on a plane."""
-    model, wheel = mbd.Model("wheel", gravity=(1.0, -9.81, 0.0)), mbd.RigidBody("wheel", 1.0, 0.05)
-    model.connect(mbd.Planar("ride", model.ground.origin, wheel.origin))
+    model, wheel = one_body(mbd.RigidBody("wheel", 1.0, 0.05), mbd.Planar, "ride", gravity=(1.0, -9.81, 0.0))
     model.constrain(mbd.Bilateral("road", mbd.height(wheel.origin), value=0.3), mbd.Rolling("tyre", wheel.origin, 0.3))
     return model, mbd.assemble(model, position={"ride.y": 0.3}), 0.5, "ride.x"
 
@@ -79,8 +77,7 @@ def sliding_contact():
 
 def released_contact():
     """A foot that another one releases."""
-    model, hip = mbd.Model("compass", gravity=mbd.on_slope(0.05)), mbd.PointMass("hip", 1.0)
-    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin))
+    model, hip = one_body(mbd.PointMass("hip", 1.0), mbd.Translation, "trunk", gravity=mbd.on_slope(0.05))
     for side, other in ("left", "right"), ("right", "left"):
         leg = mbd.Link(f"{side} leg", 0.3, 1.0, 0.5, 0.02)
         model.connect(mbd.Revolute(f"{side} hip", hip.origin, leg.start))

@@ -4,14 +4,13 @@ import numpy as np
 
 import mbd
 from mbd.compile.mechanisms import mechanism_of
+from tests.helpers import one_body
 from tests.simulation.mechanisms import G
 
 
 def block(mu: float | None, slope: float = 0.0, reverse: bool = False) -> mbd.Model:
     """A block that cannot turn on a plane with the slope 'tilt', its contact 'foot'; downhill is 'place.x' > 0."""
-    model = mbd.Model("block", gravity=mbd.on_slope(slope, G))
-    body = mbd.PointMass("block", mass=2.0)
-    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("block", mass=2.0), mbd.Translation, "place", gravity=mbd.on_slope(slope, G))
     model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin), friction=mu))
     return model
 
@@ -39,9 +38,7 @@ def brick(
 
 def rod(mu: float | None, restitution: float = 0.0) -> mbd.Model:
     """A uniform rod of 1 kg and 1 m along its own x, whose lower end is the contact 'tip'."""
-    model = mbd.Model("rod")
-    body = mbd.RigidBody("rod", mass=1.0, inertia=1.0 / 12.0)
-    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("rod", mass=1.0, inertia=1.0 / 12.0), mbd.Planar, "place")
     model.constrain(mbd.Unilateral("tip", mbd.touchdown(body.point(-0.5, 0.0)), restitution=restitution, friction=mu))
     return model
 

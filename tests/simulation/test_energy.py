@@ -9,6 +9,7 @@ from mbd.results.energy import doubted_ledger
 from mbd.simulation.diagnostics.energy import EnergyWatch, judgement
 from mbd.simulation.simulate import prepared
 from tests.comparisons import at_least, compared
+from tests.helpers import one_body
 from tests.simulation.mechanisms import kneed_walker, kneed_walker_start
 
 G = (0.0, -9.81, 0.0)
@@ -113,9 +114,7 @@ def test_an_overshoot_that_a_damped_scheme_takes_back_is_a_note():
 
 # no false alarms ------------------------------------------------------------------------------------------------------
 def ball_on(ground, height, contact="events", dt=1e-3, until=1.5, **law):
-    model = mbd.Model("ball", gravity=G)
-    ball = mbd.PointMass("ball", mass=0.3)
-    model.connect(mbd.Translation("flight", model.ground.origin, ball.origin, axes="y"))
+    model, ball = one_body(mbd.PointMass("ball", mass=0.3), mbd.Translation, "flight", gravity=G, axes="y")
     model.constrain(mbd.Unilateral("table", mbd.touchdown(ball.origin, ground), **law))
     start = mbd.assemble(model, position={"flight.y": height}) if height else mbd.assemble(model, closed="table")
     return mbd.simulate(model, start, DAMPED, dt=dt, until=until, contact=contact)
@@ -246,9 +245,7 @@ def test_a_right_run_is_neither_refused_nor_doubted(name):
 
 
 def test_a_single_step_that_makes_energy_where_there_is_none_is_refused():
-    model = mbd.Model("stiff", gravity=G)
-    point = mbd.PointMass("p", 1.0)
-    model.connect(mbd.Translation("t", model.ground.origin, point.origin))
+    model, point = one_body(mbd.PointMass("p", 1.0), mbd.Translation, "t", title="stiff", gravity=G)
     model.apply(mbd.Spring("k", model.ground.point(0.0, 1.0), point.origin, stiffness=1e9, length=1.0))
     start = mbd.assemble(model, position={"t.x": 0.3, "t.y": 0.01})
     with pytest.raises(mbd.SimulationError, match=r"ω dt = .* but RungeKutta853 is stable up to 5.96") as caught:
@@ -298,9 +295,7 @@ def test_no_row_follows_a_start_from_which_an_explicit_step_is_beyond_its_stabil
 
 def dropped_on_a_mat(scheme, dt):
     """1 kg from 0.1 m onto 1e9 N/m: an impact of 99 µs."""
-    model = mbd.Model("ball", gravity=G)
-    body = mbd.PointMass("ball", 1.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model, body = one_body(mbd.PointMass("ball", 1.0), mbd.Prismatic, "fall", gravity=G, axis=(0, 1, 0))
     model.constrain(mbd.Penalty("mat", mbd.height(body.origin), stiffness=1e9))
     start = mbd.assemble(model, position={"fall.displacement": 0.1})
     return mbd.simulate(model, start, scheme, dt=dt, until=0.3, on_failure="return")
@@ -319,9 +314,7 @@ def test_a_blow_far_below_a_step_gives_back_what_it_took():
 
 
 def test_a_contact_that_was_closed_at_the_start_gives_what_it_holds():
-    model = mbd.Model("catapult", gravity=(0.0, 0.0, 0.0))
-    body = mbd.PointMass("ball", 1.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, body.origin, axis=(0, 1, 0)))
+    model, body = one_body(mbd.PointMass("ball", 1.0), mbd.Prismatic, "fall", gravity=(0.0, 0.0, 0.0), axis=(0, 1, 0))
     model.constrain(mbd.Penalty("mat", mbd.height(body.origin), stiffness=100.0))
     start = mbd.assemble(model, position={"fall.displacement": -0.1}, closed=["mat"])
     run = mbd.simulate(model, start, mbd.RungeKutta853(), dt=1e-2, until=1.0)
@@ -331,9 +324,7 @@ def test_a_contact_that_was_closed_at_the_start_gives_what_it_holds():
 # what it costs --------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(("until", "most"), [(0.05, 40), (60.0, 100), (1000.0, 200)])
 def test_a_right_run_is_looked_at_in_few_rows_and_without_a_ledger(until, most):
-    model = mbd.Model("rod", gravity=G)
-    link = mbd.Link("link", 1.0, 1.0, 0.5)
-    model.connect(mbd.Revolute("hinge", model.ground.origin, link.start))
+    model, _ = one_body(mbd.Link("link", 1.0, 1.0, 0.5), mbd.Revolute, "hinge", title="rod", gravity=G)
     options = {"contact": "events", "impact": "newton", "locate": "root", "store": 1, "rest_speed": 1e-6}
     start = mbd.assemble(model, position={"hinge.angle": 1.0})
     run = prepared(model, start, mbd.Newmark(), 1e-3, until, {}, options | {"backend": "auto"})
@@ -375,9 +366,7 @@ def test_non_smooth_steps_tell_a_gain_above_a_fiftieth(scheme, restitution, dt, 
 
     Impacts hide it: with restitution 0 the ball has the gain in one row alone, then it rests.
     """
-    model = mbd.Model("dropped")
-    ball = mbd.PointMass("ball", mass=1.0)
-    model.connect(mbd.Translation("place", model.ground.origin, ball.origin))
+    model, ball = one_body(mbd.PointMass("ball", mass=1.0), mbd.Translation, "place", title="dropped")
     model.constrain(mbd.Unilateral("foot", mbd.touchdown(ball.origin), restitution=restitution))
     start = mbd.assemble(model, position={"place.y": 0.5})
     run = mbd.simulate(model, start, scheme, dt=dt, until=1.0, contact="nonsmooth")

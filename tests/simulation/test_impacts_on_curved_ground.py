@@ -9,6 +9,7 @@ import pytest
 
 import mbd
 from mbd.hardcases.impacts import impact_figures
+from tests.helpers import one_body
 from tests.sensitivity.differences import end
 
 LAWS = ("newton", "poisson", "sequential")
@@ -142,9 +143,7 @@ def walker(rng):
     def ground(x):
         return slope * x + wave * mbd.sin(4.0 * x + phase)
 
-    model = mbd.Model("walker")
-    hip = mbd.PointMass("hip", mass=1.0)
-    model.connect(mbd.Translation("trunk", model.ground.origin, hip.origin))
+    model, hip = one_body(mbd.PointMass("hip", mass=1.0), mbd.Translation, "trunk", title="walker")
     for side in ("left", "right"):
         leg = mbd.Link(f"{side} leg", mass=0.3, length=1.0, center=0.5, inertia=0.02)
         model.connect(mbd.Revolute(f"{side} hip", hip.origin, leg.start))
@@ -225,9 +224,7 @@ def test_sliding_friction_is_the_same_in_both_rows_of_the_impact_of_another(seed
 @pytest.mark.parametrize("friction", [None, 0.6, 3.0])
 def test_a_foot_on_a_steep_hill_that_can_neither_stick_nor_leave_is_told_to_slip(friction):
     """Held it would pull (−0.58 N), released it would sink in (−1.2 m/s²); with friction it slips and goes on."""
-    model = mbd.Model("one foot")
-    body = mbd.RigidBody("body", 1.448, 0.1082)
-    model.connect(mbd.Planar("flight", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", 1.448, 0.1082), mbd.Planar, "flight")
     sole = mbd.touchdown(body.point(-0.2, -0.1), lambda x: 0.2873 * mbd.sin(2.107 * x))
     model.constrain(mbd.Unilateral("foot", sole, friction=friction))
     start = mbd.assemble(model, position={"flight.x": 1.72, "flight.y": 0.8636, "flight.angle": 0.0604})

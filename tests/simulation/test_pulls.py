@@ -6,6 +6,7 @@ import pytest
 import mbd
 from mbd.kernel.events.handling import same_instant
 from mbd.kernel.records import Kernel
+from tests.helpers import one_body
 from tests.simulation.judging import complaints
 from tests.simulation.wild import wild_scene
 
@@ -100,9 +101,7 @@ def test_no_row_and_no_impulse_of_a_wild_scene_pulls(seed):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=NAMES)
 def test_no_contact_pulls_at_any_step(scheme, contact):
     """A point thrown onto waves leaves, lands and slides with steps of up to a wave each."""
-    model = mbd.Model("waves")
-    point = mbd.PointMass("point", mass=1.0)
-    model.connect(mbd.Translation("place", model.ground.origin, point.origin))
+    model, point = one_body(mbd.PointMass("point", mass=1.0), mbd.Translation, "place", title="waves")
     waves = mbd.touchdown(point.origin, lambda x: 0.02 * mbd.cos(6.0 * x))
     model.constrain(mbd.Unilateral("foot", waves, friction=0.1))
     rng = np.random.default_rng(3)
@@ -130,9 +129,7 @@ def test_any_number_of_frictions_may_switch_at_one_instant(scheme, contact):
 @pytest.mark.parametrize("at_start", [False, True])
 @pytest.mark.parametrize("scheme", [mbd.HHT(), mbd.RadauIIA()], ids=["HHT", "RadauIIA"])
 def test_any_number_of_events_may_happen_at_one_instant(scheme, at_start):
-    model = mbd.Model("watched")
-    point = mbd.PointMass("point", mass=1.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, point.origin, axis=(0, 1, 0)))
+    model, _ = one_body(mbd.PointMass("point", mass=1.0), mbd.Prismatic, "fall", axis=(0, 1, 0))
     for k in range(30):
         model.constrain(mbd.Event(f"event {k}", mbd.measure(lambda y: y - 0.5, "fall.displacement")))
     start = mbd.assemble(model, position={"fall.displacement": 0.5 if at_start else 1.0})

@@ -9,6 +9,7 @@ from hypothesis import given, settings, strategies as st
 import mbd
 from mbd.equations.programs import balance_with
 from mbd.kernel.algebra.redundancy import MIN_LIMIT_SHARE
+from tests.helpers import one_body
 from tests.simulation.frictions import check_friction
 from tests.simulation.mechanisms import G
 
@@ -133,9 +134,7 @@ def test_impulses_of_redundant_runners_are_the_change_of_momentum(law, restituti
 @lru_cache(maxsize=8)
 def laden(feet, swings):
     """A body on feet in a row, with a load that swings on it; coefficients are run-time parameters."""
-    model = mbd.Model("laden")
-    body = mbd.RigidBody("body", mass=2.0, inertia=0.3)
-    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", mass=2.0, inertia=0.3), mbd.Planar, "place", title="laden")
     if swings:
         load = mbd.Link("load", mass=0.7, length=0.4, center=0.3, inertia=0.01)
         model.connect(mbd.Revolute("hinge", body.origin, load.start, loss=mbd.Coulomb(0.05)))
@@ -185,9 +184,7 @@ def test_pins_of_redundant_cranks_balance_while_their_rows_turn(scheme, loss):
 
 def test_the_linear_motion_of_a_sliding_sled_is_that_of_its_run():
     """A spring holds it on a belt that runs below: δẍ = −k/m δx, with the drag of shares that do not change."""
-    model = mbd.Model("held")
-    body = mbd.RigidBody("body", mass=MASS, inertia=0.1)
-    model.connect(mbd.Planar("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", mass=MASS, inertia=0.1), mbd.Planar, "place")
     belt = mbd.Plane(velocity=(1.0, 0.0))
     for k, x in enumerate(PLACES):
         model.constrain(

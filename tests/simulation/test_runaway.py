@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mbd
+from tests.helpers import one_body
 
 FAMILY = [
     mbd.Newmark(), mbd.HHT(0.05), mbd.HHT(0.1, formulation="index3"), mbd.GeneralizedAlpha(0.9),
@@ -19,9 +20,7 @@ STEPS = (0.3, 0.1, 0.03, 0.01)
 
 def particle(law: Any, of: str = "x.rate", mass: float = 1.0, place: float = 0.0, speed: float = 1.0) -> Any:
     """A particle under a force along x that follows its place or its speed."""
-    model = mbd.Model("particle", gravity=(0.0, 0.0, 0.0))
-    body = mbd.PointMass("particle", mass)
-    model.connect(mbd.Translation("p", model.ground.origin, body.origin, axes="x"))
+    model, body = one_body(mbd.PointMass("particle", mass), mbd.Translation, "p", gravity=(0.0, 0.0, 0.0), axes="x")
     push = mbd.Applied("push", body.origin, force=lambda s: (law(s), 0.0), arguments=(f"p.{of}",))
     model.apply(push)
     return model, mbd.assemble(model, position={"p.x": place}, velocity={"p.x": speed})
@@ -105,9 +104,7 @@ def test_every_row_is_balanced_and_none_is_faster_than_the_forces_allow(law: Any
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_forces_that_begin_at_once_are_no_runaway(scheme: Any) -> None:
     """From rest all of the change is unforeseen: but it does not feed itself."""
-    model = mbd.Model("particle", gravity=(0.0, 0.0, 0.0))
-    body = mbd.PointMass("particle", 1.3)
-    model.connect(mbd.Translation("p", model.ground.origin, body.origin, axes="x"))
+    model, body = one_body(mbd.PointMass("particle", 1.3), mbd.Translation, "p", gravity=(0.0, 0.0, 0.0), axes="x")
     model.apply(
         mbd.Applied("push", body.origin, force=lambda t: (mbd.where(t < 0.111, 0.0, 5.0), 0.0), arguments=("t",))
     )
@@ -136,10 +133,8 @@ PULLS = {
 @cache
 def falling(law):
     """A point that is pulled towards the origin of a rail."""
-    model = mbd.Model("fall", gravity=(0.0, 0.0, 0.0))
-    point = mbd.PointMass("point", mass=1.0)
-    rail = mbd.Prismatic("rail", model.ground.origin, point.origin)
-    model.connect(rail)
+    model, _ = one_body(mbd.PointMass("point", mass=1.0), mbd.Prismatic, "rail", title="fall", gravity=(0.0, 0.0, 0.0))
+    rail = model.joints[0]
     model.apply(mbd.Motor("pull", rail, lambda t, x: PULLS[law](x), arguments=("t", "rail.displacement")))
     return model
 

@@ -7,15 +7,14 @@ import pytest
 
 import mbd
 from mbd import parts
+from tests.helpers import one_body
 
 RADAU = mbd.RadauIIA()
 
 
 @lru_cache(maxsize=4)
 def capsule(friction=0.4, restitution=0.0):
-    model = mbd.Model("capsule")
-    body = mbd.RigidBody("body", 2.0, (0.004, 0.01, 0.01))
-    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", 2.0, (0.004, 0.01, 0.01)), mbd.Free, "float", title="capsule")
     ends = body.point(-0.1, 0.0, 0.0), body.point(0.1, 0.0, 0.0)
     parts.capsule_foot(model, "foot", *ends, 0.03, friction=friction, restitution=restitution)
     return model
@@ -53,9 +52,7 @@ def test_a_tilted_capsule_strikes_with_its_lower_end_and_never_sinks():
 
 @lru_cache(maxsize=4)
 def box(friction, restitution=0.0):
-    model = mbd.Model("box")
-    body = mbd.RigidBody("body", 2.0, (0.02, 0.03, 0.02))
-    model.connect(mbd.Free("float", model.ground.origin, body.origin))
+    model, body = one_body(mbd.RigidBody("body", 2.0, (0.02, 0.03, 0.02)), mbd.Free, "float", title="box")
     corners = [body.point(x, -0.05, z) for x in (-0.1, 0.1) for z in (-0.08, 0.08)]
     parts.polygon_foot(model, "sole", corners, friction=friction, restitution=restitution)
     return model

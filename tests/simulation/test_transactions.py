@@ -1,7 +1,5 @@
 """A step that fails leaves everything as it was; what it failed of can be repeated; an interrupt keeps the rest."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -13,6 +11,7 @@ from hypothesis import assume, given, settings, strategies as st
 import mbd
 from mbd.integrators import StepReport, StepResult
 from mbd.testing.mechanisms import random_scene
+from tests.helpers import one_body
 from tests.integrators.own import ProjectedMidpoint
 from tests.simulation.cut_runs import PARTS, assert_halves_are_the_whole
 from tests.simulation.mechanisms import ball, falling, pendulum, point, run
@@ -91,9 +90,7 @@ def test_a_force_that_fails_leaves_the_state_and_a_cure_goes_on_as_if_nothing_ha
 
 def stiff(backend="auto", jump=1e9):
     """A wall that is a jump of the force, of 1e9 N: Newton's method cycles."""
-    model = mbd.Model("wall", gravity=(0, 0, 0))
-    body = mbd.PointMass("body", mass=1.0)
-    model.connect(mbd.Prismatic("x", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("body", mass=1.0), mbd.Prismatic, "x", title="wall", gravity=(0, 0, 0))
     wall = mbd.Applied(
         "wall", body.origin, force=lambda p: (mbd.where(p[0] > 0.5, -jump, 0.0), 0, 0), arguments=(body.origin,)
     )
@@ -103,9 +100,7 @@ def stiff(backend="auto", jump=1e9):
 
 def stuck(backend="auto"):
     """The end of a rod that sticks where it lands: no force holds it that does not pull."""
-    model = mbd.Model("rod")
-    rod = mbd.RigidBody("rod", mass=1.0, inertia=1.0 / 12.0)
-    model.connect(mbd.Planar("place", model.ground.origin, rod.origin))
+    model, rod = one_body(mbd.RigidBody("rod", mass=1.0, inertia=1.0 / 12.0), mbd.Planar, "place")
     model.constrain(mbd.Unilateral("tip", mbd.touchdown(rod.point(-0.5, 0.0))))
     return model, mbd.assemble(model, {"place.y": 0.8 + 0.5 * np.sin(0.5), "place.angle": 0.5}, backend=backend)
 

@@ -13,6 +13,7 @@ from mbd.equations.clusters import clusters
 from mbd.equations.derivation import derive
 from mbd.simulation.diagnostics.coarse import percent
 from mbd.testing.mechanisms import random_tree
+from tests.helpers import one_body
 from tests.simulation.mechanisms import falling, run
 
 STIFF = 1e9
@@ -111,9 +112,7 @@ def between_walls(seed):
         lambda x: energy * (mbd.exp((x - reach) / depth) + mbd.exp((-x - reach) / depth)),
         lambda x: energy / depth**2 * mbd.where(abs(x) > reach, (abs(x) - reach) ** 2, 0.0),
     ]
-    model = mbd.Model("between walls", gravity=(0.0, 0.0, 0.0))
-    body = mbd.PointMass("body", mass=1.0)
-    model.connect(mbd.Prismatic("slide", model.ground.origin, body.origin))
+    model, _ = one_body(mbd.PointMass("body", mass=1.0), mbd.Prismatic, "slide", gravity=(0.0, 0.0, 0.0))
     model.apply(mbd.Potential("walls", walls[seed % 2], ("slide.displacement",)))
     return model, mbd.assemble(model, velocity={"slide.displacement": speed}), depth, speed, reach
 
@@ -150,9 +149,7 @@ def test_a_wall_that_is_thinner_than_a_step_is_told_with_a_step_that_resolves_it
 def test_a_scheme_that_lags_behind_a_steep_brake_says_so(scheme, share):
     """``v̇ = −c v³`` from v₀ has ``v = v₀ / √(1 + 2 c v₀² t)``; the first step brakes v₀ by about `share`."""
     speed, dt = 33.0, 1e-3
-    model = mbd.Model("braked wheel", gravity=(0.0, 0.0, 0.0))
-    wheel = mbd.RigidBody("wheel", mass=1.0, inertia=0.01)
-    model.connect(mbd.Revolute("pin", model.ground.origin, wheel.origin))
+    model, _ = one_body(mbd.RigidBody("wheel", mass=1.0, inertia=0.01), mbd.Revolute, "pin", gravity=(0.0, 0.0, 0.0))
     c = share / (speed**2 * dt)
     model.apply(mbd.Motor("brake", model.joints[0], lambda v: -0.01 * c * v**3, arguments=["pin.rate"]))
     start = mbd.assemble(model, velocity={"pin.angle": speed})

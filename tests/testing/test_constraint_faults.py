@@ -13,6 +13,7 @@ from mbd.equations.equations import Contact
 from mbd.testing import LawBroken, check_constraint, check_model
 from mbd.testing.findings import Findings
 from mbd.testing.runs import run_laws
+from tests.helpers import one_body
 from tests.testing.test_force_faults import Own, Place, active_damper, asymmetric, from_origin
 from tests.testing.test_joint_faults import WrongSign
 
@@ -88,9 +89,7 @@ def test_an_instance_floats_in_the_plane():
 
 def falling(random: bool):
     """A bead over the ground, with a controller that may draw its force by lot."""
-    model = mbd.Model("bead")
-    bead = mbd.PointMass("bead", 1.0)
-    model.connect(mbd.Prismatic("fall", model.ground.origin, bead.origin, axis=(0, 1, 0)))
+    model, bead = one_body(mbd.PointMass("bead", 1.0), mbd.Prismatic, "fall", axis=(0, 1, 0))
     push = mbd.Applied("push", bead.origin, force=(0.0, 2.0, 0.0))
     lot = np.random.default_rng() if random else np.random.default_rng(1)
     fixed = float(lot.uniform())
@@ -236,9 +235,7 @@ def test_energy_that_no_effect_tells_is_caught():
 )
 def test_friction_beyond_its_law_is_caught(law, wrong):
     """A real run, judged by half its limit, or by sliding the other way."""
-    model = mbd.Model("block")
-    body = mbd.PointMass("block", mass=1.0)
-    model.connect(mbd.Translation("place", model.ground.origin, body.origin))
+    model, body = one_body(mbd.PointMass("block", mass=1.0), mbd.Translation, "place")
     model.constrain(mbd.Unilateral("foot", mbd.touchdown(body.origin), friction=0.3))
     start = mbd.assemble(model, velocity={"place.x": 1.0}, closed="foot")
     run = mbd.simulate(model, start, mbd.HHT(0.05), dt=0.01, until=0.2)
