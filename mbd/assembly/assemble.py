@@ -10,7 +10,7 @@ import numpy as np
 
 from mbd.arrays import Vector
 from mbd.assembly.conditions import Condition, conditions
-from mbd.assembly.consistency import ASSEMBLED_RESIDUAL
+from mbd.assembly.consistency import ASSEMBLED_RESIDUAL, residuals, violations
 from mbd.assembly.contradictions import Attempt, contradictions, infeasible
 from mbd.assembly.doubtful import doubtful
 from mbd.assembly.foot_places import foot_places
@@ -128,7 +128,7 @@ def assemble(
         return trial
 
     work = _opened(mechanism, values, named, opening(model, mechanism, values, closing), closed, held)
-    bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened))
+    bad = _closed(work, named, project, model) or undetermined(work) + _below(work, set(opened)) + _too_small(work)
     if bad:
         raise AssemblyError(bad)
     name_wrapped(work)
@@ -318,6 +318,15 @@ def _off_manifold(equations: Equations, named: _Named, q: Vector) -> list[str]:
         if 0 < len(given) < len(own):
             faults.append(f"position: {names} of {joint.known_as} belong together; name all of them or none")
     return faults or [f"position: {fault}" for fault in equations.configuration.misplaced(q, NOMINAL_RTOL)]
+
+
+def _too_small(work: Posture) -> list[str]:
+    """Rows that closing left open in the mechanism's own lengths, which are smaller than metres can tell."""
+    active = work.active_rows
+    found = residuals(work.mechanism, work.time, work.q, work.y, work.parameters, work.anchors)
+    speed = float(np.max(np.abs(work.y[: work.equations.n_v]), initial=0.0))
+    left = violations(work.equations.rows, active, found, speed) if active else []
+    return [f"lengths are too small in metres to close {'; '.join(left)}: give lengths in mm or µm"] if left else []
 
 
 def _gaps(work: Posture) -> Vector:
