@@ -37,7 +37,7 @@ APART = (
     "singular.newmark_step.singular_newmark_step", "schemes.newton.second_look", "schemes.newton.retreat",
     "schemes.radau.radau_step", "schemes.runge_kutta.runge_kutta_step", "stepping.restart.lower_to_step",
     "contact.cone_steps.come_to_zero", "stepping.advance.advance", "stepping.begin_run.begin_run",
-    "stepping.begin_run.judge_start",
+    "stepping.begin_run.judge_start", "stepping.steps_again.steps_again", "schemes.determinant.note_determinant",
 )  # fmt: skip
 """Their loops keep their shape wherever they are called; where they are not, nobody carries them along.
 
@@ -52,6 +52,8 @@ ENTRY_FUNCTION = """
 def mbd_kernel(K: Kernel) -> int:
     if K.many == 2:
         return judge_start(K)
+    if K.many == STEPS_AGAIN:
+        return steps_again(K)
     return march_many(K) if K.many == 1 else advance(K)
 """
 
@@ -138,14 +140,17 @@ def kernel_c_source() -> str:
 
 def kernel_functions() -> list[Function]:
     """The kernel as typed trees."""
+    from mbd.kernel.schemes.determinant import STEPS_AGAIN
     from mbd.kernel.stepping.advance import advance
     from mbd.kernel.stepping.begin_run import judge_start
     from mbd.kernel.stepping.many_runs import march_many
+    from mbd.kernel.stepping.steps_again import steps_again
     from mbd.kernel.translation.memory_check import check_memory
     from mbd.kernel.translation.translate import Source, functions_of, translate
 
     text, names = contract.dispatch()
     names = {**names, "advance": advance, "march_many": march_many, "judge_start": judge_start}
+    names |= {"steps_again": steps_again, "STEPS_AGAIN": STEPS_AGAIN}
     hooks = Source("hooks", functions_of(text, ENTRY_FUNCTION), names)
     found = translate(hooks, ENTRY, ["kernel"], APART, {"mbd.kernel.hooks": hooks})
     check_memory(found)

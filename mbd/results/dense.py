@@ -14,7 +14,8 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.many import at_inputs
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
-from mbd.results.balance import Balance, Solved, put
+from mbd.later import later
+from mbd.results.balance import Balance, Flags, Solved, put
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Places
 from mbd.results.projection import Projection
@@ -23,6 +24,8 @@ from mbd.results.stored_states import StoredStates
 
 SINGULAR_DISTANCE_RATIO = 0.2
 """Distance of a stage from a singular configuration, over that of the farther row, below which it is not used [-]."""
+CHANGED = ("time", "q", "v", "z", "a", "s", "lam")
+"""What differs between a place and the row before."""
 
 
 class Restepping:
@@ -31,6 +34,7 @@ class Restepping:
     def __init__(self, states: StoredStates, balance: Balance) -> None:
         self.states, self.equations, self.balance = states, states.equations, balance
         self.charts, self.onto = Charts.of(states.equations), Projection.of(balance)
+        self.steps = later("run: steps taken again")(states)
 
     @staticmethod
     def serves(states: StoredStates) -> bool:
@@ -49,31 +53,46 @@ class Restepping:
         found = rows.part(places.lower)
         if not inside.any():
             return found
-        begin, time = found.part(inside), places.time[inside]
+        mine = places.part(np.flatnonzero(inside))
+        there, near = self._by_machine(rows, mine) or self._by_equations(rows, mine)
+        new: dict[str, Any] = {name: put(getattr(found, name), inside, getattr(there, name)) for name in CHANGED}
+        found = replace(found, **new)
+        beside = put(np.zeros(len(inside), dtype=bool), inside, near)
+        return self._smoothed(rows, places, found, beside) if near.any() else found
+
+    def _by_machine(self, rows: Rows, places: Places) -> tuple[Rows, Flags] | None:
+        """The same at places between rows, and which lie next to singular configurations; None without code."""
+        if self.steps is None:
+            return None
+        begin = rows.part(places.lower)
+        ends = (self.states.all_inputs(each)["t"] for each in (begin, replace(begin, time=places.time)))
+        taken = self.steps(rows, places, *ends)
+        if taken is None:
+            return None
+        there, sizes = taken
+        least, far = np.min(sizes[:, :-1], axis=1), np.maximum(sizes[:, 0], sizes[:, -1])
+        return there, ~(least - far >= 2.0 * np.log(SINGULAR_DISTANCE_RATIO))
+
+    def _by_equations(self, rows: Rows, places: Places) -> tuple[Rows, Flags]:
+        """The same by the equations in numpy, which a run that was read from a file has."""
+        begin, time = rows.part(places.lower), places.time
         state, least = self._stepped(begin, (time - begin.time)[:, None])
         q, v, z = self._parts(begin, state)
         there = replace(begin, time=time, q=q, v=v, z=z)
         if self.onto is not None:
-            there = self.onto.at(rows, places.part(np.flatnonzero(inside)), there)
-            q, v = there.q, there.v
+            there = self.onto.at(rows, places, there)
         end = self._rates(there)
-        changed: dict[str, Any] = {"time": time, "q": q, "v": v, "z": z, "lam": end.lam}
-        changed["a"], changed["s"] = np.split(end.rate, [self.equations.n_v], axis=1)
-        new: dict[str, Any] = {name: put(getattr(found, name), inside, values) for name, values in changed.items()}
-        found = replace(found, **new)
-        near = np.zeros(len(inside), dtype=bool)
-        before, after = self._rates(begin).size, self._rates(rows.part(places.upper[inside])).size
+        a, s = np.split(end.rate, [self.equations.n_v], axis=1)
+        there = replace(there, a=a, s=s, lam=end.lam)
+        before, after = self._rates(begin).size, self._rates(rows.part(places.upper)).size
         far = np.maximum(before, after)  # the row of an event may lie at the pose itself
         least = np.minimum(np.minimum(least, 0.0) + before, end.size)
-        near[inside] = least - far < 2.0 * np.log(SINGULAR_DISTANCE_RATIO)
-        near[inside] |= ~end.sound
-        return self._smoothed(rows, places, found, near) if near.any() else found
+        return there, (least - far < 2.0 * np.log(SINGULAR_DISTANCE_RATIO)) | ~end.sound
 
     def _smoothed(self, rows: Rows, places: Places, found: Rows, near: Any) -> Rows:
         """The states with those told by `near` interpolated."""
         between = self.states.grid.between(rows, places, self.states.q_rate, True, self.charts)
-        names = ("q", "v", "z", "a", "s", "lam")
-        new: dict[str, Any] = {name: put(getattr(found, name), near, getattr(between, name)[near]) for name in names}
+        new: dict[str, Any] = {name: put(getattr(found, name), near, getattr(between, name)[near]) for name in CHANGED}
         return replace(found, **new)
 
     def _stepped(self, begin: Rows, h: Matrix) -> tuple[Matrix, Vector]:

@@ -15,6 +15,7 @@ from mbd.kernel.codes import INCREMENT_RATES, NOT_CONVERGED, PASSING, SINGULAR
 from mbd.kernel.hooks import call
 from mbd.kernel.records import DependentRows, Equations, Kernel, SingularSteps, Steps
 from mbd.kernel.schemes.contract import Abilities, Scheme
+from mbd.kernel.schemes.determinant import STEPS_AGAIN, note_determinant
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
 from mbd.kernel.schemes.explicit_error import explicit_error, hold_error
 from mbd.kernel.schemes.explicit_rates import explicit_rates, rates_at_end
@@ -85,6 +86,8 @@ def runge_kutta_step(K: Kernel, h: float, t1: float) -> int:
             status = follow_rates(K, t, s > 1) if is_differentiated() else explicit_rates(K, t)
             if status != 0:
                 return status
+            if K.many == STEPS_AGAIN:
+                note_determinant(K, s)
         for i in range(n):
             K.stages[s * width + n_v + i] = K.jump[i]
         note_velocities(K, s)

@@ -345,9 +345,9 @@ class Stepper:
         self.kernel.until = until
         return self._called()
 
-    def march_many(self) -> int:
-        """Take runs from their lines of starts to their ends until the kernel returns; its status."""
-        self.kernel.many = 1
+    def march_many(self, many: int = 1) -> int:
+        """Take runs, or steps again, from their lines of starts to their ends until the kernel returns; its status."""
+        self.kernel.many = many
         try:
             return self._called()
         finally:
