@@ -304,7 +304,7 @@ _LATER = {
     "Trajectory.plot": "mbd.view.plots.histories",
     "Trajectory.sensitivities": "mbd.sensitivity.result.read",
     "Trajectory.summary": "mbd.analysis.ending.summary",
-    "run: steps taken again": "mbd.simulation.run.steps_again.steps_of",
+    "results: states between rows": "mbd.simulation.run.states_between.between",
     "simulate: derivatives": "mbd.sensitivity.asked.request_of",
 }
 """Functions that methods of results call, by the method; see `mbd.later`."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ import pytest
 import mbd
 from mbd.hardcases.redundant_rows import bricard
 from mbd.hardcases.schemes import SCHEMES
+from mbd.results.balance import Balance
 from mbd.results.columns import ModelColumns
 from tests.fuzz import judge
 from tests.fuzz.structures import SPACE, structure
@@ -268,15 +269,29 @@ def test_states_at_times_that_are_asked_for_again_are_found_once(name, monkeypat
     np.testing.assert_array_equal(moved, again.at([0.0133, 0.0466, 0.0799])[one])
 
 
+class ByNumpy(ModelColumns):
+    """Quantities of a run without machine code."""
+
+    machine = None
+
+    @cached_property
+    def balance(self) -> Balance:
+        """The equations of motion in numpy."""
+        found = Balance(self)
+        vars(found)["between"] = None
+        return found
+
+
 @pytest.mark.parametrize("name", ["HHT", "RadauIIA", "RungeKutta853"])
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_machine_code_finds_the_states_between_rows_that_numpy_finds(kind, name):
-    """Which trial runs of a tolerance are compared by; what a user reads has the bits that a file of the run gives."""
+    """A file of the run is read by numpy."""
     run = mbd.simulate(*mechanism(kind, 2), SCHEMES[name](), dt=STEPS.get(name, USUAL), until=0.1)
     columns, times = run._model_columns, np.linspace(0.003, 0.097, 12)
     places = columns.grid.places(times)
-    quick, plain = columns.by_machine.between(places), columns.between(places)
-    assert columns.by_machine.machine is not None and columns.machine is None
+    others = ByNumpy(run.record, columns.equations)
+    quick, plain = columns.between(places), others.between(places)
+    assert columns.machine is not None and others.balance.between is None
     for part in ("q", "v", "z", "a", "lam"):
         expected = getattr(plain, part)
         np.testing.assert_allclose(

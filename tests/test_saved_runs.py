@@ -17,18 +17,17 @@ TIMES = np.linspace(0.0, 0.2, 23)
 
 
 def same(one: mbd.Trajectory, other: mbd.Trajectory, singly: Sequence[str] | None = None) -> None:
-    """Every named result at rows, events and violation, to the bit; what lies between rows of explicit steps, and
-    energies that are integrated there, to round-off, as a file has no machine code.
+    """Every named result at rows, events and violation, to the bit; what lies between rows, and energies that are
+    integrated there, to round-off, as a file has no machine code.
 
     singly : those that are asked for one by one, each by a function of its own; by default all
     """
     assert one.names == other.names
     np.testing.assert_array_equal(one.time, other.time)
-    again = one._model_columns._steps is not None
 
     def equal(ours: np.ndarray, theirs: np.ndarray, name: str) -> None:
         size = 1.0 + np.max(np.abs(one[name] if name in one.names else ours))
-        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-9 * size if again else 0.0, err_msg=name)
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-9 * size, err_msg=name)
 
     times = np.linspace(one.time[0], one.time[-1], 23)
     for side in ("left", "right"):

@@ -6,8 +6,10 @@ the constraint manifold, as at a stage of an explicit step, all of them together
 other. Their multipliers are those of least norm among all that give the same forces.
 """
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -26,6 +28,7 @@ from mbd.equations.equations import Equations
 from mbd.equations.magnitudes import magnitudes
 from mbd.kernel.algebra.redundancy import JOINT_SHARE, MIN_LIMIT_SHARE
 from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS
+from mbd.later import later
 from mbd.results.polynomials import Index
 from mbd.results.record import Rows
 from mbd.results.stored_states import StoredStates
@@ -106,17 +109,38 @@ class Balance:
             np.ones(count, dtype=bool), np.zeros((count, n, n)), np.zeros((count, n)),
         )  # fmt: skip
         groups = self._groups(rows)
+        if self.between is not None and (values := self._by_machine(rows, groups)) is not None:
+            return values
         for mode, mine in groups:
             self._solve_in(mode, rows if len(groups) == 1 else rows.part(mine), mine, found)
         return found
+
+    @cached_property
+    def between(self) -> Any:
+        """What solves by machine code, if there is any."""
+        return later("results: states between rows")(self.states)
+
+    def _by_machine(self, rows: Rows, groups: Sequence[tuple[NDArray[np.int8], Any]]) -> Solved | None:
+        """The same by machine code; None where a mode has none. Which rows depend on others stored states tell."""
+        chosen, stored = list[int](), self.states.rows
+        for mode, _ in groups:
+            same = np.flatnonzero(np.all(stored.closed == mode[: stored.closed.shape[1]], axis=1))
+            if not len(same):
+                return None
+            chosen.append(int(same[len(same) // 2]))
+        found = self.between.balanced(rows, stored.part(np.array(chosen, dtype=np.intp)))
+        if found is None:
+            return None
+        rate, lam, size, sound, unique, inertia, load = found
+        sound = sound & np.isfinite(rate).all(axis=1) & np.isfinite(lam).all(axis=1)
+        return Solved(rate, lam, size, sound, unique, inertia, load)
 
     def _groups(self, rows: Rows) -> list[tuple[NDArray[np.int8], Any]]:
         """The modes of states, and where each holds; found once for states that share their flags, as stages do."""
         closed, phase, groups = self._grouped
         if closed is not rows.closed or phase is not rows.phase:
-            modes = np.hstack([rows.closed.astype(np.int8), rows.phase])
-            patterns, group = np.unique(modes, axis=0, return_inverse=True)
-            alone, group = len(patterns) == 1, group.ravel()
+            patterns, group = modes_of(np.hstack([rows.closed.astype(np.int8), rows.phase]))
+            alone = len(patterns) == 1
             groups = [(mode, slice(None) if alone else np.flatnonzero(group == k)) for k, mode in enumerate(patterns)]
             self._grouped = rows.closed, rows.phase, groups
         return groups
@@ -254,6 +278,14 @@ class Balance:
             return parts_of_row(self.equations, k)
         first = _last_of_R(self.equations) + k * (self.equations.n_v + self.equations.n_z)
         return magnitudes(self.equations.tape, terms[first : first + self.equations.n_v])
+
+
+def modes_of(flags: NDArray[Any]) -> tuple[NDArray[Any], Index]:
+    """The different rows among flags, most of which are those of their neighbours, and the number of each."""
+    first = np.ones(len(flags), dtype=bool)
+    first[1:] = np.any(flags[1:] != flags[:-1], axis=1)
+    patterns, group = np.unique(flags[first], axis=0, return_inverse=True)
+    return patterns, group.ravel()[np.cumsum(first) - 1]
 
 
 def weights(M: Any) -> Any:

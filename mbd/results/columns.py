@@ -130,13 +130,6 @@ class ModelColumns(StoredStates, Columns):
         self._placed: WeakKeyDictionary[Places, dict[bool, Rows]] = WeakKeyDictionary()
 
     @cached_property
-    def by_machine(self) -> ModelColumns:
-        """The same from machine code, where there is any: to round-off, which a file of the run does not give."""
-        found = ModelColumns(self.record, self.equations)
-        found.machine, vars(found)["rows"] = self.equations.memory.get("machine code"), self.rows
-        return found if found.machine else self
-
-    @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(self.equations.output_names())
 

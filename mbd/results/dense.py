@@ -14,7 +14,6 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.compile.many import at_inputs
 from mbd.kernel.schemes.dormand_prince import EIGHTH_ORDER
-from mbd.later import later
 from mbd.results.balance import Balance, Flags, Solved, put
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Places
@@ -34,7 +33,6 @@ class Restepping:
     def __init__(self, states: StoredStates, balance: Balance) -> None:
         self.states, self.equations, self.balance = states, states.equations, balance
         self.charts, self.onto = Charts.of(states.equations), Projection.of(balance)
-        self.steps = later("run: steps taken again")(states)
 
     @staticmethod
     def serves(states: StoredStates) -> bool:
@@ -57,16 +55,12 @@ class Restepping:
         there, near = self._by_machine(rows, mine) or self._by_equations(rows, mine)
         new: dict[str, Any] = {name: put(getattr(found, name), inside, getattr(there, name)) for name in CHANGED}
         found = replace(found, **new)
-        beside = put(np.zeros(len(inside), dtype=bool), inside, near)
-        return self._smoothed(rows, places, found, beside) if near.any() else found
+        inside[inside] = near
+        return self._smoothed(rows, places, found, inside) if near.any() else found
 
     def _by_machine(self, rows: Rows, places: Places) -> tuple[Rows, Flags] | None:
         """The same at places between rows, and which lie next to singular configurations; None without code."""
-        if self.steps is None:
-            return None
-        begin = rows.part(places.lower)
-        ends = (self.states.all_inputs(each)["t"] for each in (begin, replace(begin, time=places.time)))
-        taken = self.steps(rows, places, *ends)
+        taken = None if self.balance.between is None else self.balance.between.stepped(rows, places)
         if taken is None:
             return None
         there, sizes = taken
@@ -94,6 +88,15 @@ class Restepping:
         between = self.states.grid.between(rows, places, self.states.q_rate, True, self.charts)
         new: dict[str, Any] = {name: put(getattr(found, name), near, getattr(between, name)[near]) for name in CHANGED}
         return replace(found, **new)
+
+    def stepped(self, rows: Rows, places: Places) -> tuple[Matrix, Vector]:
+        """(q, v, z) after steps from the rows before places, and the least change of log |det| at their stages."""
+        taken = None if self.balance.between is None else self.balance.between.stepped(rows, places)
+        if taken is None:
+            begin = rows.part(places.lower)
+            return self._stepped(begin, (places.time - begin.time)[:, None])
+        there, sizes = taken
+        return np.hstack([there.q, there.v, there.z]), np.min(sizes[:, :-2], axis=1) - sizes[:, 0]
 
     def _stepped(self, begin: Rows, h: Matrix) -> tuple[Matrix, Vector]:
         """(q, v, z) after a step of h (k, 1) from each of the rows, and the least change of log |det| at its stages.

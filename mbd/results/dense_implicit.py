@@ -60,7 +60,7 @@ class LedSteps:
         """States, accelerations and multipliers at places in the intervals `which`, numbered by `back`."""
         theta, begin = places.theta[:, None], rows.part(places.lower)
         with np.errstate(all="ignore"):
-            state, _ = self.steps._stepped(begin, theta * places.step[:, None])
+            state, _ = self.steps.stepped(rows, places)
         q, v, z = self.steps._parts(begin, state + theta * off[back])
         here = self.steps._rates(replace(begin, time=places.time, q=q, v=v, z=z))
         first, last = (self._unbalanced(rows.part(number)) for number in (which, which + 1))
@@ -87,7 +87,7 @@ class LedSteps:
         begin, end = rows.part(which), rows.part(which + 1)
         step = (end.time - begin.time)[:, None]
         with np.errstate(all="ignore"):
-            whole, least = self.steps._stepped(begin, step)
+            whole, least = self.steps.stepped(rows, Places(end.time, which, which + 1, np.ones(len(which)), step[:, 0]))
             off = np.hstack([end.q, end.v, end.z]) - whole
             n_v = begin.v.shape[1]
             sizes = np.maximum(

@@ -67,7 +67,7 @@ def share(run: Trajectory, other: Trajectory, times: Vector) -> tuple[float, str
     drives = list(drives_of(run))
     if not drives or not len(times):
         return 0.0, ""
-    columns, others = run._model_columns.by_machine, other._model_columns.by_machine
+    columns, others = run._model_columns, other._model_columns
     places = columns.grid.places(times)
     ours, theirs = columns.between(places).lam, others.between(others.grid.places(times)).lam
     apart = np.max(np.abs(ours - theirs)[:, drives], axis=0, initial=0.0)
@@ -83,7 +83,7 @@ def own_share(run: Trajectory) -> tuple[float, str]:
     drives = list(drives_of(run))
     if not drives or len(run.time) < 3:
         return 0.0, ""
-    columns, lam = run._model_columns.by_machine, run.record.lam[:, drives]
+    columns, lam = run._model_columns, run.record.lam[:, drives]
     step = np.diff(run.time)
     bent = np.max(np.abs(np.diff(lam, 2, axis=0)), axis=1, initial=0.0)
     bent[(step[1:] == 0.0) | (step[:-1] == 0.0)] = 0.0  # rows before and behind an event
@@ -136,7 +136,7 @@ def is_wholly_driven(run: Trajectory) -> bool:
     equations = run.record.equations
     if equations is None or not drives_of(run):
         return False
-    columns, bilateral = run._model_columns.by_machine, list(equations.bilateral)
+    columns, bilateral = run._model_columns, list(equations.bilateral)
     chosen = np.unique(np.linspace(0, len(run.time) - 1, MAX_SAMPLES).astype(np.intp))
     M, _, _, B, *_ = columns.balance.terms_at(columns.rows.part(chosen))
     weight = np.sqrt(np.maximum(np.einsum("kii->ki", M), 0.0))[:, : equations.n_v]

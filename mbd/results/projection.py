@@ -22,7 +22,7 @@ import numpy as np
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import DIRECT_PIVOT_RTOL, EQUAL_RTOL, ROUND_OFF_RTOL
-from mbd.results.balance import Balance, Flags, Held, put, saddle
+from mbd.results.balance import Balance, Flags, Held, modes_of, put, saddle
 from mbd.results.charts import Charts
 from mbd.results.polynomials import Index, Places
 from mbd.results.record import Rows
@@ -66,9 +66,9 @@ class Projection:
         if not len(asked):
             return found
         each = np.hstack([found.closed.astype(np.int8), found.phase])[asked]
-        patterns, group = np.unique(each, axis=0, return_inverse=True)
+        patterns, group = modes_of(each)
         modes = [
-            _Mode(np.flatnonzero(group.ravel() == number), *self._basis(held))
+            _Mode(np.flatnonzero(group == number), *self._basis(held))
             for number, held in enumerate(map(self.balance.rows_in, patterns)) if held.kept
         ]  # fmt: skip
         if not modes:

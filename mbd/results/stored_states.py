@@ -30,12 +30,14 @@ END_RTOL = 8.0 * float(np.finfo(float).eps)
 class StoredStates:
     """States at the rows of a run, with what contacts and turns hold there."""
 
-    machine: Any = None
-    """Layout, common programs and `accelerations` in machine code, where results need not be those of numpy."""
-
     def __init__(self, record: Record, equations: Equations) -> None:
         self.record, self.equations = record, equations
         self.grid = Grid(record.time)
+
+    @property
+    def machine(self) -> Any:
+        """Layout, common programs and `accelerations` in machine code; None where there is none, as for a file."""
+        return getattr(self.equations, "memory", {}).get("machine code")
 
     @cached_property
     def rows(self) -> Rows:

@@ -17,7 +17,7 @@ def compare(run: mbd.Trajectory) -> int:
     steps = columns._steps
     if steps is None or len(run.time) < 2:
         return 0
-    assert steps.steps is not None
+    assert steps.balance.between is not None
     times = np.random.default_rng(0).uniform(run.time[0], run.time[-1], 60)
     places = columns.grid.places(times)
     places = places.part(np.flatnonzero(places.step > 0.0))

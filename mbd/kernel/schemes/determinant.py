@@ -18,7 +18,7 @@ def note_determinant(K: Kernel, stage: int) -> None:
     if K.n_active == 0:
         return
     stages = K.n_nodes + 1
-    place = K.run * (1 + 2 * stages + K.n_q + 2 * K.n + K.n_rows) + 1 + stage
+    place = K.run * (2 + 2 * stages + K.n_q + 2 * K.n + K.n_rows) + 2 + stage
     size = K.n + K.n_active
     K.ends[place] = 0.0
     if not factor_saddle(K, K.n_active, False, DIRECT_PIVOT_RTOL):

@@ -1,9 +1,13 @@
-"""Steps of an explicit scheme taken again from stored rows, many in one call, for states between the rows of a run.
+"""States between the rows of a run, many in one call: steps of an explicit scheme from stored rows, and balances.
 
 A line of `starts` is a step: number of its row, t and the time of its end, q, (v, z), (v̇, ż), λ, anchors and closed
-contacts of the row. Its line of `ends` begins with the status, then tells the determinants of [M R; B 0] at the row, at
-the stages and at the end, parts first and then the powers of `FAR` that they are to be multiplied by; then q, (v, z),
-(v̇, ż) and λ at the end. A step of no length tells the determinant at its row alone. Contacts stay as the row has them.
+contacts of the row. Its line of `ends` begins with the status and how many rows depend on others, then tells the
+determinants of [M R; B 0] at the row, at the stages and at the end, parts first and then the powers of `FAR` that they
+are to be multiplied by; then q, (v, z), (v̇, ż) and λ at the end. Contacts stay as the row has them.
+
+A step of no length asks for the determinant and the consistent (v̇, ż) and λ at its row, which may be any state, and
+where lines of the log are kept, for M and f in the place of one. Which rows depend on others is judged at the first
+of neighbouring lines of one mode.
 """
 
 from mbd.kernel.algebra.redundancy import find_dependent
@@ -12,39 +16,29 @@ from mbd.kernel.hooks import scheme_start, scheme_step
 from mbd.kernel.records import Kernel
 from mbd.kernel.schemes.determinant import note_determinant
 from mbd.kernel.stepping.candidate import carry
-from mbd.kernel.stepping.restart import active_rows, evaluate, stepping_rows
+from mbd.kernel.stepping.restart import active_rows, consistent, evaluate, stepping_rows
 from mbd.kernel.stepping.starting import find_mode
 
 __all__ = ["steps_again"]
 
 
 def steps_again(K: Kernel) -> int:
-    """All steps that are left; DONE, or NEW_MODE before one whose mode has no code."""
+    """All lines that are left; DONE, or NEW_MODE before one whose mode has no code."""
     while K.run < K.n_runs:
-        width = 3 + K.n_q + 2 * K.n + K.n_rows + K.n_anchors + K.n_contacts
-        o = K.run * width
-        status = 0
-        if K.begun != int(K.starts[o]) + 1:
-            status = load_row(K, o)
-            if status == NEW_MODE:
-                return NEW_MODE
-        h = K.starts[o + 2] - K.time
-        if status == 0 and h == 0.0:
-            evaluate(K, K.time, K.q, K.y)
-            note_determinant(K, 0)
-        elif status == 0:
-            status = scheme_step(K, h, K.starts[o + 2])
-            if status == 0:
-                note_determinant(K, K.n_nodes)
+        o = K.run * (3 + K.n_q + 2 * K.n + K.n_rows + K.n_anchors + K.n_contacts)
+        if K.begun != int(K.starts[o]) + 1 and not load_row(K, o):
+            return NEW_MODE
+        status = balance(K) if K.starts[o + 2] == K.time else step_from_row(K, K.starts[o + 2])
         write_end(K, status)
         K.run += 1
     return DONE
 
 
-def load_row(K: Kernel, o: int) -> int:
-    """The row of a line as the accepted state, with the scheme started from it; 0, NEW_MODE or a failure."""
+def load_row(K: Kernel, o: int) -> bool:
+    """The row of a line as the accepted state; false where its mode has no code."""
     same = K.begun > 0
     K.begun = 0
+    K.restart_due = 1
     K.time = K.starts[o + 1]
     if K.n_parameters > 0:
         carry(K.params, K.given_parameters, K.run * K.n_parameters, K.n_parameters, False)
@@ -62,20 +56,45 @@ def load_row(K: Kernel, o: int) -> int:
         find_dependent(K, active_rows(K, K.closed))
         K.n_active = stepping_rows(K)
         K.mode_id = find_mode(K)
-        if K.mode_id < 0:
-            return NEW_MODE
-    status = scheme_start(K)
-    if status == 0:
+    if K.mode_id >= 0:
         K.begun = int(K.starts[o]) + 1
+    return bool(K.mode_id >= 0)
+
+
+def balance(K: Kernel) -> int:
+    """Consistent rates and multipliers at the accepted state as those of the candidate; 0, or a failure."""
+    status = consistent(K, K.time, K.q, K.y)
+    note_determinant(K, 0)
+    if K.most_lines > 0:
+        count = K.n * (K.n + 1)
+        carry(K.acc, K.lines, K.run * count, count, True)
+    carry(K.q, K.q1, 0, K.n_q, True)
+    carry(K.y, K.y1, 0, K.n, True)
+    carry(K.jump, K.rate1, 0, K.n, True)
+    carry(K.impulse, K.lam1, 0, K.n_rows, True)
+    return status
+
+
+def step_from_row(K: Kernel, t1: float) -> int:
+    """A step from the accepted state, from which the scheme is started if it is not yet; 0, or a failure."""
+    status = 0
+    if K.restart_due == 1:
+        status = scheme_start(K)
+        K.restart_due = 0 if status == 0 else 1
+    if status == 0:
+        status = scheme_step(K, t1 - K.time, t1)
+    if status == 0:
+        note_determinant(K, K.n_nodes)
     return status
 
 
 def write_end(K: Kernel, status: int) -> None:
     """The line of the present step among the ends, but for its determinants."""
     count = 2 * (K.n_nodes + 1)
-    o = K.run * (1 + count + K.n_q + 2 * K.n + K.n_rows)
+    o = K.run * (2 + count + K.n_q + 2 * K.n + K.n_rows)
     K.ends[o] = float(status)
-    place = carry(K.q1, K.ends, o + 1 + count, K.n_q, True)
+    K.ends[o + 1] = float(K.n_dropped)
+    place = carry(K.q1, K.ends, o + 2 + count, K.n_q, True)
     place = carry(K.y1, K.ends, place, K.n, True)
     place = carry(K.rate1, K.ends, place, K.n, True)
     carry(K.lam1, K.ends, place, K.n_rows, True)

@@ -104,7 +104,7 @@ def _named(run: Trajectory, other: Trajectory, names: tuple[str, ...], pairs: Ma
     shifted, beside = pairs.pairs + pairs.late, INSTANT_RTOL * (end - float(run.time[0]))
     times = np.concatenate([_rows(run, end)[:-1], _some_middles(run, end)])
     times = times[apart(times, shifted, beside)]
-    both = (run._model_columns.by_machine, other._model_columns.by_machine)
+    both = (run._model_columns, other._model_columns)
     ours, theirs = (columns.at_places(names, columns.grid.places(times)) for columns in both)
     apart_by = {name: float(np.max(np.abs(a - b), initial=0.0)) for name, a, b in zip(names, ours, theirs, strict=True)}
     if not pairs.late:
@@ -195,7 +195,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     """Coordinates at places (k, n_q), and where they are known well enough (k,)."""
     record, sure = columns.record, np.ones(len(places.time), dtype=bool)
     if columns.equations.compose is not None:
-        return np.asarray(columns.by_machine.between(places, forces=False).q), sure
+        return np.asarray(columns.between(places, forces=False).q), sure
     if not record.extension.uses_accelerations:
         return quintic(places, record.q, record.v, record.a), sure
     known = (record.q, record.v, record.a)
@@ -210,7 +210,7 @@ def _positions(columns: ModelColumns, places: Places, accuracy: float) -> tuple[
     sure[again] = False
     if len(again) > MAX_DOUBTFUL_SHARE * len(sure) and Restepping.serves(columns):
         again = again[np.argsort(-doubt[again], kind="stable")[:16]]
-        q[again], sure[again] = columns.by_machine.between(places.part(again), forces=False).q, True
+        q[again], sure[again] = columns.between(places.part(again), forces=False).q, True
     elif len(again) > MAX_DOUBTFUL_SHARE * len(sure):
         sure[again] = True  # the polynomials are what there is
     return q, sure
