@@ -122,18 +122,23 @@ class Balance:
 
     def _by_machine(self, rows: Rows, groups: Sequence[tuple[NDArray[np.int8], Any]]) -> Solved | None:
         """The same by machine code; None where a mode has none. Which rows depend on others stored states tell."""
-        chosen, stored = list[int](), self.states.rows
-        for mode, _ in groups:
-            same = np.flatnonzero(np.all(stored.closed == mode[: stored.closed.shape[1]], axis=1))
-            if not len(same):
-                return None
-            chosen.append(int(same[len(same) // 2]))
-        found = self.between.balanced(rows, stored.part(np.array(chosen, dtype=np.intp)))
+        samples = self.samples([mode for mode, _ in groups])
+        found = None if samples is None else self.between.balanced(rows, samples)
         if found is None:
             return None
         rate, lam, size, sound, unique, inertia, load = found
         sound = sound & np.isfinite(rate).all(axis=1) & np.isfinite(lam).all(axis=1)
         return Solved(rate, lam, size, sound, unique, inertia, load)
+
+    def samples(self, modes: Sequence[NDArray[Any]]) -> Rows | None:
+        """A stored row of each mode; None if one has none."""
+        chosen, stored = list[int](), self.states.rows
+        for mode in modes:
+            same = np.flatnonzero(np.all(stored.closed == mode[: stored.closed.shape[1]], axis=1))
+            if not len(same):
+                return None
+            chosen.append(int(same[len(same) // 2]))
+        return stored.part(np.array(chosen, dtype=np.intp))
 
     def _groups(self, rows: Rows) -> list[tuple[NDArray[np.int8], Any]]:
         """The modes of states, and where each holds; found once for states that share their flags, as stages do."""

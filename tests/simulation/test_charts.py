@@ -163,7 +163,7 @@ def test_a_run_is_as_accurate_between_its_rows_live_and_from_a_file(scheme, coun
     assert np.log2(errors[0] / errors[1]) > order - 0.25
     run.save(tmp_path / "run.mbd")
     saved = mbd.load(tmp_path / "run.mbd")
-    assert [saved.at(between)[name] for name in (*NAMES, *SPINS)] == found.tolist()
+    assert [saved.at(between)[name] for name in (*NAMES, *SPINS)] == pytest.approx(found.tolist(), rel=1e-14, abs=1e-14)
     assert unit("ball.spin x", saved.facts) == "rad/s"
     assert unit("ball.spin x.acceleration", saved.facts) == "rad/s²"
 

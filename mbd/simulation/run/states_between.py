@@ -70,26 +70,43 @@ class StatesBetween:
 
         (v̇, ż), λ, log |det|, where these were found, where no row depends on others, M and f; or None.
         """
-        modes = np.vstack([samples.closed, rows.closed])
-        _, mode = modes_of(modes)
-        number = np.arange(len(modes))
-        time = np.concatenate([self._time(samples), self._time(rows)])
-        lines = np.vstack([
-            _lines(number[: len(samples)], time[: len(samples)], time[: len(samples)], samples),
-            _lines(number[len(samples) :], time[len(samples) :], time[len(samples) :], rows),
-        ])  # fmt: skip
-        order = np.lexsort((number, mode))
-        taken = self._taken(lines[order], np.concatenate([samples.source, rows.source])[order], forces=True)
+        taken = self._in_modes(rows, samples, self._time(rows), forces=True)
         if taken is None:
             return None
-        ends, forces = (np.empty_like(each) for each in taken)
-        ends[order], forces[order] = taken
-        good, dropped, sizes, states = self._read(ends[len(samples) :])
+        good, dropped, sizes, states = self._read(taken[0])
         n = self.mechanism.layout.n
         *_, lam = _parts(rows, states)
         rate = states[:, states.shape[1] - lam.shape[1] - n : states.shape[1] - lam.shape[1]]
-        inertia, load = np.split(forces[len(samples) :], [n * n], axis=1)
+        inertia, load = np.split(taken[1], [n * n], axis=1)
         return rate, lam, sizes[:, 0], good, dropped == 0, inertia.reshape(-1, n, n), load
+
+    def led(self, rows: Rows, samples: Rows, aim: Matrix, aim_rate: Matrix) -> tuple[Matrix, Matrix, Any] | None:
+        """Positions and velocities with h = `aim` and ḣ = `aim_rate`, and where they were found; or None."""
+        taken = self._in_modes(replace(rows, lam=aim), samples, np.full(len(rows), -np.inf), aim_rate)
+        if taken is None:
+            return None
+        good, _, _, states = self._read(taken[0])
+        q, v, *_ = _parts(rows, states)
+        return q, v, good
+
+    def _in_modes(
+        self, rows: Rows, samples: Rows, end: Vector, aims: Matrix | None = None, forces: bool = False
+    ) -> tuple[Matrix, Matrix] | None:
+        """What the kernel answers for states, mode by mode, each behind its sampled row; None where one has no code."""
+        _, mode = modes_of(np.vstack([samples.closed, rows.closed]))
+        number, first = np.arange(len(samples) + len(rows)), len(samples)
+        begin = self._time(samples)
+        lines = np.vstack([
+            _lines(number[:first], begin, begin, samples), _lines(number[first:], self._time(rows), end, rows, aims),
+        ])  # fmt: skip
+        order = np.lexsort((number, mode))
+        taken = self._taken(lines[order], np.concatenate([samples.source, rows.source])[order], forces)
+        if taken is None:
+            return None
+        ends, loads = (np.empty_like(each) for each in taken)
+        ends[order] = taken[0]
+        loads[order if forces else slice(None)] = taken[1]
+        return ends[first:], loads[first:]
 
     def _time(self, rows: Rows, time: Vector | None = None) -> Vector:
         """As steps begin and end there, beside jumps."""
@@ -121,7 +138,7 @@ class StatesBetween:
         v.most_lines = int(forces)
         if parameters.ndim == 2:
             v.given_parameters, v.n_parameters = np.ascontiguousarray(parameters).ravel(), parameters.shape[1]
-        v.closed[: v.n_contacts] = lines[0, lines.shape[1] - v.n_contacts :]
+        v.closed[: v.n_contacts] = lines[0, 3 + v.n_q + 2 * v.n + v.n_rows + v.n_anchors :][: v.n_contacts]
         v.run, v.n_runs, v.begun = 0, len(lines), 0
         try:
             while stepper.march_many(STEPS_AGAIN) == codes.NEW_MODE:
@@ -132,10 +149,11 @@ class StatesBetween:
         return ends, loads
 
 
-def _lines(number: Any, begin: Vector, end: Vector, rows: Rows) -> Matrix:
+def _lines(number: Any, begin: Vector, end: Vector, rows: Rows, aims: Matrix | None = None) -> Matrix:
     """Lines of starts of the kernel."""
     return np.column_stack([
         number, begin, end, rows.q, rows.v, rows.z, rows.a, rows.s, rows.lam, rows.anchors, rows.closed,
+        np.zeros_like(rows.lam) if aims is None else aims,
     ])  # fmt: skip
 
 
