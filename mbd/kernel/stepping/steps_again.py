@@ -17,7 +17,7 @@ from mbd.kernel.algebra.redundancy import find_dependent
 from mbd.kernel.algebra.saddle import factor_saddle
 from mbd.kernel.codes import DONE, NEW_MODE, NOT_CONVERGED, SINGULAR
 from mbd.kernel.hooks import scheme_start, scheme_step
-from mbd.kernel.records import Kernel, Reals
+from mbd.kernel.records import DependentRows, Kernel, Reals
 from mbd.kernel.schemes.determinant import note_determinant
 from mbd.kernel.stepping.candidate import carry
 from mbd.kernel.stepping.restart import active_rows, consistent, displace, evaluate, stepping_rows
@@ -123,7 +123,7 @@ def lead(K: Kernel, o_aim: int) -> int:
     return 0
 
 
-def correct(K: Kernel, o_off: int, aims: Reals, o_aim: int) -> bool:
+def correct(K: DependentRows, o_off: int, aims: Reals, o_aim: int) -> bool:
     """The least change x with ``B x = h* − h``, or of ḣ, at the candidate, in K.rhs; false without a pivot."""
     evaluate(K, K.time, K.q1, K.y1)
     if not factor_saddle(K, K.n_active, True, DIRECT_PIVOT_RTOL):
