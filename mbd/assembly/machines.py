@@ -93,12 +93,9 @@ def store_first(
     mechanism: Mechanism, time: float, q: Vector, y: Vector, parameters: Vector, anchors: Vector,
     machines: Sequence[Machine] | None = None,
 ) -> None:  # fmt: skip
-    """Store into anchors what machines store at a start; the states that they are in stay."""
-    machines = mechanism.equations.machines if machines is None else machines
-    if not machines:
-        return
-    captured = mechanism.acceleration_terms(time, q, y, parameters, anchors).captured
-    for machine in machines:
+    """Store into anchors what machines store at a start, one after the other; the states that they are in stay."""
+    for machine in mechanism.equations.machines if machines is None else machines:
+        captured = mechanism.acceleration_terms(time, q, y, parameters, anchors).captured
         anchors[list(machine.first)] = captured[list(machine.first)]
         if not machine.first:  # a law that samples forces: its first sample is due at the start
             anchors[list(machine.times)] = time

@@ -23,15 +23,15 @@ def stored_at_start(programs: Programs, motion: Motion, mode: Mode) -> Motion:
         for turn, number in machine.own:
             if number in columns:
                 of_before[machine.anchors[turn]] = motion.tangent.p[columns[number]]
-    values, slopes = programs.stored(replace(motion, anchors=before).at(mode, *zero))
-    found = slopes @ motion.with_tangent(anchors=of_before).tangent.stacked(programs.columns)
-    stored = [anchor for machine in machines for anchor in machine.first]
-    before[stored], of_anchors = values[stored], motion.tangent.anchors.copy()
-    fresh = np.abs(before - motion.anchors) <= ROUND_OFF_RTOL * np.maximum(1.0, np.abs(before))
-    for machine in machines:
-        if np.all(fresh[list(machine.anchors[1:])]):  # it begins here
-            own = [machine.anchors[turn] for turn, _ in machine.own]
+    of_anchors = motion.tangent.anchors.copy()
+    for machine in machines:  # each knows what those before it have stored
+        first, all_, own = list(machine.first), list(machine.anchors[1:]), [machine.anchors[k] for k, _ in machine.own]
+        values, slopes = programs.stored(replace(motion, anchors=before).at(mode, *zero))
+        found = slopes @ motion.with_tangent(anchors=of_before).tangent.stacked(programs.columns)
+        before[first], of_before[first] = values[first], found[first]
+        fresh = np.abs(before - motion.anchors) <= ROUND_OFF_RTOL * np.maximum(1.0, np.abs(before))
+        if np.all(fresh[all_]):  # it begins here
             of_anchors[own] = of_before[own]
-    stored = [anchor for anchor in stored if fresh[anchor]]
-    of_anchors[stored] = found[stored]
+        stored = [anchor for anchor in first if fresh[anchor]]
+        of_anchors[stored] = found[stored]
     return motion.with_tangent(anchors=of_anchors)

@@ -288,3 +288,61 @@ def test_what_falls_on_one_instant_follows_the_order_of_the_model_however_its_su
     at_turns = [(heard, phase) for t, heard, phase in seen if min(abs(t - turn) for turn in turns) < 1e-9]
     at_turns.append((run["inner.seen"][-1], run["phase.index"][-1]))
     assert [heard == phase for heard, phase in at_turns] == [not law_first] * len(at_turns)
+
+
+@pytest.mark.parametrize("outer_first", [True, False])
+def test_cascades_are_an_integration_beside_them_and_have_its_derivatives(outer_first: bool) -> None:
+    """A slow law gives a fast one what it follows, also in the first sample; samples of both fall on one instant."""
+
+    def end(angle: float) -> list[float]:
+        y, follows = np.array([angle, 0.0]), 0.0
+        for k in range(60):
+            new = 0.5 * y[0] if k % 5 == 0 else follows
+            torque = -3.0 * (y[0] - (new if outer_first else follows)) - 0.1 * y[1]
+            follows = new
+
+            def rates(t: float, y: Any, torque: float = torque) -> list[float]:
+                return [y[1], (torque - 2.0 * 9.81 * 0.2 * np.sin(y[0])) / INERTIA]
+
+            y = solve_ivp(rates, (0.0, 0.01), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        return list(y)
+
+    model, _ = arm()
+    model = model.without("PID")
+    laws = [
+        mbd.SampledLaw("outer", 0.05, {"u": lambda q: 0.5 * q}, arguments=["hinge.angle"]),
+        mbd.SampledLaw("inner", 0.01, {"motor.torque": lambda u, q, v: -3.0 * (q - u) - 0.1 * v},
+                       arguments=["outer.u", "hinge.angle", "hinge.rate"]),
+    ]  # fmt: skip
+    model.apply(*laws[:: 1 if outer_first else -1])
+    start, of = mbd.assemble(model, {"hinge.angle": 0.9}), ["hinge.angle", "hinge.rate"]
+    scheme = {"dt": 0.01, "until": 0.6}
+    found = mbd.sensitivities(model, start, mbd.RungeKutta853(), wrt=["hinge.angle"], of=of, **scheme)
+    np.testing.assert_allclose([found.run.final[name] for name in of], end(0.9), rtol=1e-9)
+    slope = (np.array(end(0.9 + 1e-5)) - np.array(end(0.9 - 1e-5))) / 2e-5
+    np.testing.assert_allclose([found[name, "hinge.angle"] for name in of], slope, rtol=1e-7)
+    with pytest.raises(mbd.CapabilityError, match="with no time between"):
+        mbd.sensitivities(model, start, mbd.RungeKutta853(), wrt=["outer.period"], of=of, **scheme)
+
+
+@pytest.mark.parametrize("waits", ["angle", "number"])
+def test_timers_that_wait_for_what_they_remember_move_with_it(waits: str) -> None:
+    """Two timers fall on one instant by chance: one waits 0.2 s, the other 0.2 s as stored from the motion or not."""
+    model, _ = arm()
+    model = model.without("PID")
+    ways = [mbd.Transition("wait", "push", after=0.2)], [mbd.Transition("wait", "push", after="second.for")]
+    stored: dict[str, Any] = {"remembers": {"for": "hinge.angle"}} if waits == "angle" else {"numbers": {"for": 0.2}}
+    model.apply(mbd.Mode("first", ("wait", "push"), transitions=ways[0]),
+                mbd.Mode("second", ("wait", "push"), transitions=ways[1], **stored),
+                mbd.Motor("push", model.joints[0], torque={"push": lambda: 0.4}, by="second",
+                          arguments=[]))  # fmt: skip
+    start, of = mbd.assemble(model, {"hinge.angle": 0.2}), ["hinge.angle"]
+    scheme: dict[str, Any] = {"dt": 0.01, "until": 0.5, "of": of}
+    of_angle = lambda: mbd.sensitivities(model, start, mbd.RungeKutta853(), wrt=["hinge.angle"], **scheme)  # noqa: E731
+    if waits == "angle":
+        with pytest.raises(mbd.CapabilityError, match="with no time between"):
+            of_angle()
+        return
+    ends = [mbd.simulate(model, mbd.assemble(model, {"hinge.angle": 0.2 + h}), mbd.RungeKutta853(), dt=0.01,
+                         until=0.5).final["hinge.angle"] for h in (-1e-5, 1e-5)]  # fmt: skip
+    np.testing.assert_allclose(of_angle()["hinge.angle", "hinge.angle"], (ends[1] - ends[0]) / 2e-5, rtol=1e-7)

@@ -15,6 +15,7 @@ from mbd.sensitivity.passed import Instant
 from mbd.sensitivity.programs import Programs, State
 from mbd.sensitivity.run_data import RunRows, refused, sided
 from mbd.sensitivity.tangent.follow_impacts import EDGE, NO_REBOUND, TIE
+from mbd.tape.derivatives import live
 
 AtRow = Callable[[int], tuple[Motion, Rates]]
 MIN_IMPULSE_RATIO = 1e-3
@@ -48,7 +49,8 @@ def refuse_turning_points(
     found, lead = list[Instant](), 0
     for row in order:
         if row not in fired:
-            found.append(_beside(rows, programs, at_row, lead, row))
+            still = not any(np.any(each.of_time) for each in found)
+            found.append(_beside(rows, programs, at_row, lead, row, still))
             continue
         lead = row
         found.append(Instant(fired[row].name, float(rows.ends[row - 1]), time_at(row - 1)))
@@ -65,11 +67,12 @@ def _is_again(rows: RunRows, row: int) -> bool:
     )
 
 
-def _beside(rows: RunRows, programs: Programs, at_row: AtRow, lead: int, row: int) -> Instant:
+def _beside(rows: RunRows, programs: Programs, at_row: AtRow, lead: int, row: int, still: bool) -> Instant:
     """The event of a row right after that of row `lead`, at one instant with it.
 
-    It moves with it where its guard is the gap of a contact that has just closed, or has jumped over zero there. One
-    that changes nothing may come by chance: its own instant is not known then, unless both move alike.
+    It moves with it where its guard is the gap of a contact that has just closed, or has jumped over zero there; timers
+    and samples do where no event moves (`still`) nor what their times are made of. One that changes nothing may come by
+    chance: its own instant is not known then, unless both move alike.
     """
     equations, event, time = programs.equations, rows.events[row][0], float(rows.record.time[row])
     numbers = [e for e, guard in enumerate(equations.guards) if guard.name == event.name]
@@ -83,6 +86,8 @@ def _beside(rows: RunRows, programs: Programs, at_row: AtRow, lead: int, row: in
         values = [_guard(rows, programs, each, at_row(each), place) for each in (lead - 1, row - 1)]
         if all(abs(value) > noise for value, noise, _, _ in values):
             return Instant(event.name, time, of_time)
+        if still and equations.guards[numbers[0]].is_timer and not _moves(programs, numbers[0]):
+            return Instant(event.name, time, of_time)
         if not rows.controllers and not acts(equations, numbers[0], rows.record.settings["until"]):
             _, _, change, growth = values[0]
             size = np.max(np.maximum(np.abs(change - growth * of_time), np.abs(growth * of_time)))
@@ -91,6 +96,23 @@ def _beside(rows: RunRows, programs: Programs, at_row: AtRow, lead: int, row: in
     raise sided(
         f"{event.name!r} happens at t = {time:.9g} s right after another event or the start, with no time between"
     )
+
+
+def _moves(programs: Programs, e: int) -> bool:
+    """Whether a timer or instants that machines hold are made of the motion or of parameters that are asked for."""
+    machines, waiting, seen = programs.equations.machines, [programs.equations.guards[e].value], set[tuple[Any, ...]]()
+    captured = {anchor: node for m in machines for anchor, node in zip(m.anchors, m.captured, strict=True)}
+    own = {m.anchors[turn]: number for m in machines for turn, number in m.own}
+    waiting += [captured[anchor] for m in machines for anchor in m.times]
+    while waiting:
+        inputs = {node.data for node in live(waiting) if node.op == "input"} - seen
+        anchors = [number for kind, number in inputs if kind == "anchor"]
+        numbers = [number for kind, number in inputs if kind == "p"] + [own[each] for each in anchors if each in own]
+        if {kind for kind, _ in inputs} - {"anchor", "p", "t"} or set(numbers) & set(programs.places):
+            return True
+        seen |= inputs
+        waiting = [captured[each] for each in anchors if each in captured]
+    return False
 
 
 def _guard(
