@@ -165,13 +165,16 @@ def _other_cut(made: Scene, run: mbd.Trajectory) -> list[str]:
 def _moves_alike(made: Scene, run: mbd.Trajectory, form: Form) -> list[str]:
     """The same motion in another form, within what two thirds of the step change.
 
-    Half of it would change nothing in impacts, whose steps are dt halved until they are short enough.
+    It is the step that most are taken with, which contacts shorten until a larger dt changes nothing. Half of it would
+    change nothing in impacts, whose steps are dt halved until they are short enough.
     """
     names = [name for joint in made.model.joints for name in joint.coordinate_names]
     place, speed = _beginning(made.model, run)
     position, velocity, parameters = place | form.position, speed | form.velocity, form.parameters
+    steps = np.diff(run.time)
+    longest = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else np.inf
     changes: dict[str, Any] = (
-        {"dt": made.options["dt"] / 1.5} if "dt" in made.options else {"tol": made.options["tol"] / 4.0}
+        {"dt": min(made.options["dt"], longest) / 1.5} if "dt" in made.options else {"tol": made.options["tol"] / 4.0}
     )
     finer = run_of(made, **changes)
     if not finer.success or _happened(made, finer) != _happened(made, run):

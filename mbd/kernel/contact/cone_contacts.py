@@ -17,43 +17,64 @@ from mbd.kernel.contact.cone_problem import CONE_RTOL, EQUAL, PUSH, STEADY, cone
 from mbd.kernel.contact.cones import aim, follows, set_sticking
 from mbd.kernel.records import Balance, ContactForces, Frictions
 from mbd.kernel.stepping.loads import evaluate_loaded, limit_of
-from mbd.kernel.stepping.restart import active_rows, load_accelerations
+from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, active_rows, load_accelerations
 from mbd.kernel.tangent_rules import takes_part
+
+LOAD_RTOL = 1e-6
+"""Change of multipliers, of the largest, below which the limits that follow them are found."""
 
 
 def solve_cones(K: Balance, level: int, allowed: float) -> int:
     """1 if all that may choose obeys its law, with K.jump, K.impulse and branches in place; 0 if nothing was found.
 
-    Then everything is as it was. The levels, and what may choose, are those of `complementarity`; laws may be missed by
-    the part `allowed` of the largest impulse: `CONE_RTOL`, or more where branches alone are asked for.
+    Then branches are as they were. The levels, and what may choose, are those of `complementarity`; laws may be missed
+    by the part `allowed` of the largest impulse: `CONE_RTOL`, or more where branches alone are asked for. Limits that
+    follow loads of joints are found for branches alone, by a fixed point: those of the solution before, the first
+    without loads, so that each of its problems has one solution (Nečas, Jarušek & Haslinger 1980, Boll. Unione Mat.
+    Ital. 17:796).
     """
-    if K.loaded == 1:
+    if K.loaded == 1 and allowed <= CONE_RTOL:
         return 0
     keep_branches(K, True)
     count = gather_unknowns(K)
     if count == 0:
         return 0
     hold_others(K)
-    find_limits_apart(K, level, count)
+    if K.loaded == 1:
+        K.impulse[: K.n_rows] = 0.0
+    found = False
+    for turn in range(MAX_LOAD_ITERATIONS if K.loaded == 1 else 1):
+        change = find_limits_apart(K, level, count)
+        if turn > 0 and change <= LOAD_RTOL:
+            break
+        found = solve_apart(K, level, count, allowed)
+        if not found:
+            break
+    if not found:
+        keep_branches(K, False)
+        return 0
+    residual = K.cone_work[0]
+    take_cone_branches(K, level, count)
+    if residual <= CONE_RTOL:
+        K.cone_residual = max(K.cone_residual, residual)
+    return 1
+
+
+def solve_apart(K: Balance, level: int, count: int, allowed: float) -> bool:
+    """Whether there is a solution with limits that follow the unknown pushes alone; it is then in place."""
     held = load_held(K, level, count)
-    if held >= 0:
-        fill_cones(K, held, count)
-        if K.n_clusters > 1:
-            take_own_units(K, count)
-        cone_solve(
-            K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
-            K.cone_work, K.side_pivots,
-        )  # fmt: skip
-        if K.n_clusters > 1:
-            leave_own_units(K, count)
-        residual = K.cone_work[0]
-        if residual <= allowed and take_impulses(K, level, count):
-            take_cone_branches(K, level, count)
-            if residual <= CONE_RTOL:
-                K.cone_residual = max(K.cone_residual, residual)
-            return 1
-    keep_branches(K, False)
-    return 0
+    if held < 0:
+        return False
+    fill_cones(K, held, count)
+    if K.n_clusters > 1:
+        take_own_units(K, count)
+    cone_solve(
+        K.cone_matrix, count, K.cone_shift, K.cone_found, K.cone_owner, K.cone_twin, K.cone_limit, K.cone_mu,
+        K.cone_work, K.side_pivots,
+    )  # fmt: skip
+    if K.n_clusters > 1:
+        leave_own_units(K, count)
+    return bool(K.cone_work[0] <= allowed and take_impulses(K, level, count))
 
 
 def keep_branches(K: ContactForces, out: bool) -> None:
@@ -132,14 +153,16 @@ def hold_others(K: ContactForces) -> None:
             K.slip[f] = 0.0
 
 
-def find_limits_apart(K: ContactForces, level: int, count: int) -> None:
-    """Limits of frictions without the unknown pushes, into K.cone_limit, and their slopes."""
+def find_limits_apart(K: ContactForces, level: int, count: int) -> float:
+    """Limits of frictions without the unknown pushes, into K.cone_limit, and their slopes; how far loads changed."""
     for k in range(K.n_rows):
         K.loads[k] = (K.given[k] + K.past[k]) if level == 1 else 0.0
+        if K.loaded == 1:
+            K.loads[k] += K.impulse[k]
     for u in range(count):
         if K.cone_owner[u] < 0:
             K.loads[K.cone_rows[u]] = K.given[K.cone_rows[u]] if level == 1 else 0.0
-    evaluate_loaded(K, K.loads)
+    change = evaluate_loaded(K, K.loads)
     for u in range(count):
         f = K.row_friction[K.cone_rows[u]]
         K.cone_limit[u] = limit_of(K, f) if f >= 0 and K.cone_mu[u] >= 0.0 else 0.0
@@ -157,6 +180,7 @@ def find_limits_apart(K: ContactForces, level: int, count: int) -> None:
         if K.cone_normal[c] >= 0:
             K.loads[K.normal[c]] += 1.0
     evaluate_loaded(K, K.loads)
+    return change
 
 
 def load_held(K: Balance, level: int, count: int) -> int:
