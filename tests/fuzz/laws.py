@@ -215,7 +215,7 @@ def _slip(word: mbd.Rolling, bodies: Bodies) -> Array:
 def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
     """Gaps, pushes and friction of contacts; dry friction in joints.
 
-    What the run tells in a note about penetration or pull is not counted.
+    What the run tells in a note about penetration or pull is not counted, nor are rates next to singular poses.
     """
     told, size = bodies.told, size_of(bodies)
     notes = " ".join(map(str, run.stats["notes"]))
@@ -250,7 +250,8 @@ def contacts(found: Faults, bodies: Bodies, acting: Loads, run: Any) -> None:
             )
         found.small("a closed contact touches", word.name, gap.value, HELD * size, closed)
         if located:
-            found.small("a closed contact stays", word.name, rate, HELD * (fast + np.abs(rate)), closed)
+            at_poses = int(run.stats["singular_steps"])
+            found.small("a closed contact stays", word.name, rate, HELD * (fast + np.abs(rate)), closed, told=at_poses)
         if word.slides and gap.tangents and f"{word.name}.friction" in told:
             slipping = np.linalg.norm([np.sum(gap.slip(bodies) * e, axis=1) for _, e in gap.tangents], axis=0)
             mu = _coefficient(word, slipping, told.parameters)
