@@ -137,8 +137,10 @@ class House:
 
 def _statements(node: ast.AST, inside: bool, types: bool) -> Iterator[ast.AST]:
     for child in ast.iter_child_nodes(node):
-        function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-        checker = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)
+        if isinstance(child, ast.expr):
+            continue
+        function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef)
+        checker = isinstance(child, ast.If) and isinstance(child.test, ast.Name) and child.test.id == "TYPE_CHECKING"
         if (inside or not function) and (types or not checker):
             yield child
             yield from _statements(child, inside, types)

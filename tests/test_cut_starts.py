@@ -33,9 +33,10 @@ def places(model, start):
 
 
 @pytest.mark.parametrize("spatial", [False, True])
-def test_what_is_not_named_starts_alike_whatever_joints_are_cut(spatial):
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 8), marks=pytest.mark.slow)])
+def test_what_is_not_named_starts_alike_whatever_joints_are_cut(spatial, seeds):
     compared = 0
-    for seed in range(5):
+    for seed in seeds:
         model = driven(seed, spatial, "auto")
         free = model.joints[-1].coordinate_names
         named = {free[0]: 0.3} if len(model.joints) > 1 and model.joints[-1].is_vector else {}
@@ -45,7 +46,7 @@ def test_what_is_not_named_starts_alike_whatever_joints_are_cut(spatial):
             found = places(other, mbd.assemble(other, named, backend="python"))
             np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8, err_msg=f"{seed} {cut}")
             compared += found.size
-    assert compared > 300
+    assert compared > 60 * len(seeds)
 
 
 def test_a_loss_that_needs_a_reaction_leaves_the_start_as_it_is():

@@ -53,15 +53,17 @@ FILES = sorted(file for file in PACKAGE.rglob("*.py") if file != PACKAGE / "__in
 @cache
 def imports(file: Path) -> set[tuple[str, bool]]:
     """(module, whether inside a function) of every import of ours, those for type checkers only among them."""
-    tree = ast.parse(file.read_text())
-    inside = {id(node) for owner in ast.walk(tree) if isinstance(owner, ast.FunctionDef) for node in ast.walk(owner)}
     found: set[tuple[str, bool]] = set()
-    for node in ast.walk(tree):
+    statements: list[tuple[ast.AST, bool]] = [(ast.parse(file.read_text()), False)]
+    while statements:
+        node, inside = statements.pop()
         if isinstance(node, ast.Import):
-            found |= {(alias.name, id(node) in inside) for alias in node.names}
+            found |= {(alias.name, inside) for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "imports are absolute"
-            found |= {(f"{node.module}.{alias.name}", id(node) in inside) for alias in node.names}
+            found |= {(f"{node.module}.{alias.name}", inside) for alias in node.names}
+        inside = inside or isinstance(node, ast.FunctionDef)
+        statements += [(each, inside) for each in ast.iter_child_nodes(node) if not isinstance(each, ast.expr)]
     return {(name.removeprefix("mbd."), deep) for name, deep in found if name.startswith("mbd.")}
 
 

@@ -31,7 +31,7 @@ def both(model, start, seed, away=0.3):
 
 
 @given(st.sampled_from(list(JOINTS)), st.integers(0, 10**6))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_rates_of_random_trees_are_those_of_the_mass_matrix(joint, seed):
     case = scene("tree", joint, seed)
     mechanism, x, block, found, rates, pull, condition = both(case.model, case.start, seed)
