@@ -202,25 +202,30 @@ def test_a_contact_that_pulls_over_a_step_has_let_go_before_it():
         assert trajectory["floor.force"].min() >= 0.0 and trajectory["floor.gap"].min() > -1e-12
 
 
+@pytest.mark.parametrize(("loss", "speed", "turn"), [(0.1, 2.0, 0.0), (1.5, 0.0, 3.0)], ids=["rest", "release"])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_dry_joint_comes_to_rest_within_a_step_as_where_events_are_located(seed):
-    """Turned around with the friction of before, a light link is driven by it for the rest of the step."""
+def test_a_dry_joint_rests_and_is_released_within_a_step_as_where_events_are_located(seed, loss, speed, turn):
+    """Turned around with the friction of before, a light link is driven by it for the rest of the step.
+
+    Released at the start of the step, before the load reaches the limit, it goes the way that the friction pulls.
+    """
     rng = np.random.default_rng(seed)
     model, end = mbd.Model("dry chain"), None
     for k in range(3):
         link = mbd.Link(f"link {k}", *rng.uniform((0.01, 0.3, 0.1, 1e-4), (1.0, 0.5, 0.2, 1e-2)))
-        loss = mbd.Coulomb(rng.uniform(0.01, 0.1))
-        model.connect(mbd.Revolute(f"hinge {k}", end or model.ground.origin, link.start, loss=loss))
+        law = mbd.Coulomb(rng.uniform(0.1 * loss, loss))
+        model.connect(mbd.Revolute(f"hinge {k}", end or model.ground.origin, link.start, loss=law))
         end = link.end
     model.constrain(mbd.Unilateral("floor", mbd.touchdown(end, mbd.Plane(offset=-10.0))))
-    start = mbd.assemble(model, velocity={f"hinge {k}.angle": rng.uniform(-2.0, 2.0) for k in range(3)})
-    runs = [mbd.simulate(model, start, dt=2e-3, until=0.2, contact=contact) for contact in ("events", "nonsmooth")]
+    velocity = {f"hinge {k}.angle": rng.uniform(-speed, speed) for k in range(3)}
+    start = mbd.assemble(model, {f"hinge {k}.angle": rng.uniform(-turn, turn) for k in range(3)}, velocity)
+    runs = [mbd.simulate(model, start, dt=2e-3, until=0.4, contact=contact) for contact in ("events", "nonsmooth")]
     np.testing.assert_allclose(runs[1].record.q[-1], runs[0].record.q[-1], rtol=0.0, atol=1e-9)
     for part in runs[1].energy.parts:
         assert part.kind != "friction" or np.max(np.diff(part.energy)) < 1e-9
 
 
-@pytest.mark.parametrize("seed", [0, 116, 420, 672])
+@pytest.mark.parametrize("seed", [0, 116, 420, 672, 1201])
 def test_a_dry_joint_of_a_wild_scene_gives_no_energy(seed):
     assert complaints(wild_scene(seed, interpreted=()).run()) == []
 

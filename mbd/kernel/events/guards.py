@@ -228,15 +228,15 @@ def judge(K: Switching, h: float) -> bool:
     for e in range(K.n_guards):
         judge_user(K, e, h)
     for f in range(K.n_frictions):
-        if K.strategy == 0 or comes_to_rest(K, f):
+        if K.strategy == 0 or is_located(K, f):
             judge_friction(K, f, h)
     return bool(K.event_kind >= 0)
 
 
-def comes_to_rest(K: Guards, f: int) -> bool:
-    """Whether friction f is that of a joint in motion: a non-smooth step ends where it rests, or drives it back."""
+def is_located(K: Guards, f: int) -> bool:
+    """Whether friction f is that of a joint that sticks or moves: a non-smooth step ends where that changes."""
     alone = K.friction_contact[f] < 0 and K.group_size[f] == 1
-    return bool(alone and K.slip[f] * K.guards0[K.at_slip + f] > REST_SPEED)
+    return bool(alone and (K.sticks[f] == 1 or K.slip[f] * K.guards0[K.at_slip + f] > REST_SPEED))
 
 
 def rises(g0: float, g1: float, d0: float, d1: float, lost: float, reach: float) -> bool:
