@@ -4,8 +4,6 @@ Python names a wrong keyword but neither what it was to be nor what there is. `e
 first asked of ``mbd``; a call that succeeds costs no more for it than a function around it.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping
 from functools import wraps

@@ -5,8 +5,6 @@ each of the 230 classes that a first step of a walker imports; a process uses th
 class is given placeholders, and the first look at one of them makes the class the dataclass that it would have been.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from collections.abc import Callable

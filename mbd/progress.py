@@ -1,7 +1,5 @@
 """Bars on a terminal or in a notebook."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

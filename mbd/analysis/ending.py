@@ -1,10 +1,8 @@
 """What a run came to: at rest, fallen, walking. Each is said by a rule on the rows, never guessed from names."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +11,7 @@ from mbd.arrays import Vector
 from mbd.equal import EQUAL_RTOL, NOMINAL_RTOL
 from mbd.notebook import Text
 from mbd.results.summary import cost, entries, of_the_swing, strategy
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 FALLEN_HEIGHT_RATIO = 0.5
 """Height over that of the start below which a mechanism has fallen [-]."""

@@ -5,11 +5,9 @@ that heel and toe are one; where there is one such body only, as a wheel of spok
 has left the ground.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +15,7 @@ from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
 from mbd.notebook import table as html_table
 from mbd.results.record import EventRecord
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 SPATIAL = ("solid", "limb", "hinge")
 """Kinds of shapes that runs in space have alone."""

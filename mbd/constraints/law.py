@@ -26,14 +26,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
+from mbd.constraints.measure import Measure
+from mbd.constraints.rules import When
 from mbd.dataclass import dataclass
 from mbd.tape.node import Node, Scalar
-
-if TYPE_CHECKING:
-    from mbd.constraints.measure import Measure
-    from mbd.constraints.rules import When
 
 Hold: TypeAlias = "Callable[[Sequence[Scalar]], Sequence[Scalar]]"
 

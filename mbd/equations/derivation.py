@@ -1,10 +1,8 @@
 """From a model in words to its equations of motion."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from mbd.bodies.algebra import dot, norm
 from mbd.bodies.domains import ParameterCheck
@@ -43,10 +41,8 @@ from mbd.tape.derivatives import gradient, live
 from mbd.tape.functions import cos
 from mbd.tape.node import Node, Scalar
 from mbd.topology.check import require_valid
+from mbd.topology.description import Description
 from mbd.topology.plan import Plan, plan
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
 
 
 @runtime_checkable

@@ -1,10 +1,8 @@
 """Lagrange's equations of a mechanism that is given by its energies."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mbd.constraints.impulse import Impulse
 from mbd.equations import equations as records
@@ -12,6 +10,7 @@ from mbd.equations.contacts import laws
 from mbd.equations.coordinate_scope import CoordinateScope, identifier
 from mbd.equations.dynamics import Work
 from mbd.equations.effects import causes, effect_of
+from mbd.equations.energy_description import EnergyDescription
 from mbd.equations.equations import Effect, Equations, Row
 from mbd.equations.gathered import Gathered
 from mbd.equations.impulses import impulses_of
@@ -27,9 +26,6 @@ from mbd.errors import ModelError, TraceError, nearest
 from mbd.tape.derivatives import gradient, jvp, live
 from mbd.tape.node import Node, Scalar, Tape
 from mbd.tape.tracing import traced_scalar
-
-if TYPE_CHECKING:
-    from mbd.equations.energy_description import EnergyDescription
 
 
 class Lowering:

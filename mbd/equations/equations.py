@@ -23,15 +23,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from mbd.configuration import Configuration
 from mbd.dataclass import dataclass
+from mbd.equations.composite_mass import MassLoop
 from mbd.equations.shapes import Shape
 from mbd.tape.node import Node, Table, Tape
-
-if TYPE_CHECKING:
-    from mbd.equations.composite_mass import MassLoop
 
 
 @dataclass(frozen=True)

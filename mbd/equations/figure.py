@@ -1,16 +1,11 @@
 """The stick figure of a model: which frames of each body to join by lines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.link import Link
 from mbd.bodies.marker import Marker
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
+from mbd.topology.description import Description
 
 Segments = list[tuple[str, tuple[str, ...]]]
 """(body, its frames in the order of a line); one frame alone is a point. Places are the results 'body.frame.x', …"""

@@ -1,10 +1,8 @@
 """Contacts that never open, and wheels that roll, as pictures show them: where the ground pushes, and which way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mbd.bodies.algebra import total
 from mbd.bodies.base import Frame
@@ -14,9 +12,7 @@ from mbd.constraints.disks import DiskTouchdown
 from mbd.constraints.rolling import Rolling
 from mbd.constraints.sphere_touchdown import SphereTouchdown
 from mbd.constraints.touchdown import Touchdown
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
+from mbd.topology.description import Description
 
 WAYS = ("arm", "normal", "forward", "sideways")
 """Vectors of each: from the center to where it touches [m], and three directions of the ground."""

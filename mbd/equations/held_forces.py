@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import partial
-from typing import TYPE_CHECKING
 
 from mbd.constraints.base import Constraint
 from mbd.constraints.law import Law
@@ -24,10 +23,8 @@ from mbd.equations.results import offer_contacts, offer_rows
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
+from mbd.topology.description import Description
 from mbd.topology.held_forces import OF_GAPS, REACTIONS, names_of_held_forces
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
 
 ADVICE = (
     "let the law read a sample of it (mbd.SampledLaw), or a first-order state that follows it (rates of an "

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from functools import partial
-from typing import TYPE_CHECKING
 
-from mbd.equations.outputs import AXES
+from mbd.equations.equations import Equations
+from mbd.equations.outputs import AXES, Outputs
 from mbd.tape.derivatives import gradient
 from mbd.tape.node import Node
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
-    from mbd.equations.outputs import Outputs
 
 
 def net_moments(equations: Equations, outside: Collection[str]) -> list[Node]:

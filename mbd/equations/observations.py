@@ -1,22 +1,17 @@
 """Results of users' own: traced last, on all that the equations know, so that nothing of the motion depends on them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Frame
 from mbd.bodies.scope import FrameMotion, JointMotion, Scope
 from mbd.constraints.observation import Observation
 from mbd.equations.coordinate_scope import CoordinateScope
+from mbd.equations.derivation_context import DerivationContext
 from mbd.equations.derivation_scope import DerivationScope
 from mbd.equations.outputs import AXES, Outputs
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node, Scalar, Table
-
-if TYPE_CHECKING:
-    from mbd.equations.derivation_context import DerivationContext
 
 UNSTEADY = {"a": "accelerations", "s": "rates of first-order states", "lam": "forces of constraints"}
 """Inputs whose rates the equations do not give."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Frame
 from mbd.bodies.scope import Triple
@@ -17,9 +16,7 @@ from mbd.equations.reactions import Wrench, reaction
 from mbd.forces.base import Force
 from mbd.joints.base import Joint, Label
 from mbd.tape.node import Node, Scalar, Tape
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
+from mbd.topology.description import Description
 
 
 def offer_results(

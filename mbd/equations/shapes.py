@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mbd.bodies.algebra import basis, rotate, scaled, total
 from mbd.bodies.base import Frame
@@ -26,9 +26,7 @@ from mbd.dataclass import dataclass
 from mbd.equations.held import held_contacts, offer_held
 from mbd.equations.outputs import AXES, Outputs
 from mbd.tape.node import Scalar
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
+from mbd.topology.description import Description
 
 PLACE = "place"
 """Kind of the inputs x (number 0) and z (number 1) of a height function that is drawn."""

@@ -9,7 +9,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from functools import partial
-from typing import TYPE_CHECKING
 
 from mbd.bodies.algebra import dot, rotate
 from mbd.bodies.base import Body, Frame
@@ -25,9 +24,7 @@ from mbd.constraints.turning_measures import Cone
 from mbd.equations.outputs import AXES, Outputs
 from mbd.equations.shapes import Shape, drawn
 from mbd.joints.base import Joint
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
+from mbd.topology.description import Description
 
 LIKE = (0.5, 1.3)
 """Radius of the uniform ball of a body's mean moment of inertia, over that with which it touches, if it is a ball: from

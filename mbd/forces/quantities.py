@@ -1,7 +1,5 @@
 """Quantities that users give: numbers, functions of named things, expressions, or samples in time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeAlias

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,8 +27,6 @@ from mbd.notebook import table
 from mbd.results.titled import Titled
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
 
 FIRST_DISTANCE, MAX_DISTANCE, MIN_DISTANCE = 0.02, 0.1, 1e-6

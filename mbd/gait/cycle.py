@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,16 +24,13 @@ from mbd.gait.section import Chart
 from mbd.later import later
 from mbd.notebook import table
 from mbd.results.ledger import SPENT, titled
+from mbd.results.trajectory import Trajectory
 from mbd.sensitivity.tangent_names import place_names
 from mbd.simulation.simulate import simulate
 from mbd.state import State
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
-
-    from mbd.results.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)

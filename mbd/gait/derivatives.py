@@ -7,8 +7,6 @@ events happen, also beside folds, where the branch itself turns. The differences
 gait moves by as much whatever the parameter's unit is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 

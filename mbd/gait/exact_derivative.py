@@ -13,8 +13,6 @@ axes of the child: D and its inverse lead from them to the increments of a chart
 Instants of touchdowns follow from the events of a run, lengths of steps from where the feet are at its ends.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

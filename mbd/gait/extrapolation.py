@@ -1,7 +1,5 @@
 """Richardson's extrapolation of differences, and the slopes of functions of parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 

@@ -4,8 +4,6 @@ In a plane names alone are exchanged. In space the walker is reflected too (`mbd
 z, y and x under which the mechanism is its own mirror image (`mbd.gait.alike`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from functools import cached_property

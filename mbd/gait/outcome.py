@@ -1,17 +1,13 @@
 """What became of a walk, as a name: arrives, falls, scuffs, misses the event, ends otherwise, fails."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbd.analysis.ending import FALLEN_HEIGHT_RATIO
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

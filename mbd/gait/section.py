@@ -12,8 +12,6 @@ so that c_q = Z_qᵀ (q ⊖ q₀), c_v = Z_vᵀ (v − v₀) exactly. Multiplier
 on the chart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import field
 from functools import cached_property

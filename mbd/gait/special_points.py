@@ -8,8 +8,6 @@ branch point : ``det [P − 1, σ F_p; τᵀ]``; another branch crosses, such as
 (Kuznetsov 2004, Elements of Applied Bifurcation Theory, ch. 10.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import field, replace
 

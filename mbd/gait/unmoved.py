@@ -1,7 +1,5 @@
 """Coordinates that nothing depends on but the places where feet stand: a walker moves on along them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

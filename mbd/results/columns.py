@@ -6,12 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.equations.equations import Equations
 from mbd.equations.outputs import Outputs
 from mbd.errors import TrajectoryError, UnknownNameError, nearest
 from mbd.joints.euler import SEQUENCES
@@ -28,10 +29,7 @@ from mbd.results.projection import Projection
 from mbd.results.record import Record, Rows
 from mbd.results.stored_states import StoredStates, is_smooth
 from mbd.results.turning import turns_to
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
-    from mbd.tape.node import Node
+from mbd.tape.node import Node
 
 Alias = tuple[str, int]
 """A named quantity that is itself part of the state: ('q', 0), ('v', 3), …"""

@@ -11,10 +11,6 @@ but no less than `FORCE_RTOL` of ``|B_k| (|M a| + |f| + |R λ|) / B_k²``, the t
 the run. A drive that needs no force at all is right within that.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,12 +18,10 @@ from mbd.arrays import Matrix, Vector
 from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Equations, Row
 from mbd.results.balance import MAX_SAMPLES, Balance
+from mbd.results.columns import ModelColumns
 from mbd.results.record import Rows
+from mbd.results.trajectory import Trajectory
 from mbd.tape.derivatives import live, substitute
-
-if TYPE_CHECKING:
-    from mbd.results.columns import ModelColumns
-    from mbd.results.trajectory import Trajectory
 
 FORCE_RTOL = 1e-5
 """Force of a drive, over the terms that cancel in it, below which it is measured by these [-]."""

@@ -11,28 +11,24 @@ schemes of high order from states within them, `mbd.results.within`), and an imp
 onto rows and what non-smooth steps lift out of surfaces stand there too.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Container, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.equal import HALF_PRECISION_RTOL, ROUND_OFF_RTOL, SMALL_SUM_RTOL
+from mbd.equations.equations import Equations
 from mbd.results.columns import ModelColumns
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.powers import Lost, Power, moving_share, powers
 from mbd.results.quadrature import cumulative
 from mbd.results.record import EventRecord, Rows
 from mbd.results.within import readable, within
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
-    from mbd.tape.node import Node
+from mbd.tape.node import Node
 
 
 def ledger(columns: ModelColumns) -> Ledger:

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbd.dataclass import dataclass
+from mbd.equations.equations import Equations
 from mbd.equations.held import WAYS
 from mbd.equations.net_moments import contact_places
 from mbd.equations.shapes import HEIGHT, Shape, drawn
 from mbd.joints.anatomy import Angle, angles_of
 from mbd.results.names import AXES
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
 
 ROUND = ("wheel", "ball")
 """Kinds of shapes that have a radius."""

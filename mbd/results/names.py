@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
 
+from mbd.equations.equations import Equations
 from mbd.equations.outputs import Outputs
 from mbd.errors import UnknownNameError
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
 
 AXES = (".x", ".y", ".z")
 """Endings of the components of a vector."""

@@ -1,10 +1,7 @@
 """Rotation vectors and Euler angles of a run that was read from a file, from the quaternions in it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +10,7 @@ from mbd.joints.anatomy import Angle
 from mbd.joints.euler import ANGLE_SUFFIXES, euler_angles, second_from_singular, sequence_of
 from mbd.joints.quaternions import rotation_of, rotation_vector
 from mbd.notes import doubt
-
-if TYPE_CHECKING:
-    from mbd.results.facts import Facts
+from mbd.results.facts import Facts
 
 VECTOR = re.compile(r"(.+)\.rotation_vector\.([xyz])")
 ANGLES = re.compile(r"(.+)\.euler\.([xyz]{3})(?:\.([123]))?")

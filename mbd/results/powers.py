@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from mbd.dataclass import dataclass
 from mbd.equations.cones import NO_SLIP, slip_square
+from mbd.equations.equations import Effect, Equations
 from mbd.tape.derivatives import gradient, jvp, live, substitute
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Effect, Equations
-    from mbd.tape.node import Node, Scalar
+from mbd.tape.node import Node, Scalar
 
 UNKNOWN_RATE = frozenset({"a", "s", "lam"})
 """Inputs whose rates the stored rows do not hold."""

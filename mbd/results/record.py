@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector, read_only
 from mbd.dataclass import LateFields, dataclass
+from mbd.equations.equations import Equations
 from mbd.integrators.extension import HERMITE, Extension, extension_of
 from mbd.notebook import table
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
 
 
 def _nothing() -> Vector:

@@ -1,24 +1,19 @@
 """The stored states of a run with the model's equations, which evaluate any expression there."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.compile.python import array_function
+from mbd.equations.equations import Equations
 from mbd.results.interpolation import Grid
 from mbd.results.record import Record, Rows
 from mbd.results.turning import counted, doubtful, function_of
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
-    from mbd.tape.node import Node, Scalar
-
+from mbd.tape.node import Node, Scalar
 
 ONSET, LEAST = 1e-7, 1e-200
 """As in `contact.cones`: how much the direction of λ_T counts beside that of γ, and what stands for none of it."""

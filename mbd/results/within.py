@@ -5,24 +5,18 @@ that of a polynomial through rows around (Davis & Rabinowitz 1984, ch. 2.7), and
 controllers and events, beside which stretches are short, do no harm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbd.arrays import Vector
 from mbd.results.charts import Charts
-from mbd.results.columns import asks_for_forces
+from mbd.results.columns import ModelColumns, asks_for_forces
 from mbd.results.dense import Restepping
 from mbd.results.polynomials import CHUNK, Places
 from mbd.results.stored_states import is_smooth
-
-if TYPE_CHECKING:
-    from mbd.results.columns import ModelColumns
-    from mbd.tape.node import Node
+from mbd.tape.node import Node
 
 POINTS = 0.5 * (np.array([-0.8611363115940526, -0.33998104358485626, 0.33998104358485626, 0.8611363115940526]) + 1.0)
 WEIGHTS = 0.5 * np.array([0.34785484513745357, 0.6521451548625464, 0.6521451548625464, 0.34785484513745357])

@@ -1,11 +1,6 @@
 """Runs that their user ended, which end a study too."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 
 def stopped(run: Trajectory) -> bool:

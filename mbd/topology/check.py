@@ -1,10 +1,8 @@
 """Every fault of a description at once, by name, with what to try."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from mbd.bodies.algebra import ZERO
 from mbd.bodies.base import Body, Frame
@@ -12,6 +10,9 @@ from mbd.bodies.domains import ParameterCheck, Parameterized
 from mbd.bodies.ground import Ground
 from mbd.bodies.marker import Marker
 from mbd.bodies.point_mass import PointMass
+from mbd.constraints.base import Constraint
+from mbd.constraints.controller import Controller
+from mbd.constraints.machine import Machine
 from mbd.errors import MbdError, ModelError, nearest
 from mbd.forces.base import Force
 from mbd.forces.quantities import INCREMENT_PREFIX
@@ -19,15 +20,10 @@ from mbd.forces.rotor import Rotor
 from mbd.joints.base import Joint
 from mbd.joints.named_angles import orientation_names
 from mbd.joints.screw import Screw
+from mbd.topology.description import Description
 from mbd.topology.graph import disconnected
 from mbd.topology.held_forces import names_of_held_forces
 from mbd.topology.plan import cut_names, is_planar, plan
-
-if TYPE_CHECKING:
-    from mbd.constraints.base import Constraint
-    from mbd.constraints.controller import Controller
-    from mbd.constraints.machine import Machine
-    from mbd.topology.description import Description
 
 
 def faults(model: Description) -> list[str]:

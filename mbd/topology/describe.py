@@ -1,21 +1,16 @@
 """A model in a page of text."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+from mbd.bodies.base import Body
+from mbd.constraints.base import Constraint
 from mbd.errors import ModelError
+from mbd.joints.base import Joint
 from mbd.notebook import folded, paragraphs, table
 from mbd.topology.check import faults
+from mbd.topology.description import Description
 from mbd.topology.plan import plan
-
-if TYPE_CHECKING:
-    from mbd.bodies.base import Body
-    from mbd.constraints.base import Constraint
-    from mbd.joints.base import Joint
-    from mbd.topology.description import Description
 
 UNITS = {"mass": "kg", "length": "m", "center": "m", "inertia": "kg m²"}
 

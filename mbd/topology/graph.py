@@ -1,14 +1,10 @@
 """The mechanism as a graph: bodies are nodes, joints are edges. Questions only, no mechanics."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mbd.joints.base import Joint
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
+from mbd.topology.description import Description
 
 Links = dict[str, dict[str, dict[str, Joint]]]
 """The joints by name between a body and each of its neighbors, by their names: the adjacency of the graph."""

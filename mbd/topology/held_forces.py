@@ -1,15 +1,9 @@
 """Names of the forces that hold a mechanism, which laws may read."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from mbd.constraints.base import Constraint
 from mbd.forces.base import Force
 from mbd.joints.base import Joint
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
+from mbd.topology.description import Description
 
 OF_ROWS = ("force", "multiplier", "tension", "torque", "spin.torque")
 OF_FRICTION = ("friction", "friction.forward", "friction.sideways")

@@ -1,9 +1,6 @@
 """Which joints generate coordinates and which are cut."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from mbd.bodies.base import Body, Frame
 from mbd.bodies.ground import Ground
@@ -16,11 +13,9 @@ from mbd.joints.free import Free
 from mbd.joints.planar import Planar
 from mbd.joints.reversed import Reversed
 from mbd.joints.translation import Translation
+from mbd.topology.description import Description
 from mbd.topology.graph import links_of, mobility, spanning_tree
 from mbd.topology.held_forces import reactions_read
-
-if TYPE_CHECKING:
-    from mbd.topology.description import Description
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,12 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mbd.analysis.accuracy import Accuracy, Point
 from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, FAINT, INK, NEUTRAL, PALE, PAPER, as_label, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.analysis.accuracy import Accuracy, Point
 
 SCHEME_MARKERS = "osD^vP*X"
 """Of the schemes in turn."""

@@ -1,18 +1,14 @@
 """The accuracy lab as one self-contained HTML page."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from mbd.analysis.accuracy import Accuracy, Point
 from mbd.view.lab_page import finite, lab_page
 from mbd.view.style import CYCLE
 from mbd.view.template import written
-
-if TYPE_CHECKING:
-    from mbd.analysis.accuracy import Accuracy, Point
 
 CONTROLS = """\
 <label>quantity <select id="quantity"><option value="">the largest of all</option></select></label>

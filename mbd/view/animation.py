@@ -1,17 +1,12 @@
 """The player of a run in the cell of a notebook."""
 
-from __future__ import annotations
-
 from html import escape
 from os import PathLike
-from typing import TYPE_CHECKING
 
 from mbd.bodies.values import is_number
 from mbd.errors import ModelError
+from mbd.results.trajectory import Trajectory
 from mbd.view.page import html
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 MIN_HEIGHT = 200
 """Height that has room for the mechanism [pixels]."""

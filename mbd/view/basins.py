@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.gait.basin.result import Basin
 from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, FAINT, INK, NEUTRAL, PALE, as_label, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.gait.basin.result import Basin
 
 SHADES = {
     "falls forward": CYCLE[4], "falls backward": CYCLE[5], "falls": CYCLE[6], "scuffs": CYCLE[3], "stands": FAINT,

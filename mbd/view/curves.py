@@ -1,18 +1,13 @@
 """Curves through the rows of a run, smooth where rows are few."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Vector
 from mbd.results.interpolation import Grid
 from mbd.results.polynomials import Index
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 CURVE_POINTS = 600
 """Points of a curve that look smooth over the width of a plot [-]."""

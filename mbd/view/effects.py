@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mbd.analysis.effects import Contribution, Effects
 from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, INK, PAPER, as_label, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.analysis.effects import Contribution, Effects
 
 NOTE: dict[str, Any] = {"va": "center", "fontsize": 7.5}
 

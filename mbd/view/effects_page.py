@@ -1,17 +1,13 @@
 """The study of effects as one self-contained HTML page."""
 
-from __future__ import annotations
-
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from mbd.analysis.effects import Contribution, Effects
 from mbd.view.lab_page import finite, lab_page
 from mbd.view.style import CYCLE
 from mbd.view.template import written
-
-if TYPE_CHECKING:
-    from mbd.analysis.effects import Contribution, Effects
 
 CONTROLS = """\
 <label>output <select id="output"><option value="">the largest of all</option></select></label>

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.analysis.fitting.fit import Fit
 from mbd.results.units import unit
 from mbd.view.curves import curves
 from mbd.view.plots import drawing, scale
@@ -14,8 +15,6 @@ from mbd.view.style import CYCLE, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.analysis.fitting.fit import Fit
 
 
 def fitted(fit: Fit, path: str | Path | None = None) -> Figure:

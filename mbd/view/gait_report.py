@@ -7,6 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mbd.analysis.gait_report.curves import Curve
+from mbd.analysis.gait_report.report import GaitReport, Walk
 from mbd.equal import EQUAL_RTOL
 from mbd.notebook import table
 from mbd.view.plots import drawing
@@ -16,9 +18,6 @@ from mbd.view.template import filled, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.analysis.gait_report.curves import Curve
-    from mbd.analysis.gait_report.report import GaitReport, Walk
 
 ROWS = ("angle", "moment", "power")
 """Quantities of a joint, one below the other."""

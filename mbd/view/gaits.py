@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.gait.branch import Branch
+from mbd.gait.cycle import LimitCycle
+from mbd.gait.follow import PointCurve
 from mbd.joints.reflected import exchanged
 from mbd.results.interpolation import Grid
+from mbd.results.trajectory import Trajectory
 from mbd.view.curves import curves
 from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.gait.branch import Branch
-    from mbd.gait.cycle import LimitCycle
-    from mbd.gait.follow import PointCurve
-    from mbd.results.trajectory import Trajectory
 
 MARKS = {
     "fold": "s", "doubling": "o", "torus": "^", "branch point": "D", "scuff": "X", "graze": "X", "release": "v",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,9 +11,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Moments, Trajectory
+from mbd.results.trajectory import Moments, Trajectory
 
 
 @dataclass(frozen=True, eq=False)

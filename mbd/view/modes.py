@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbd.analysis.linearization import Linearization, NaturalMode
 from mbd.errors import ModelError
 from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, NEUTRAL, as_label, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.analysis.linearization import Linearization, NaturalMode
 
 
 def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) -> Figure:

@@ -1,11 +1,9 @@
 """One self-contained HTML file that plays a run: no network, no libraries, our own small script."""
 
-from __future__ import annotations
-
 from collections import Counter
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +13,7 @@ from mbd.constraints.machine import SEPARATOR
 from mbd.results.ledger import SPENT
 from mbd.results.names import AXES
 from mbd.results.summary import facts
+from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
 from mbd.view.geometry import finite, geometry, packed, side, step_of
 from mbd.view.instants import Instants
@@ -22,9 +21,6 @@ from mbd.view.plots import QUANTITIES, scale, stretches
 from mbd.view.scene import Scene, scene
 from mbd.view.style import CYCLE
 from mbd.view.template import filled, part, written
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 MAX_FRAME_RATE = 60.0
 """Most pictures per second of run [1/s]."""

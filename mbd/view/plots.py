@@ -18,6 +18,7 @@ from mbd.results.archive import named_file, write_whole
 from mbd.results.interpolation import Grid
 from mbd.results.ledger import SPENT, Ledger, Part
 from mbd.results.tables import library
+from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
 from mbd.view import vector
 from mbd.view.curves import curves, extremes
@@ -25,8 +26,6 @@ from mbd.view.style import CYCLE, INK, NEUTRAL, as_label, color, rules, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.results.trajectory import Trajectory
 
 MAX_EVENT_LINES = 60
 """Events beyond this number are left to the contact bars, so that lines do not hide the curves."""

@@ -1,10 +1,7 @@
 """Forces of the ground on what touches it, as arrows show them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +10,9 @@ from mbd.dataclass import dataclass
 from mbd.equations.held import WAYS
 from mbd.equations.shapes import Shape, drawn
 from mbd.results.names import AXES
+from mbd.results.trajectory import Trajectory
 from mbd.view.instants import Instants
 from mbd.view.scenery import Scenery, plane_of_motion
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,5 @@
 """What is kept of a run on disk: plots, page, the run itself, and a record of how it came about."""
 
-from __future__ import annotations
-
 import json
 import os
 import platform
@@ -13,16 +11,14 @@ from functools import partial
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mbd.analysis.gait import gait
 from mbd.results.archive import plain, write as write_arrays, write_whole
 from mbd.results.storage import SUFFIX, Archive, contents
 from mbd.results.summary import facts
+from mbd.results.trajectory import Trajectory
 from mbd.view.beside import beside
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 FORMAT, VERSION = "mbd record", 1
 """Of the record, see docs/files.md."""

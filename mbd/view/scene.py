@@ -1,10 +1,7 @@
 """The geometry of a run for drawing: points over time, the ground they touch, gravity down the page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +11,11 @@ from mbd.dataclass import dataclass
 from mbd.equal import NOMINAL_RTOL
 from mbd.results.facts import ROUND
 from mbd.results.names import AXES
+from mbd.results.trajectory import Trajectory
 from mbd.view.instants import Instants
 from mbd.view.pushes import Push, pushes
 from mbd.view.scenery import Ball, Ground, Scenery, Wheel, plane_of_motion, scenery
 from mbd.view.solids import Hinge, Solid, Stop, hinges, limbs, rotations, solids, stops
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 RADIUS_RTOL = 0.02
 """Radii that differ less, over the radius, are one [-]."""

@@ -1,9 +1,5 @@
 """What stands or rolls around bodies in a picture: grounds, height functions, wheels, blades."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,11 +10,9 @@ from mbd.equal import NOMINAL_RTOL
 from mbd.equations.shapes import HEIGHT, PLACE, Shape, drawn
 from mbd.results.facts import ROUND
 from mbd.results.names import AXES
+from mbd.results.trajectory import Trajectory
 from mbd.tape.evaluate import evaluate_arrays
 from mbd.view.instants import Instants
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 FINE, MOST, MOST_MOVING = 100, 4000, 400
 """Points of a curve over the size of the mechanism, and on a whole curve, at rest and moving."""

@@ -1,9 +1,5 @@
 """Solid bodies of a spatial run over time, and the axes about which its joints turn."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,11 +7,9 @@ from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
 from mbd.equations.shapes import Shape, drawn
 from mbd.results.names import AXES
+from mbd.results.trajectory import Trajectory
 from mbd.view.forms import Form, equal_inertia
 from mbd.view.instants import Instants
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 

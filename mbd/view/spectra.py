@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbd.analysis.numerical import Criteria
 from mbd.equal import EQUAL_RTOL
 from mbd.view.plots import drawing
 from mbd.view.style import CYCLE, NEUTRAL, tone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.analysis.numerical import Criteria
 
 HALF = float(np.pi)
 """ω dt of two steps a period, beyond which there is no period to speak of [rad]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,14 +19,12 @@ from mbd.dataclass import dataclass
 from mbd.errors import ModelError, SimulationError
 from mbd.integrators import HHT, GeneralizedAlpha, Integrator, Newmark, RadauIIA, RungeKutta853
 from mbd.kernel.contact.active_set import ActiveSetManager
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.capabilities import refusals
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.run.strategy import chosen as strategy_of
 from mbd.simulation.simulate import simulate
 from mbd.state import State
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 PROBES = (2000, 20000, 200000)
 """Steps of the run that looks for time scales, until one succeeds."""

@@ -1,9 +1,6 @@
 """How far a run is from another: events matched, quantities compared away from them, event times apart."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +8,7 @@ from mbd.arrays import Vector
 from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL, ROUND_OFF_RTOL
 from mbd.results.matching import apart, matched
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,10 @@
 """One point of the lab: a scheme with a step, its errors, and what it cost."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from time import perf_counter, thread_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +15,10 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.integrators import Integrator
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 CLOCK = perf_counter if sys.platform == "win32" else thread_time
 """Processor time of the thread [s]; wall time where the system counts the other in steps of 16 ms."""

@@ -1,11 +1,9 @@
 """Published values that runs are judged by, in place of a reference of the lab's own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,11 +12,9 @@ from mbd.arrays import Vector
 from mbd.bodies.values import is_number
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, SimulationError, UnknownNameError, nearest
+from mbd.integrators import Integrator
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.run.user_calls import call_user
-
-if TYPE_CHECKING:
-    from mbd.integrators import Integrator
-    from mbd.results.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mbd.analysis.accuracy.advice import advice
 from mbd.analysis.accuracy.points import Point
 from mbd.analysis.accuracy.published import Published
+from mbd.analysis.accuracy.truth import Truth
 from mbd.dataclass import dataclass
 from mbd.later import later
 from mbd.notebook import paragraphs, table
@@ -18,8 +19,6 @@ from mbd.results.titled import Tabular, by_title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.analysis.accuracy.truth import Truth
 
 HEADS = (
     "scheme", "dt [s] or tol", "error", "order", "time [ms]", "steps", "Newton", "tangents", "residuals", "factored",

@@ -1,18 +1,14 @@
 """How fine runs are: steps from the model's time scales, tolerances from the ranges of its coordinates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mbd.dataclass import dataclass
 from mbd.integrators import Integrator
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 STEP_COUNT = 6
 """Steps, each half the one before."""

@@ -1,11 +1,9 @@
 """The reference of the lab, its own error bound, and how fast errors grow by themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +15,10 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.integrators import Integrator, RadauIIA, RungeKutta853
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.simulate import simulate
 from mbd.state import State
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 TIGHT, LOOSE = 1e-12, 1e-10
 """Tolerances of the reference and of the run that bounds its error [-]."""

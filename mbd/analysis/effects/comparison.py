@@ -1,9 +1,6 @@
 """How far a run without an effect is from the whole scene's: until their events differ."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +8,9 @@ from mbd.analysis.accuracy.compare import gaps
 from mbd.analysis.effects.contribution import Change
 from mbd.arrays import Vector
 from mbd.equal import INSTANT_RTOL
+from mbd.equations.equations import Equations
 from mbd.results.matching import apart
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Equations
-    from mbd.results.trajectory import EventRecord, Trajectory
+from mbd.results.trajectory import EventRecord, Trajectory
 
 MATCHING_WINDOW = 4
 """Events among which the next one is looked for: those of about one instant may come in any order."""

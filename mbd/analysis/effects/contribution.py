@@ -1,15 +1,10 @@
 """What one effect costs, carries and changes, as values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import field
-from typing import TYPE_CHECKING
 
+from mbd.analysis.effects.timing import Timing
 from mbd.dataclass import dataclass
-
-if TYPE_CHECKING:
-    from mbd.analysis.effects.timing import Timing
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,10 @@ from mbd.errors import UnknownNameError, nearest
 from mbd.later import later
 from mbd.notebook import folded, paragraphs, table
 from mbd.results.titled import Tabular, by_title
+from mbd.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from mbd.results.trajectory import Trajectory
 
 HEADS = ("effect", "kind", "operations", "ns/step", "energy [J]", "share", "change", "of", "until [s]")
 """Columns of the table."""

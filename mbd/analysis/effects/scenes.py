@@ -1,10 +1,8 @@
 """The scene without some of its effects, started with the same values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +11,8 @@ from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.equations.cost import Cost
 from mbd.equations.equations import Equations
+from mbd.results.trajectory import Trajectory
 from mbd.state import Mode, State
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,10 @@
 """Processor time of a step with and without an effect, by turns, and how sure it is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from time import perf_counter, thread_time
-from typing import TYPE_CHECKING
 
 from mbd.dataclass import dataclass
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 MIN_ROUNDS, MAX_ROUNDS = 5, 15
 """Times that each run is made; beyond the least only while there is time left."""

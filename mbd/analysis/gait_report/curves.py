@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,12 +12,10 @@ from mbd.analysis.gait_report.strides import Side, base_name, of_side
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
+from mbd.results.columns import ModelColumns
 from mbd.results.interpolation import Side as When
-
-if TYPE_CHECKING:
-    from mbd.results.columns import ModelColumns
-    from mbd.results.trajectory import Trajectory
-    from mbd.tape.node import Node
+from mbd.results.trajectory import Trajectory
+from mbd.tape.node import Node
 
 PERCENT = np.linspace(0.0, 100.0, 101)
 """Share of the stride [%]."""

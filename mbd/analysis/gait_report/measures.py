@@ -1,11 +1,8 @@
 """Numbers of a gait by side, and where its energy goes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import field
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +11,9 @@ from mbd.analysis.gait_report.curves import forces_at, grips_of
 from mbd.analysis.gait_report.strides import Side, Stride, of_side
 from mbd.arrays import Vector
 from mbd.dataclass import dataclass
+from mbd.results.impulses import Impulse
 from mbd.results.interpolation import OneSide
-
-if TYPE_CHECKING:
-    from mbd.results.impulses import Impulse
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 MIN_SAMPLES = 9
 """Samples of a part between two events at least, and of each refinement [-]."""

@@ -1,10 +1,7 @@
 """Sides, their feet, strikes and strides, read from the events of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +9,7 @@ from mbd.arrays import Matrix
 from mbd.dataclass import dataclass
 from mbd.equal import NOMINAL_RTOL
 from mbd.errors import TrajectoryError
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
+from mbd.results.trajectory import Trajectory
 
 SHORT = {"left": "l", "right": "r"}
 """Letters that stand for the words of sides in names of other programs."""

@@ -1,7 +1,5 @@
 """A muscle: activation, contraction of its fibers, an elastic or a rigid tendon, and a path over joints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The starts of a study, and what makes their walks: states on the section, parameters, balls round the attractors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -17,6 +17,7 @@ from mbd.errors import ModelError
 from mbd.gait.basin.axes import Grid
 from mbd.gait.basin.balls import Ball
 from mbd.gait.basin.kinds import KINDS
+from mbd.gait.basin.made import Made
 from mbd.gait.basin.walks import Decided
 from mbd.later import later
 from mbd.notebook import table
@@ -26,8 +27,6 @@ from mbd.state import State
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import Dataset
-
-    from mbd.gait.basin.made import Made
 
 
 @dataclass(frozen=True, eq=False)

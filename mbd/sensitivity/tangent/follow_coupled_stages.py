@@ -8,8 +8,6 @@ With the unknowns δW_i, δλ_i and δη_i of each stage, and positions correcte
 
 """
 
-from __future__ import annotations
-
 from mbd.kernel.algebra.linear import factor
 from mbd.kernel.algebra.ordered import solve_held
 from mbd.kernel.records import Kernel

@@ -1,8 +1,6 @@
 """Runs of a batch that Python makes: those whose start, end or energy asks for the judgement of `simulate`."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +12,12 @@ from mbd.compile.python import array_function
 from mbd.dataclass import dataclass
 from mbd.errors import MbdError
 from mbd.kernel import codes
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.diagnostics.energy import REPORTED_SHARE, UNDRIVEN, kinds_of
 from mbd.simulation.interrupted import stopped
 from mbd.simulation.many_runs import Ends
 from mbd.simulation.simulate import simulate
 from mbd.state import State
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
 
 NAMES = {
     getattr(codes, name): name.lower().replace("_", " ")

@@ -1,10 +1,8 @@
 """What a batch of runs gives: a table of their ends."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +16,12 @@ from mbd.results.columns import ModelColumns
 from mbd.results.record import Rows
 from mbd.results.tables import last_number
 from mbd.results.titled import Titled
+from mbd.results.trajectory import Trajectory
 from mbd.simulation.batch.alone import NAMES, Alone
+from mbd.simulation.batch.runner import Runner
 from mbd.simulation.batch.starts import Starts
 from mbd.simulation.many_runs import Ends
 from mbd.state import State
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
-    from mbd.simulation.batch.runner import Runner
 
 NOT_RUN = "not run"
 """The outcome of runs that an interrupted batch never came to."""

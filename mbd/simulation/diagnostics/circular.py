@@ -11,19 +11,14 @@ beyond that a law that followed the force with the smallest lag would run away f
 determinants must be positive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.equations.programs import law_forces
+from mbd.simulation.run.stepper import Stepper
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.stepper import Stepper
 
 SINGULAR_RTOL = 0.01
 """Part of the determinant without the law, or the friction, below which it counts as zero [-]."""

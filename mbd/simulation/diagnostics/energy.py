@@ -17,10 +17,7 @@ A glance at E in some of the rows comes first, and at its rise in steps that end
 strange is the ledger of all rows made.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -29,15 +26,12 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
+from mbd.equal import EQUAL_RTOL
 from mbd.equations.equations import Contact
 from mbd.results.columns import ModelColumns
-from mbd.simulation.run.stored import inputs_of, record_of, whole_record
-
-if TYPE_CHECKING:
-    from mbd.results.ledger import Ledger
-
-from mbd.equal import EQUAL_RTOL
+from mbd.results.ledger import Ledger
 from mbd.simulation.run.data import EnergyFindings, RunData
+from mbd.simulation.run.stored import inputs_of, record_of, whole_record
 from mbd.tape.derivatives import live
 
 SPREAD, EARLY = 30, tuple(2**k for k in range(10))

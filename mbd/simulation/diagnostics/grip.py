@@ -4,17 +4,12 @@ With its contact closed the wheel rolls, and what holds the slip at zero makes t
 the grip is gone, and the wheel falls back onto the plane. A real wheel slips there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.results.record import EventRecord
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.stepper import Stepper
+from mbd.simulation.run.stepper import Stepper
 
 
 def lost_grip(stepper: Stepper, events: Sequence[EventRecord]) -> str:

@@ -1,18 +1,12 @@
 """Modes that a run never changed, and how near each of the transitions that they waited for has come."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mbd.constraints.machine import SEPARATOR
+from mbd.equations.equations import Guard, Machine
 from mbd.results.columns import ModelColumns
 from mbd.results.record import Record
-
-if TYPE_CHECKING:
-    from mbd.equations.equations import Guard, Machine
-    from mbd.simulation.run.data import RunData
+from mbd.simulation.run.data import RunData
 
 MAX_ROWS = 400
 """Rows at which what a transition waits for is evaluated, at most [-]."""

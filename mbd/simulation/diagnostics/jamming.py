@@ -12,19 +12,13 @@ or there are several (Painlevé 1895). For a pendulum with the moment of inertia
 at a distance c that is ``μ r ≥ J / (m c)``, the lever arm of the load on the pin.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.simulation.diagnostics.circular import SINGULAR_RTOL
+from mbd.simulation.run.stepper import Stepper
 from mbd.tape.derivatives import live
 from mbd.tape.node import Node
-
-if TYPE_CHECKING:
-    from mbd.arrays import Vector
-    from mbd.simulation.run.stepper import Stepper
 
 DIRECTIONS = 180
 """Directions of the force in a pin that are tried [-]."""

@@ -1,15 +1,9 @@
 """What each motion of a contact that slides in Painlevé's paradox would need, in numbers."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mbd.equal import EQUAL_RTOL
-
-if TYPE_CHECKING:
-    from mbd.simulation.run.stepper import Stepper
+from mbd.simulation.run.stepper import Stepper
 
 NONE, SEVERAL = "no consistent contact force", "more than one consistent contact force"
 

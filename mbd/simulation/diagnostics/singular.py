@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.assembly.islands import islands_of_rows
+from mbd.compile.mechanism import AccelerationTerms
 from mbd.kernel import codes
-
-if TYPE_CHECKING:
-    from mbd.compile.mechanism import AccelerationTerms
-
 from mbd.simulation.run.data import RunData
 
 SINGULAR_RTOL = 1e-3

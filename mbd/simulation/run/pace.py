@@ -1,7 +1,5 @@
 """Runs whose steps follow their error down to where they no longer get anywhere."""
 
-from __future__ import annotations
-
 from mbd.simulation.run.data import RunData
 
 LOOK_STEPS = 200_000

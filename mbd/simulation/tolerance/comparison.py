@@ -5,10 +5,7 @@ what it gives there is less accurate than its rows. The other run is read by the
 and by steps taken again where these are in doubt.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +13,14 @@ from numpy.typing import NDArray
 from mbd.arrays import Matrix, Vector
 from mbd.dataclass import dataclass
 from mbd.equal import INSTANT_RTOL
+from mbd.results.columns import ModelColumns
 from mbd.results.dense import Restepping
 from mbd.results.driving import drives_of, share
 from mbd.results.matching import Matches, apart, matched
 from mbd.results.osculating import MAX_ERROR_RATIO, osculating
 from mbd.results.polynomials import Places, quintic
-
-if TYPE_CHECKING:
-    from mbd.results.columns import ModelColumns
-    from mbd.results.record import Record
-    from mbd.results.trajectory import Trajectory
+from mbd.results.record import Record
+from mbd.results.trajectory import Trajectory
 
 CHECKED_MIDDLES = 32
 """Middles between rows at which it is compared, about, if what it gives there is in doubt [-]."""

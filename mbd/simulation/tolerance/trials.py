@@ -1,18 +1,12 @@
 """One trial run of a calibration, and what it tells by itself."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from mbd.dataclass import dataclass
+from mbd.results.trajectory import Trajectory
+from mbd.simulation.run.data import RunData
+from mbd.simulation.run.room import Room
 from mbd.simulation.tolerance.comparison import Gap
-
-if TYPE_CHECKING:
-    from mbd.results.trajectory import Trajectory
-    from mbd.simulation.run.data import RunData
-    from mbd.simulation.run.room import Room
 
 EPS = float(np.finfo(float).eps)
 INSTANT_TOLERANCE = 0.1
