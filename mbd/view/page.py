@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mbd.arrays import Matrix
 from mbd.constraints.machine import SEPARATOR
+from mbd.equal import ROUND_OFF_RTOL
 from mbd.results.ledger import SPENT
 from mbd.results.names import AXES
 from mbd.results.summary import facts
@@ -175,8 +176,9 @@ def _charts(run: Trajectory, instants: Instants) -> list[dict[str, Any]]:
         groups.setdefault(unit(name, run.facts), []).append(name)
     acting_names = [name for name in run.names if _is_force(name, run)]
     forces = dict(zip(acting_names, instants.read(run, acting_names).T, strict=True))
+    still = {"W": ROUND_OFF_RTOL * float(np.max(ledger.kinetic, initial=0.0)) / max(run.time[-1] - run.time[0], 1e-300)}
     for name, force in forces.items():
-        if np.any(force):
+        if not np.max(np.abs(force), initial=0.0) <= still.get(unit(name, run.facts), 0.0):  # what sticks has no power
             groups.setdefault(unit(name, run.facts), []).append(name)
     values |= forces
     for kind, names in groups.items():

@@ -164,6 +164,12 @@ def same_content(found: Any, expected: Any) -> None:
         assert found == expected
 
 
+def test_a_foot_that_sticks_has_no_chart_of_power():
+    run = tossed(waves)
+    assert 0.0 < np.max(np.abs(run["foot friction.power"])) < 1e-12
+    assert "power" not in [chart["title"] for chart in content(run, scene(run, COUNT))["charts"]]
+
+
 def test_a_file_of_chosen_names_draws_what_it_has(tmp_path):
     loaded = mbd.load(rolled().save(tmp_path / "run", names=[name for name, _ in rolled().facts.coordinates]))
     picture = scene(loaded, COUNT)
