@@ -269,9 +269,11 @@ class ModelColumns(StoredStates, Columns):
 class SavedColumns(ModelColumns):
     """Quantities between the rows of a run that was read from a file, from the expressions in it."""
 
-    def __init__(self, record: Record, expressions: Any, anchors: Matrix, q_rate: Matrix) -> None:
+    def __init__(
+        self, record: Record, expressions: Any, anchors: Matrix, q_rate: Matrix, beside_jumps: Vector | None
+    ) -> None:
         super().__init__(record, expressions)
-        self._anchors, self._rates = anchors, q_rate
+        self._anchors, self._rates, self._beside_jumps = anchors, q_rate, beside_jumps
 
     @property
     def anchors(self) -> Matrix:
@@ -280,6 +282,10 @@ class SavedColumns(ModelColumns):
     @property
     def q_rate(self) -> Matrix:
         return self._rates
+
+    @property
+    def times_beside_jumps(self) -> Vector | None:
+        return self._beside_jumps
 
 
 class StoredColumns(Columns):

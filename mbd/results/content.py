@@ -79,6 +79,9 @@ def arrays_of_run(meta: Mapping[str, Any], members: Members) -> set[str]:
     if "q_rate" in members.names:
         expect(members.head("q_rate") == heads["q"], "'q_rate'")
         wanted.add("q_rate")
+    if "beside_jumps" in members.names:
+        expect(members.head("beside_jumps") == time, "'beside_jumps'")
+        wanted.add("beside_jumps")
     for number, row in enumerate(_list(meta["changes"], int, "'changes'")):
         expect(0 <= row <= count and members.head(f"change {number}") == Head("f", width), "'changes'")
         wanted.add(f"change {number}")

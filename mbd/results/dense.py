@@ -59,13 +59,20 @@ class Restepping:
         return self._smoothed(rows, places, found, inside) if near.any() else found
 
     def _by_machine(self, rows: Rows, places: Places) -> tuple[Rows, Flags] | None:
-        """The same at places between rows, and which lie next to singular configurations; None without code."""
+        """The same at places between rows, and which lie next to singular configurations; None without code.
+
+        Steps that end too far from the rows, which the run did not take itself, are led back to them by the equations.
+        """
         taken = None if self.balance.between is None else self.balance.between.stepped(rows, places)
         if taken is None:
             return None
         there, sizes = taken
         least, far = np.min(sizes[:, :-1], axis=1), np.maximum(sizes[:, 0], sizes[:, -1])
-        return there, ~(least - far >= 2.0 * np.log(SINGULAR_DISTANCE_RATIO))
+        near, lost = ~(least - far >= 2.0 * np.log(SINGULAR_DISTANCE_RATIO)), np.isnan(sizes[:, 1])
+        if lost.any():
+            others, near[lost] = self._by_equations(rows, places.part(np.flatnonzero(lost)))
+            there = replace(there, **{name: put(getattr(there, name), lost, getattr(others, name)) for name in CHANGED})
+        return there, near
 
     def _by_equations(self, rows: Rows, places: Places) -> tuple[Rows, Flags]:
         """The same by the equations in numpy, which a run that was read from a file has."""
@@ -91,12 +98,17 @@ class Restepping:
 
     def stepped(self, rows: Rows, places: Places) -> tuple[Matrix, Vector]:
         """(q, v, z) after steps from the rows before places, and the least change of log |det| at their stages."""
+        begin = rows.part(places.lower)
+        step = (places.time - begin.time)[:, None]
         taken = None if self.balance.between is None else self.balance.between.stepped(rows, places)
         if taken is None:
-            begin = rows.part(places.lower)
-            return self._stepped(begin, (places.time - begin.time)[:, None])
+            return self._stepped(begin, step)
         there, sizes = taken
-        return np.hstack([there.q, there.v, there.z]), np.min(sizes[:, :-2], axis=1) - sizes[:, 0]
+        state, least = np.hstack([there.q, there.v, there.z]), np.min(sizes[:, :-2], axis=1) - sizes[:, 0]
+        lost = np.flatnonzero(np.isnan(least))
+        if len(lost):
+            state[lost], least[lost] = self._stepped(begin.part(lost), step[lost])
+        return state, least
 
     def _stepped(self, begin: Rows, h: Matrix) -> tuple[Matrix, Vector]:
         """(q, v, z) after a step of h (k, 1) from each of the rows, and the least change of log |det| at its stages.

@@ -59,6 +59,9 @@ def contents(record: Record, run: Archive, names: Sequence[str] | None = None) -
     arrays["anchors"], q_rate = run.columns.anchors, run.columns.q_rate
     if q_rate is not record.v:
         arrays["q_rate"] = q_rate
+    model = run.columns.between_rows
+    if model is not None and model.times_beside_jumps is not None:
+        arrays["beside_jumps"] = model.times_beside_jumps
     meta: dict[str, Any] = {
         "format": FORMAT, "version": VERSION, "facts": run.facts.as_json(),
         "parameter_names": list(record.parameter_names), "stats": record.stats, "settings": record.settings,
@@ -172,7 +175,8 @@ def _run(meta: dict[str, Any], arrays: Arrays) -> tuple[Record, Archive]:
     anchors, q_rate = arrays["anchors"], arrays.get("q_rate", record.v)
     words, model = meta.get("expressions"), None
     if words is not None:
-        model = SavedColumns(record, read_expressions(words, arrays, len(record.parameters)), anchors, q_rate)
+        expressions = read_expressions(words, arrays, len(record.parameters))
+        model = SavedColumns(record, expressions, anchors, q_rate, arrays.get("beside_jumps"))
     columns = StoredColumns(record, aliases, values, meta["names"], anchors, q_rate, model)
     ledger = _read_ledger(record, arrays, meta)
     return record, Archive(columns, ledger, Violation(**meta["violation"]), Facts.read(meta["facts"]))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import mbd
+from tests.fuzz.scenes import scene
+from tests.fuzz.verdict import run_of
 from tests.mechanisms_between_rows import KINDS
 
 SCHEMES = mbd.RungeKutta853(), mbd.RungeKutta4()
@@ -63,3 +65,26 @@ def test_contacts_that_open_and_close():
         here = compare(run)
         compared, events = compared + here, events + len(run.events) * (here > 0)
     assert compared > 300 and events > 30
+
+
+DRIVEN = 10095074, 10095095, 10095104, 10095128, 10095143, 10095154
+
+
+@pytest.mark.filterwarnings("ignore::mbd.MbdWarning")
+@pytest.mark.parametrize("numbers", [DRIVEN, pytest.param(range(10095200, 10095260), marks=pytest.mark.slow)])
+def test_driven_mechanisms_and_their_files_agree_between_rows_by_every_scheme(numbers, tmp_path):
+    """Steps over jumps in time, and steps so large that they miss what drives prescribe."""
+    compared = 0
+    for number in numbers:
+        made = scene(number, 100000)
+        try:
+            run = run_of(made)
+        except mbd.MbdError:
+            continue
+        times = np.random.default_rng(number).uniform(*run.time[[0, -1]], 17)
+        ours, theirs = (each.at(times).read(*run.names) for each in (run, mbd.load(run.save(tmp_path / "run"))))
+        for name, expected in theirs.items():
+            size = 1e-3 + np.max(np.abs(expected))
+            np.testing.assert_allclose(ours[name], expected, rtol=0.0, atol=1e-6 * size, err_msg=f"{number} {name}")
+        compared += 1
+    assert compared > 0.8 * len(numbers)
