@@ -52,12 +52,16 @@ def build() -> None:
     """Build the optimized kernel for the cache, or wait for the process that does."""
     from mbd.kernel.build import kernel_text, object_of, tag
 
-    keep(tag(), lambda: object_of(kernel_text()))
+    keep(tag, lambda: object_of(kernel_text()))
 
 
-def keep(tag: str, make: Callable[[], bytes]) -> None:
-    """Put what `make` compiles into the cache, or wait for the process that does."""
-    store, key = default_cache(), tag_key(tag)
+def keep(tag: Callable[[], str], make: Callable[[], bytes]) -> None:
+    """Put what `make` compiles into the cache, or wait for the process that does.
+
+    Under no name where the sources have changed meanwhile, as `tag` tells: it is made of some of either.
+    """
+    name = tag()
+    store, key = default_cache(), tag_key(name)
     assert store.directory is not None
     store.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
     mark = store.directory / f"{key}.building"
@@ -75,7 +79,9 @@ def keep(tag: str, make: Callable[[], bytes]) -> None:
             if store.load(key, lasting=True) is None:  # nobody has built it since the last look
                 if hasattr(os, "nice"):
                     os.nice(10)  # beside the run that waits for nothing
-                store.store(key, make(), lasting=True)
+                code = make()
+                if tag() == name:
+                    store.store(key, code, lasting=True)
         finally:
             mark.unlink(missing_ok=True)
         break

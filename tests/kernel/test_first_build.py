@@ -70,6 +70,15 @@ def test_two_processes_build_the_kernel_once(monkeypatch, tmp_path):
     assert not list((tmp_path / "cache").glob("*.building"))
 
 
+def test_a_kernel_whose_sources_change_as_it_is_built_is_not_kept(monkeypatch, tmp_path):
+    """Steps of one version were taken for those of another, where a branch was changed during a build."""
+    monkeypatch.setenv("MBD_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(os, "nice", lambda steps: 0, raising=False)
+    source = ["one"]
+    first_build.keep(lambda: source[0], lambda: source.insert(0, "another") or b"of both")
+    assert not list((tmp_path / "cache").iterdir())
+
+
 def test_the_kernel_of_derivatives_is_kept_like_the_other(monkeypatch, tmp_path):
     monkeypatch.setenv("MBD_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(os, "nice", lambda steps: 0, raising=False)

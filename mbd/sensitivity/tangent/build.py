@@ -109,7 +109,7 @@ def keep_optimized() -> None:
     """The optimized kernel for the cache, in a process of its own (see `mbd.kernel.first_build`)."""
     from mbd.kernel.first_build import keep
 
-    keep(_tag(LEVEL), lambda: build.object_of(text(), level=LEVEL))
+    keep(lambda: _tag(LEVEL), lambda: build.object_of(text(), level=LEVEL))
 
 
 def text() -> str:
