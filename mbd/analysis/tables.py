@@ -1,12 +1,17 @@
 """Results of analyses as lines of text."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbd.analysis.linearization import Linearization
-from mbd.analysis.numerical import Criteria
 from mbd.notebook import paragraphs, table
+
+if TYPE_CHECKING:
+    from mbd.analysis.linearization import Linearization
+    from mbd.analysis.numerical import Criteria
 
 MAX_NAMED = 4
 """Coordinates that are named in a line at most."""

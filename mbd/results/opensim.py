@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +17,10 @@ from mbd.arrays import Vector
 from mbd.bodies.values import shown
 from mbd.errors import TrajectoryError
 from mbd.results.archive import named_file, write_whole
-from mbd.results.trajectory import Trajectory
 from mbd.results.units import unit
+
+if TYPE_CHECKING:
+    from mbd.results.trajectory import Trajectory
 
 KINDS = (".sto", ".mot")
 """Endings of the files: in radians, and of motions in degrees."""

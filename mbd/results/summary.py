@@ -1,15 +1,19 @@
 """A run in a few lines: as text, and as a table for notebooks."""
 
+from __future__ import annotations
+
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbd.results.ledger import Ledger
-from mbd.results.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from mbd.results.trajectory import Trajectory
 
 COLUMNS = 100
 """Width of what is printed; longer lines go on below [-]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +16,10 @@ from mbd.errors import TrajectoryError
 from mbd.joints.anatomy import ANATOMY, angles_of
 from mbd.results.archive import named_file, write_whole
 from mbd.results.interpolation import OneSide, Side
-from mbd.results.trajectory import Trajectory
 from mbd.results.units import EFFORTS, unit
+
+if TYPE_CHECKING:
+    from mbd.results.trajectory import Trajectory
 
 WORDS = {
     "x": "place of {} along x", "y": "place of {} along y", "z": "place of {} along z",
