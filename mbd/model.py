@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from mbd.bodies.domains import ParameterCheck
+from mbd.bodies.values import flag
 from mbd.notebook import Faults, Text
 from mbd.notes import doubt
 from mbd.topology.description import Description
@@ -94,7 +95,7 @@ class Model(Description):
 
         self.require_own()
         text = description(self)
-        if mobility and not self.check():
+        if flag(mobility, "mobility of describe") and not self.check():
             from mbd.assembly.mobility import mobility as of
 
             text += f"\n{of(self)}"

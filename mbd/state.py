@@ -123,6 +123,8 @@ class State(LateFields):
         (see `plot`) has all results of runs that do not follow from forces: 'left hip.flexion', 'left shank.end',
         angles of joints that are cut.
         """
+        if not isinstance(name, str):
+            raise UnknownNameError(f"a state is asked for one value by its name, such as 'hip.angle', not {name!r}")
         if name in self.names:
             return float(self.q[self.names.index(name)])
         if name in self.velocity_names:

@@ -7,6 +7,8 @@ import inspect
 import math
 import re
 import warnings
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -261,6 +263,7 @@ def tells(text: str, name: str, value: Any) -> bool:
     stems = (name[:5].replace("_", " "), name[:5])
     came = (shown(value)[:20], f"{value:g}" if isinstance(value, float) else shown(value), type(value).__name__)
     came += (getattr(value, "__name__", ""),)
+    value = value.tolist() if isinstance(value, np.ndarray) else value
     inside = [shown(each) for each in value] if isinstance(value, list | tuple | dict) else []
     inside += ["nan"] * ("None" in inside)
     return any(part.lower() in text.lower() for part in (*stems, *came, *inside) if part)
@@ -302,6 +305,90 @@ def test_a_wrong_argument_is_taken_or_named(name):
                 assert files
             if said and parameter.name not in MEANT_OTHERWISE.get(name, ()):
                 assert tells(said, parameter.name, value), f"{name}({parameter.name}={shown(value)}): {said}"
+
+
+RUN = mbd.simulate(MODEL, START, dt=0.1, until=0.3, backend="python")
+SLOPES = mbd.sensitivities(
+    MODEL, START, dt=0.1, until=0.2, wrt=["hinge.angle"], of=["hinge.rate", "hinge.angle"], backend="python"
+)
+FITTED = mbd.fit(
+    MODEL, START, {"time": [0.1, 0.2, 0.3], "hinge.angle": RUN["hinge.angle"][1:]}, {"upper.length": 1.0}, dt=0.1,
+    backend="python",
+)  # fmt: skip
+GAIT = RIGHT_GAITS["branch"]["gait"]
+SEEN = mbd.Recording(np.arange(20) / 100.0, {"mark": np.ones((20, 3))}, {"angle": np.arange(20.0)})
+METHODS: dict[str, tuple[Any, dict[str, Any]]] = {
+    "run[…]": (lambda name: RUN[name], {"name": "hinge.angle"}),
+    "run.at": (RUN.at, {"times": [0.1, 0.2], "side": "left"}),
+    "run.save": (RUN.save, {"path": "run", "names": ["hinge.angle"]}),
+    "run.to_csv": (RUN.to_csv, {"path": "run.csv", "names": ["hinge.angle"], "at": 0.1, "side": "before"}),
+    "run.to_sto": (RUN.to_sto, {"path": "run.sto", "names": ["hinge.angle"], "at": 0.1, "degrees": True}),
+    "run.to_dataframe": (RUN.to_dataframe, {"names": ["hinge.angle"], "at": 0.1, "side": "before"}),
+    "energy[…]": (lambda name: RUN.energy[name], {"name": "kinetic"}),
+    "energy.to_dataframe": (RUN.energy.to_dataframe, {"by": "kind"}),
+    "state[…]": (lambda name: START[name], {"name": "hinge.angle"}),
+    "slopes[…]": (lambda names: SLOPES[names], {"names": "hinge.rate"}),
+    "slopes[…, …]": (lambda of, by: SLOPES[of, by], {"of": "hinge.rate", "by": "hinge.angle"}),
+    "slopes.along": (SLOPES.along, {"change": {"hinge.angle": 0.1}}),
+    "fit.interval": (FITTED.interval, {"name": "upper.length", "level": 0.9}),
+    "gait.at": (GAIT.at, {"parameters": {"pivot loss.coefficient": 0.11}}),
+    "gait.derivatives[…, …]": (
+        lambda of, by: GAIT.derivatives[of, by],
+        {"of": "period", "by": "pivot loss.coefficient"},
+    ),
+    "recording[…]": (lambda column: SEEN[column], {"column": "mark"}),
+    "Recording": (mbd.Recording, {"time": [0.0], "markers": {"mark": [(1.0, 0.0, 0.0)]}, "channels": {"angle": [1.0]}}),
+    "recording.between": (SEEN.between, {"first": 0.0, "last": 0.1}),
+    "recording.smoothed": (SEEN.smoothed, {"cutoff": 6.0}),
+    "recording.filled": (SEEN.filled, {"longest": 0.1}),
+    "PlateRecord.at": (
+        mbd.PlateRecord.at,
+        {"name": "p", "time": [0.0], "force": [(0.0, 9.0, 0.0)], "center": [(0.0, 0.0, 0.0)], "free_moment": 0.0},
+    ),
+    "film": (mbd.film, {"run": RUN, "markers": {"end": END}, "rate": 10.0, "scatter": 0.0, "seed": 0}),
+    "point": (UPPER.point, {"x": 0.1, "y": 0.2, "z": 0.0}),
+    "point by name": (lambda name: mbd.PointMass("bob", 1.0).point(0.1, 0.2, name=name), {"name": "toe"}),
+    "turned": (UPPER.end.turned, {"angle": 0.1, "axis": (0.0, 0.0, 1.0)}),
+    "turned by name": (lambda name: mbd.PointMass("bob", 1.0).origin.turned(0.1, name=name), {"name": "sole"}),
+    "without": (lambda names: MODEL.without(names), {"names": "hinge"}),
+    "describe": (MODEL.describe, {"mobility": False}),
+}
+"""What is asked of values that are made, with arguments with which it is content."""
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_wrong_argument_of_what_a_value_can_do_is_taken_or_named(name):
+    method, fine = METHODS[name]
+    method(**fine)
+    for key in fine:
+        for value in [*WRONG, 1e-320, np.array(0.5), np.array([]), np.array(["a"]), Decimal("0.5"), Fraction(1, 3)]:
+            said = ""
+            try:
+                method(**{**fine, key: value})
+            except mbd.MbdError as error:
+                said = str(error)
+            except OSError:  # a name that no file of this system may have
+                said = key if key == "path" else ""
+                assert said
+            outside = key in ("at", "times") and "is outside the run" in said
+            assert not said or outside or tells(said, key, value), f"{name}({key}={shown(value)}): {said}"
+
+
+def test_bodies_have_names_like_all_else():
+    for bodies in MODEL.bodies, mbd.human(75.0, 1.8).bodies:
+        with pytest.raises(mbd.ModelError, match=r"no body named 'uper'.*'(upper|head)'"):
+            bodies["uper"]
+
+
+def test_numbers_are_what_a_float_can_be_made_of():
+    """Decimals, fractions and numbers of numpy do what the float does that they stand for."""
+    for number in Decimal("0.2"), Fraction(1, 5), np.float64(0.2), np.array(0.2):
+        run = mbd.simulate(MODEL, START, dt=number / 2, until=number, backend="python")
+        assert run.time[-1] == 0.2
+        law = mbd.SampledLaw("law", number, {"u": lambda q: q}, ["hinge.angle"], delay=number)
+        assert law.period == law.delay == 0.2
+    with pytest.raises(mbd.ModelError, match="is more than 1000 periods"):
+        mbd.SampledLaw("law", 0.01, {"u": lambda q: q}, ["hinge.angle"], delay=1e300)
 
 
 @pytest.mark.parametrize("name", WORDS)

@@ -52,7 +52,7 @@ class LinearOscillator(System):
 
 def oscillated(integrator: Integrator, turn: float, damping: float, start: Vector, steps: int) -> list[Any]:
     """(state, memory) at the start (u, u̇/ω) and after each step of dt = 1 s, with ω = `turn` rad/s."""
-    system = LinearOscillator(turn, damping)
+    system = LinearOscillator(turn, float(damping))
     state = State(0.0, np.array([start[0]]), np.array([turn * start[1]]))
     run = [(state, integrator.start(system, state, MODE, 1.0))]
     for _ in range(steps):
@@ -77,7 +77,7 @@ def amplification_matrix(integrator: Integrator, turn: float, damping: float = 0
     CapabilityError
         if a step fails, or is not linear in what the scheme carries.
     """
-    system = LinearOscillator(turn, damping)
+    system = LinearOscillator(turn, float(damping))
     # steps after which the memory of a scheme has its final shape, a multistep scheme with up to so many steps
     runs = [oscillated(integrator, turn, damping, np.array(start), 4) for start in ((1.0, 0.0), (0.3, 1.0))]
     states = [_numbers(*each) for run in runs for each in run]

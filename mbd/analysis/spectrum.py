@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mbd.analysis.amplification import amplification_matrix
-from mbd.bodies.values import is_number, shown
+from mbd.bodies.values import is_number, is_several, shown
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.integrators.base import Integrator
@@ -66,6 +66,7 @@ def spectrum(integrator: Integrator, turn: float, damping: float = 0.0) -> Spect
     faults = argument_faults(integrator, [turn], damping)
     if faults:
         raise ModelError(faults)
+    damping = float(damping)
     roots = np.linalg.eigvals(amplification_matrix(integrator, turn, damping)).astype(complex)
     swing = np.sqrt(1.0 - damping**2)
     pairs = [z for z in roots if z.imag > 1e-9 * abs(z)]
@@ -83,7 +84,7 @@ def argument_faults(integrator: Any, turns: Sequence[float], damping: float) -> 
     faults = []
     if not isinstance(integrator, Integrator):
         faults.append(f"an integrator is expected, such as mbd.HHT(0.05), not {integrator!r}")
-    several = isinstance(turns, list | tuple | range | np.ndarray) and len(turns) > 0
+    several = is_several(turns) and isinstance(turns, Sequence | np.ndarray) and len(turns) > 0
     if not several or not all(is_number(turn) and 0.0 < turn <= MAX_OMEGA_DT for turn in turns):
         faults.append(f"turns (ω dt) must be a list of numbers above 0 and up to {MAX_OMEGA_DT:g}, not {shown(turns)}")
     if not is_number(damping) or not 0.0 <= damping < 1.0:

@@ -11,7 +11,7 @@ from mbd.bodies.domains import Domain, Parameterized, at_least_zero
 from mbd.bodies.mass import MassProperties
 from mbd.bodies.values import Vector3, number, printable, triple, unit_vector
 from mbd.dataclass import dataclass
-from mbd.errors import ModelError, nearest
+from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.tape.node import Node, Scalar
 
 Parameter = Callable[[str], Scalar]
@@ -124,11 +124,18 @@ class Body(Parameterized, ABC):
         offset = triple((x, y, z), f"a point of '{self.name}'")
         if name is None:
             name = f"point({offset[0]:.12g}, {offset[1]:.12g}, {offset[2]:.12g})"
-        elif name in self.frames:
+        elif printable(name, f"a point of '{self.name}'") in self.frames:
             raise ModelError(f"body '{self.name}' has a frame '{name}' already; give the point another name")
         else:
-            return self.remember(Frame(self, printable(name, f"a point of '{self.name}'"), offset))
+            return self.remember(Frame(self, name, offset))
         return Frame(self, name, offset)
+
+
+class Bodies(dict[str, "Body"]):
+    """Bodies by name; a wrong name is answered with the right ones."""
+
+    def __missing__(self, name: Any) -> Body:
+        raise UnknownNameError(nearest(name, self, "body", "There are"))
 
 
 @dataclass(frozen=True, repr=False)
@@ -183,8 +190,11 @@ class Frame:
         about = unit_vector(axis, f"axis of a frame turned from '{self.full_name}'")
         turn = number(angle, f"angle of a frame turned from '{self.full_name}'")
         R: Any = product(self.rotation or IDENTITY, constant_rotation(about, turn))
-        frame = Frame(self.body, name or f"{self.name} turned {turn:.12g}", self.offset, R, self.landmark)
-        return self.body.remember(frame) if name and name not in self.body.frames else frame
+        if name is None:
+            return Frame(self.body, f"{self.name} turned {turn:.12g}", self.offset, R, self.landmark)
+        title = printable(name, f"a frame turned from '{self.full_name}'")
+        frame = Frame(self.body, title, self.offset, R, self.landmark)
+        return frame if title in self.body.frames else self.body.remember(frame)
 
     @property
     def is_planar(self) -> bool:

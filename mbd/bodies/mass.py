@@ -1,13 +1,13 @@
 """Mass, center of mass and inertia, as scalars for the derivation and as numbers for the check."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from mbd.arrays import Matrix
 from mbd.bodies.algebra import IDENTITY, ZERO, Rotation, Triple
-from mbd.bodies.values import number, numbers
+from mbd.bodies.values import is_several, number, numbers
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError
@@ -40,7 +40,7 @@ def inertia_of(value: Any, what: str) -> Inertia:
     rows = _rows(value)
     if rows is not None:
         return _of_matrix([numbers(row, what) for row in rows], what)
-    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
+    if not is_several(value):
         return number(value, what)
     result = numbers(value, what)
     if len(result) not in (3, 6):
@@ -53,10 +53,10 @@ def inertia_of(value: Any, what: str) -> Inertia:
 
 def _rows(value: Any) -> list[Any] | None:
     """The rows of a matrix; None of what is none."""
-    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
+    if not is_several(value):
         return None
     rows = list(value)
-    several = [isinstance(row, Iterable) and not isinstance(row, str | bytes) for row in rows]
+    several = [is_several(row) for row in rows]
     return rows if rows and all(several) else None
 
 

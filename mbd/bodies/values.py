@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from mbd.arrays import Vector
 from mbd.errors import ModelError
 
 Vector3: TypeAlias = tuple[float, float, float]
@@ -32,12 +33,19 @@ def printable(name: str, what: str) -> str:
     >>> printable("left knee", "Revolute")
     'left knee'
     """
+    if not isinstance(name, str) or not name.strip():
+        raise ModelError(f"{what} needs a name, such as 'toe'; got {shown(name)[:80]}")
     if name.isascii() and name.isprintable():
         return name
     wrong = [sign for sign in name if unicodedata.category(sign) in ("Cc", "Cs", "Zl", "Zp") or sign in DIRECTION_MARKS]
     if wrong:
         raise ModelError(f"{what} {name!r}: a name holds no control characters such as {wrong[0]!r}; leave them out")
     return name
+
+
+def is_several(value: Any) -> bool:
+    """Whether a value has entries to go through, which a text, a type and an array of no dimension have not."""
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes | type) and getattr(value, "ndim", 1) > 0
 
 
 def names_of(values: Any, what: str) -> tuple[str, ...]:
@@ -47,10 +55,10 @@ def names_of(values: Any, what: str) -> tuple[str, ...]:
     ('left foot',)
     """
     several = (values,) if isinstance(values, str) else values
-    if isinstance(several, Iterable) and not isinstance(several, bytes | type):
+    if is_several(several):
         result = tuple(several)
         if all(isinstance(name, str) and name for name in result):
-            return result
+            return tuple(map(str, result))  # texts of numpy among them
     raise ModelError(f"{what} must be a name or several, such as ('left foot', 'right foot'); got {values!r}")
 
 
@@ -160,7 +168,7 @@ def names_given(
     value: Any, what: str, of: str = "contacts, such as ['left foot']"
 ) -> tuple[tuple[str, ...], list[str]]:
     """Names given as one or several."""
-    several = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else (value,)
+    several = (value,) if isinstance(value, str) else tuple(value) if is_several(value) else (value,)
     if all(isinstance(name, str) for name in several):
         return several, []
     return (), [f"{what} lists names of {of}, not {shown(value)}"]
@@ -177,9 +185,23 @@ def is_finite_number(value: Any) -> bool:
 
 def numbers(values: Any, what: str) -> tuple[float, ...]:
     """A tuple of finite floats."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
+    if not is_several(values):
         raise ModelError(f"{what} must be a sequence of numbers, got {values!r}")
     return tuple(number(value, what) for value in values)
+
+
+def floats(values: Any, what: str) -> Vector:
+    """An array of real numbers of any shape, NaN for what is not known.
+
+    >>> floats([1, None], "force")
+    array([ 1., nan])
+    """
+    try:
+        if np.iscomplexobj(values):
+            raise TypeError
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"{what} must be real numbers, got {shown(values)[:80]}") from None
 
 
 def triple(values: Any, what: str) -> Vector3:

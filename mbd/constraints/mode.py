@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 
 from mbd.bodies.domains import Domain, positive
 from mbd.bodies.scope import Scope
-from mbd.bodies.values import among, is_number, name_of, number
+from mbd.bodies.values import among, is_number, is_several, name_of, number
 from mbd.constraints.machine import SEPARATOR, Change, Machine
 from mbd.constraints.measure import Measure, gap_of
 from mbd.constraints.user_measure import measured
@@ -55,7 +55,7 @@ class Transition:
 
     def __post_init__(self) -> None:
         put, title = object.__setattr__, f"Transition({self.source!r}, {self.target!r})"
-        several = isinstance(self.source, Iterable) and not isinstance(self.source, str)
+        several = is_several(self.source)
         sources = tuple(self.source) if several else (self.source,)
         if not sources or not all(isinstance(each, str) and each for each in (*sources, self.target)):
             raise ModelError(f"{title} needs the names of the states that it leaves and enters")
@@ -136,7 +136,7 @@ class Mode(Machine):
     def __post_init__(self) -> None:
         name_of(self.name, "Mode")
         put, title = object.__setattr__, f"Mode '{self.name}'"
-        states = tuple(self.states) if not isinstance(self.states, str) and isinstance(self.states, Iterable) else ()
+        states = tuple(self.states) if is_several(self.states) else ()
         if len(states) < 2 or not all(isinstance(each, str) and each for each in states):
             raise ModelError(f"{title} needs the names of two states at least, such as ('stance', 'swing')")
         if len(set(states)) < len(states) or any(SEPARATOR in each for each in states):
@@ -145,7 +145,7 @@ class Mode(Machine):
             given = getattr(self, kind)
             if not isinstance(given, Mapping) or not all(isinstance(each, str) and each for each in given):
                 raise ModelError(f"{kind} of {title} maps names to what they stand for, got {given!r}")
-        if not isinstance(self.transitions, Iterable) or isinstance(self.transitions, str):
+        if not is_several(self.transitions):
             raise ModelError(f"transitions of {title} are a list of mbd.Transition, got {self.transitions!r}")
         if self.start is not None and not isinstance(self.start, str):
             raise ModelError(f"start of {title} is the name of a state, got {self.start!r}")

@@ -1,9 +1,9 @@
 """When a constraint acts."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from mbd.bodies.values import flag
+from mbd.bodies.values import flag, is_several
 from mbd.constraints.measure import Measure
 from mbd.constraints.user_measure import measured
 from mbd.dataclass import dataclass
@@ -40,7 +40,7 @@ class When:
 def releases_of(value: Any, what: str) -> tuple[When, ...]:
     """The `release=` of a contact: None, one `When`, or several."""
     several = () if value is None else (value,) if isinstance(value, When) else value
-    if isinstance(several, str | Mapping) or not isinstance(several, Iterable):
+    if isinstance(several, Mapping) or not is_several(several):
         raise ModelError(f"release of '{what}' is mbd.When('name of another contact'), got {value!r}")
     result = tuple(several)
     for rule in result:

@@ -21,6 +21,9 @@ from mbd.tape.tracing import traced_scalar
 INDEX, NEXT, FIRST = 0, 1, 2
 """Numbers that a sampled law holds: whether it waits to put out, when its next sample is, then its values."""
 
+MAX_WAITS = 1000
+"""Periods of a delay at most, each of which keeps its outputs [-]."""
+
 
 @dataclass(frozen=True)
 class SampledLaw(Machine):
@@ -41,9 +44,9 @@ class SampledLaw(Machine):
         frames, joints, or (label, number) for a parameter
     states : functions x_{k+1} by label; their values are the quantities 'name.label'
     start : the x_0 of states by label; 0 where they are left out
-    delay : time from a sample to its outputs [s], of any length. Until the first outputs a parameter has its own value,
-        an output of its own is 0. A whole number of periods is a number of samples, also where the period is changed;
-        any other delay is the parameter 'name.delay', with the same number of samples between it and the period
+    delay : time from a sample to its outputs [s], up to 1000 periods. Until the first outputs a parameter has its own
+        value, an output of its own is 0. A whole number of periods is a number of samples, also where the period is
+        changed; any other delay is the parameter 'name.delay', with as many samples between it and the period
     resolution : steps to which values are rounded, of outputs and of arguments by their names: {'knee.angle': 1e-3}
     restart_on : names of contacts, events or states of modes: a sample is taken as they happen, and the next one a
         period later, so that the samples of each step are the same. A gait without it lasts a whole number of samples
@@ -83,6 +86,9 @@ class SampledLaw(Machine):
             raise ModelError(f"the period of {title}, {self.period:g} s, is not positive; give a time > 0")
         if self.delay < 0.0:
             raise ModelError(f"the delay of {title}, {self.delay:g} s, is negative; give a time ≥ 0")
+        if self.delay > MAX_WAITS * self.period:
+            raise ModelError(f"the delay of {title}, {self.delay:g} s, is more than {MAX_WAITS} periods of "
+                             f"{self.period:g} s, of which each keeps its outputs; give a longer period")  # fmt: skip
         put(self, "arguments", arguments_of(self.arguments, title))
         for kind in ("outputs", "states"):
             given = getattr(self, kind)

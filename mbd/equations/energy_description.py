@@ -1,11 +1,11 @@
 """A mechanism in energies: textbook problems, without bodies."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, Self, TypeAlias, cast
 
 from mbd.bodies.domains import Domain, Parameterized
-from mbd.bodies.values import named_number_faults, names_of, number, printable
+from mbd.bodies.values import is_several, named_number_faults, names_of, number, printable
 from mbd.constraints.base import Constraint
 from mbd.constraints.controller import Controller
 from mbd.constraints.event import Event
@@ -257,7 +257,7 @@ def _check_shapes(system: EnergyDescription) -> None:
         raise ModelError(f"Lagrangian needs a name as its first argument, got {system.name!r}")
     printable(system.name, "Lagrangian")
     faults = []
-    if isinstance(system.coordinates, str | Mapping) or not isinstance(system.coordinates, Iterable):
+    if isinstance(system.coordinates, Mapping) or not is_several(system.coordinates):
         faults.append(f"coordinates must be a list of mbd.Coordinate or names, got {system.coordinates!r}")
     for field_name in ("forces", "parameters", "nonholonomic", "domains"):
         value = getattr(system, field_name)
@@ -271,9 +271,9 @@ def _check_shapes(system: EnergyDescription) -> None:
             for key, domain in system.domains.items()
             if not isinstance(domain, Domain)
         ]
-    if isinstance(system.constraints, str) or not isinstance(system.constraints, Iterable):
+    if not is_several(system.constraints):
         faults.append(f"constraints must be a mapping {{name: h}} or a list of expressions, got {system.constraints!r}")
-    if not isinstance(system.controllers, Iterable) or not all(isinstance(c, Controller) for c in system.controllers):
+    if not is_several(system.controllers) or not all(isinstance(c, Controller) for c in system.controllers):
         faults.append(f"controllers must be a list of mbd.Controller, got {system.controllers!r}")
     if faults:
         raise ModelError([f"Lagrangian {system.name!r}: {fault}" for fault in faults])

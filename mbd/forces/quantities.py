@@ -1,6 +1,6 @@
 """Quantities that users give: numbers, functions of named things, expressions, or samples in time."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -11,7 +11,7 @@ from mbd.bodies.base import Frame
 from mbd.bodies.by_mode import ByMode
 from mbd.bodies.given import Function
 from mbd.bodies.scope import Scope
-from mbd.bodies.values import is_number, number
+from mbd.bodies.values import is_number, is_several, number
 from mbd.errors import ModelError, UnknownNameError
 from mbd.forces.inertia import InertialArgument
 from mbd.forces.samples import Samples
@@ -85,7 +85,7 @@ def triple_of(value: Any, what: str) -> Any:
 def arguments_of(values: Any, what: str) -> ArgumentSpec:
     """Arguments as users may give them: names, frames, joints, ``(label, one of these or a number)``, or a mapping."""
     entries = list(values.items()) if isinstance(values, Mapping) else [values] if isinstance(values, str) else values
-    if not isinstance(entries, Iterable) or isinstance(entries, bytes | type | Samples):
+    if not is_several(entries) or isinstance(entries, Samples):
         raise ModelError(f"{what}: arguments must be a list such as ('t', 'left hip.angle'), got {values!r}")
     result: list[tuple[str, Mention | float | InertialArgument]] = []
     for entry in entries:

@@ -12,6 +12,9 @@ from mbd.errors import ModelError
 MIN_SAMPLES = 5
 """Samples that generalized cross-validation needs at least."""
 
+MIN_CUTOFF = 1e-6
+"""Of a filter over the sampling rate; round-off hides what is slower [-]."""
+
 
 def smoothed(time: Sequence[float], values: Sequence[float], cutoff: float | None, periodic: bool) -> tuple[float, ...]:
     """The values (n,) of a smooth curve at the samples.
@@ -62,8 +65,10 @@ def _filtered(t: Vector, y: Vector, cutoff: float) -> Vector:
             f"{widths.max():.6g} s; resample them, or leave cutoff out"
         )
     rate = 1.0 / float(widths.mean())
-    if not 0.0 < cutoff < 0.5 * rate:
-        raise ModelError(f"cutoff of Samples must be between 0 and half the sampling rate, {0.5 * rate:.6g} Hz")
+    if not MIN_CUTOFF * rate < cutoff < 0.5 * rate:
+        raise ModelError(
+            f"cutoff of Samples must be between 0 and half the sampling rate, {0.5 * rate:.6g} Hz, not {cutoff:g} Hz"
+        )
     wider = math.tan(math.pi * cutoff / rate) / (math.sqrt(2.0) - 1.0) ** 0.25
     sections = butter(2, 2.0 * math.atan(wider) / math.pi, output="sos")
-    return np.asarray(sosfiltfilt(sections, y, padlen=min(len(y) - 1, int(3.0 * rate / cutoff))))
+    return np.asarray(sosfiltfilt(sections, y, padlen=int(min(len(y) - 1, 3.0 * rate / cutoff))))

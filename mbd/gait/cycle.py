@@ -146,6 +146,7 @@ class LimitCycle:
 
         if faults := named_number_faults(parameters, "parameters"):
             raise ModelError(faults)
+        parameters = parameters or {}
         values = {**self.parameters, **parameters}
         self.map.require_free(parameters, values)
         self.map.require(values)

@@ -42,7 +42,7 @@ class Derivatives(Mapping[tuple[str, str], float]):
         self._known: dict[tuple[str, str], float] = {}
 
     def __getitem__(self, key: tuple[str, str]) -> float:
-        if not isinstance(key, tuple) or len(key) != 2:
+        if not isinstance(key, tuple) or len(key) != 2 or not all(isinstance(name, str) for name in key):
             raise ModelError(f"derivatives are asked for as derivatives['speed', 'hip.mass'], not {key!r}")
         if key not in self._known:
             scalar, parameter = key

@@ -13,6 +13,9 @@ from mbd.laboratory.recording import PlateRecord, Recording
 from mbd.notes import doubt
 from mbd.results.trajectory import Trajectory
 
+MAX_FRAMES = 1e7
+"""Frames of a film at most [-]."""
+
 
 def film(
     run: Any, markers: Mapping[str, Any] | Sequence[Any], rate: float = 100.0, scatter: float = 0.0, seed: int = 0
@@ -61,7 +64,12 @@ def film(
         raise ModelError(
             f"markers of film are points by name such as {{'LKNE': 'left thigh.end'}}, got {shown(markers)[:80]}"
         )
+    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
+        raise ModelError(f"seed of film is a whole number ≥ 0, got {shown(seed)[:80]}")
+    rate, scatter = float(rate), float(scatter)
     first, last = float(run.time[0]), float(run.time[-1])
+    if (last - first) * rate > MAX_FRAMES:
+        raise ModelError(f"rate of film: {rate:g} frames a second are more than {MAX_FRAMES:g} frames of this run")
     time = first + np.arange(int((last - first) * rate * (1.0 + 1e-12)) + 1) / rate
     seen = run.at(np.minimum(time, last))
     rng = np.random.default_rng(seed)

@@ -82,7 +82,8 @@ def inverse_kinematics(
         )
     if faults := [*named_number_faults(weights, "weights"), *named_number_faults(parameters, "parameters")]:
         raise ModelError(faults)
-    if cutoff is not None and not (number(cutoff, "cutoff of inverse_kinematics") > 0.0 and len(recording.time) >= 5):
+    cutoff = None if cutoff is None else number(cutoff, "cutoff of inverse_kinematics")
+    if cutoff is not None and not (cutoff > 0.0 and len(recording.time) >= 5):
         raise ModelError(
             f"cutoff must be positive [Hz], with 5 frames at least; got {cutoff!r}, {len(recording.time)} frames"
         )

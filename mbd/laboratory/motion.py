@@ -9,7 +9,7 @@ import numpy as np
 
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.assemble import assemble
-from mbd.bodies.values import shown
+from mbd.bodies.values import floats, shown
 from mbd.compile.mechanism import Mechanism
 from mbd.dataclass import dataclass
 from mbd.equations.equations import Equations
@@ -230,7 +230,7 @@ def _in_milliseconds(time: Vector) -> list[str]:
 def _times(given: Mapping[str, Any]) -> Vector:
     if "time" not in given:
         raise ModelError("motion: give the times of its frames under 'time' [s]")
-    time = np.asarray(given["time"], dtype=float)
+    time = floats(given["time"], "motion: 'time'")
     if time.ndim != 1 or not len(time) or not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0.0):
         raise ModelError("motion: 'time' must be one column of finite, increasing times [s]")
     return time

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from mbd.arrays import Matrix, Vector
-from mbd.bodies.values import number
+from mbd.bodies.values import floats, number, shown
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError, UnknownNameError, nearest
 from mbd.forces.smoothing import smoothed
@@ -70,17 +70,18 @@ class PlateRecord:
     ) -> PlateRecord:
         """From force (A, 3), center of pressure (A, 3) and vertical free moment (A,); without a force the center counts
         for nothing, and may be NaN."""
-        time, force = np.asarray(time, dtype=float), np.asarray(force, dtype=float)
-        place = np.asarray(center, dtype=float)
-        if force.shape != (len(time), 3) or place.shape != force.shape:
+        given = ("time", time), ("force", force), ("center", center), ("free_moment", free_moment)
+        time, force, place, free = (floats(value, f"{what} of a PlateRecord") for what, value in given)
+        fits = force.shape == place.shape == (*time.shape, 3) and free.shape in ((), time.shape)
+        if time.ndim != 1 or not fits:
             raise ModelError(
-                f"{name!r}: force and center need the shape ({len(time)}, 3), got {force.shape} and {place.shape}"
+                f"{name!r}: for times (n,), force and center need the shape (n, 3) and free_moment (n,) or one number; "
+                f"got {time.shape}, {force.shape}, {place.shape} and {free.shape}"
             )
         level = height
         if level is None:
             seen = place[np.isfinite(place[:, 1]) & (np.abs(force[:, 1]) > MIN_PLATE_LOAD), 1]
             level = float(np.median(seen)) if len(seen) else 0.0
-        free = np.broadcast_to(np.asarray(free_moment, dtype=float), time.shape)
         known = np.nan_to_num(place, nan=0.0)
         moment = np.cross(known, force)
         moment[:, 1] += np.nan_to_num(free, nan=0.0)
@@ -122,6 +123,9 @@ class Recording(Mapping[str, Any]):
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "time", _column(self.time, "time of a Recording"))
+        for what in ("markers", "channels", "analog", "units"):
+            if not isinstance(getattr(self, what), Mapping):
+                raise ModelError(f"{what} of a Recording are given by name, got {shown(getattr(self, what))[:80]}")
         count = len(self.time)
         if np.any(np.diff(self.time) <= 0.0) or not np.all(np.isfinite(self.time)):
             raise ModelError("time of a Recording must be finite and increase from frame to frame")
@@ -133,6 +137,8 @@ class Recording(Mapping[str, Any]):
         return list(self)
 
     def __getitem__(self, name: str) -> Any:
+        if not isinstance(name, str):
+            raise UnknownNameError(f"a recording is asked for one column by its name, not {shown(name)[:80]}")
         if name == "time":
             return self.time
         for known in (self.markers, self.channels, self.analog):
@@ -207,6 +213,8 @@ class Recording(Mapping[str, Any]):
         record that much more than you need, and cut it with `between` afterwards.
         """
 
+        cutoff = None if cutoff is None else number(cutoff, "cutoff of smoothed")
+
         def smooth(values: Any) -> Any:
             out = np.array(values)
             for a, b in _spans(~_missing(values)):
@@ -225,6 +233,7 @@ class Recording(Mapping[str, Any]):
 
     def between(self, first: float, last: float) -> Recording:
         """The frames, samples and events from `first` to `last` [s]."""
+        first, last = number(first, "first of between"), number(last, "last of between")
         if not first < last:
             raise ModelError(f"between: the first time must lie before the last, got {first!r} and {last!r}")
         part = (self.time >= first) & (self.time <= last)
@@ -273,16 +282,16 @@ def _few(words: Sequence[str]) -> str:
 
 
 def _column(value: Any, what: str) -> Vector:
-    found = np.asarray(value, dtype=float)
+    found = floats(value, what)
     if found.ndim != 1:
         raise ModelError(f"{what} must be one column of numbers, got an array of shape {found.shape}")
     return found
 
 
 def _table(value: Any, shape: tuple[int, ...], name: str) -> Any:
-    found = np.asarray(value, dtype=float)
+    found = floats(value, f"{name!r} of a Recording")
     if found.shape != shape:
-        raise ModelError(f"{name!r} of a Recording needs the shape {shape}, got {found.shape}")
+        raise ModelError(f"{name!r} of a Recording of {shape[0]} times needs the shape {shape}, got {found.shape}")
     return found
 
 

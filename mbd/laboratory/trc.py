@@ -16,6 +16,9 @@ from mbd.laboratory.recording import Recording
 from mbd.laboratory.text import Lines, numbers_of, read_lines, times_of, with_tabs
 from mbd.laboratory.units import factor_of, is_length
 
+RATE_RTOL = 0.01
+"""By how much the rate of the header and that of the times differ before a note says so [-]."""
+
 
 def read_trc(path: Path) -> Recording:
     """Markers in the axes of the file, in meters.
@@ -114,19 +117,22 @@ def _rows(source: Lines, first: int) -> list[tuple[int, list[str]]]:
 def _times(
     source: Lines, table: Matrix, fields: dict[str, str], rows: list[tuple[int, list[str]]], notes: list[str]
 ) -> Matrix:
-    time = table[:, 1]
+    frames, time = table[:, 0], table[:, 1]
+    try:
+        rate = float(fields.get("datarate", "").replace(",", "."))
+    except ValueError:
+        rate = 0.0
     if not np.all(np.isfinite(time)):
-        try:
-            rate = float(fields.get("datarate", "").replace(",", "."))
-        except ValueError:
-            rate = 0.0
-        frames = table[:, 0]
         if not rate > 0.0 or not np.all(np.isfinite(frames)):
             wrong = int(np.flatnonzero(~np.isfinite(time))[0])
             raise source.wrong(rows[wrong][0], "the time is missing, and frames with a DataRate are not there either")
         time = (frames - 1.0) / rate
         notes.append(f"times follow from the frames at {rate:g} Hz")
-    return times_of(source, time, rows)
+    time = times_of(source, time, rows)
+    found = (frames[-1] - frames[0]) / (time[-1] - time[0]) if len(time) > 1 else rate
+    if rate > 0.0 and found > 0.0 and abs(found / rate - 1.0) > RATE_RTOL:
+        notes.append(f"the header promises {rate:g} frames a second, the times tell {found:.4g}; the times count")
+    return time
 
 
 def write_trc(recording: Recording, target: Path) -> str:

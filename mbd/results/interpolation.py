@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import among
 from mbd.dataclass import dataclass
 from mbd.equal import ROUND_OFF_RTOL
 from mbd.errors import TrajectoryError
@@ -38,7 +39,7 @@ class Grid:
 
     def places(self, times: ArrayLike, side: Side = "right") -> Places:
         """Where times lie; at a switch, the row after it (side 'right' or 'after') or before it ('left', 'before')."""
-        if side not in ("left", "right", "before", "after"):
+        if not among(side, ("left", "right", "before", "after")):
             raise TrajectoryError(f"side is 'left' or 'before', 'right' or 'after' (a switch), got {side!r}")
         wanted = np.atleast_1d(np.asarray(times, dtype=np.float64)).ravel()
         first, last = float(self.time[0]), float(self.time[-1])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mbd.arrays import Vector, read_only
+from mbd.bodies.values import among
 from mbd.dataclass import dataclass
 from mbd.equal import EQUAL_RTOL
 from mbd.errors import ModelError, UnknownNameError, nearest
@@ -158,7 +159,7 @@ class Ledger:
         What is stored has its kind behind a name that it shares: 'bumper (potential)' beside the part 'bumper'.
         """
         columns = self._columns
-        if name not in columns:
+        if not among(name, columns):
             raise UnknownNameError(nearest(name, columns, "part of the energy", "The ledger has"))
         return columns[name]
 
@@ -171,7 +172,7 @@ class Ledger:
 
     def to_dataframe(self, by: Literal["element", "kind"] = "element") -> DataFrame:
         """A pandas table [J]: `time` as index; kinetic, potential, total; each part, or each kind; numerical."""
-        if by not in ("element", "kind"):
+        if not among(by, ("element", "kind")):
             raise ModelError(f"to_dataframe(by=…) takes 'element' or 'kind', not {by!r}")
         from mbd.results.tables import library
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbd.arrays import Vector
-from mbd.bodies.values import shown
+from mbd.bodies.values import flag, shown
 from mbd.errors import TrajectoryError
 from mbd.results.archive import named_file, write_whole
 from mbd.results.units import unit
@@ -34,7 +34,7 @@ def storage_file(
 
     target = _target(path)
     time, columns = columns_of(run, names, at, "after", in_words=False)
-    turned = target.suffix == ".mot" if degrees is None else bool(degrees)
+    turned = target.suffix == ".mot" if degrees is None else flag(degrees, "degrees of to_sto")
     for name in columns:
         if turned and _is_angular(run, name):
             columns[name] = np.rad2deg(columns[name])

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mbd.bodies.values import names_of
 from mbd.dataclass import dataclass
 from mbd.results.archive import Arrays, Members, named_file, read, write
 from mbd.results.columns import Alias, Columns, SavedColumns, StoredColumns
@@ -101,7 +102,8 @@ def _columns(
 
     `shown` are for pictures, and not among the names of the run.
     """
-    wanted = columns.names if names is None else [part for name in names for part in columns.components(name)]
+    asked = None if names is None else names_of(names, "names of save")
+    wanted = columns.names if asked is None else [part for name in asked for part in columns.components(name)]
     aliases, values = {}, {}
     keys: dict[Any, int] = {}
     fresh: list[str] = []

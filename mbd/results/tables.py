@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbd.arrays import Vector
-from mbd.bodies.values import is_number, shown
+from mbd.bodies.values import among, is_number, names_of, shown
 from mbd.errors import TrajectoryError
 from mbd.joints.anatomy import ANATOMY, angles_of
 from mbd.results.archive import named_file, write_whole
@@ -143,12 +143,12 @@ def dataset(
 def _wanted(run: Trajectory, names: Sequence[str] | None) -> Sequence[str]:
     if isinstance(names, str):
         raise TrajectoryError(f"names are a list, such as [{names!r}]; got one text")
-    return run.names if names is None else names
+    return run.names if names is None else names_of(names, "names of a table")
 
 
 def _axis(run: Trajectory, at: ArrayLike | None, side: OneSide | None) -> tuple[Vector, Reader]:
     """The times of a table, and what reads scalars there."""
-    if side is not None and side not in SIDES:
+    if side is not None and not among(side, SIDES):
         raise TrajectoryError(f"side is 'before' or 'after' an event, or None for both where at= is; got {side!r}")
     columns = run.columns
     if at is None:
@@ -195,7 +195,7 @@ def _every(time: Vector, dt: float) -> Vector:
         )
     if not len(time):
         return np.zeros(0)
-    steps = (time[-1] - time[0]) / dt
+    steps = float(time[-1] - time[0]) / float(dt)
     if steps > MAX_ROWS:
         raise TrajectoryError(
             f"at={dt:g} s would make {steps:.3g} rows of a run of {time[-1] - time[0]:g} s; at most {MAX_ROWS}"

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbd.arrays import Matrix, Vector
+from mbd.bodies.values import named_number_faults
 from mbd.dataclass import dataclass
-from mbd.errors import TrajectoryError, UnknownNameError, nearest
+from mbd.errors import ModelError, TrajectoryError, UnknownNameError, nearest
 from mbd.notebook import table
 from mbd.results.trajectory import Trajectory
 
@@ -60,7 +61,8 @@ class Sensitivities:
 
         Several where a name has parts: ``found["hip.angular_velocity", "hip.orientation"]`` is a matrix (3, 3).
         """
-        line, column = (names, None) if isinstance(names, str) else names
+        both = (names, None) if isinstance(names, str) else names
+        line, column = both if isinstance(both, tuple) and len(both) == 2 else (both, None)
         rows, columns = _place(line, self.of, "line"), slice(None) if column is None else _turn(column, self.wrt)
         found = self.matrix[rows][..., columns]
         return float(found) if np.ndim(found) == 0 else found
@@ -73,8 +75,10 @@ class Sensitivities:
 
     def along(self, change: dict[str, float]) -> dict[str, float]:
         """First change of each line as several quantities change together, {name: change} [their units]."""
+        if faults := named_number_faults(change, "change"):
+            raise ModelError(faults)
         by = np.zeros(len(self.wrt))
-        for name, amount in change.items():
+        for name, amount in (change or {}).items():
             by[_place(name, self.wrt, "column")] = amount
         return {name: float(value) for name, value in zip(self.of, self.matrix @ by, strict=True)}
 
@@ -124,12 +128,16 @@ class Sensitivities:
 
 def _turn(name: str, names: tuple[str, ...]) -> int | list[int]:
     """The column of a name, those of the three turns of an orientation."""
-    stem = name.removesuffix(".orientation")
-    return _place(f"{stem}.turn" if stem != name and name not in names else name, names, "column")
+    stem = str(name).removesuffix(".orientation")
+    return _place(f"{stem}.turn" if stem != str(name) and name not in names else name, names, "column")
 
 
 def _place(name: str, names: tuple[str, ...], kind: str) -> int | list[int]:
     """The place of a name, those of its parts where it has some."""
+    if not isinstance(name, str):
+        raise UnknownNameError(
+            f"derivatives are asked for by names, such as found['hip.angle', 'hip.mass'], not {name!r}"
+        )
     if name not in names:
         parts = [k for k, each in enumerate(names) if each.rpartition(".")[0] == name]
         if len(parts) > 1:

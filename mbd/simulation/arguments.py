@@ -1,6 +1,7 @@
 """What may be given to a run: every fault of the arguments, said before the first step."""
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import Any
@@ -66,7 +67,7 @@ def _numbers(scheme: Any, start: Any, dt: Any, tol: Any, until: Any, store: Any,
         faults.append(
             f"give dt={shown(dt)} for fixed steps or tol={shown(tol)} for steps that follow their error, not both"
         )
-    elif tol is not None and (not is_number(tol) or not 0.0 < tol <= MAX_ERROR):
+    elif tol is not None and (not is_number(tol) or not sys.float_info.min <= tol <= MAX_ERROR):
         faults.append(f"tol must be a positive error of coordinates [m, rad], not {shown(tol)}; 1e-6 is common")
     elif tol is not None and store != 1:
         faults.append(f"tol= compares runs at all their steps; use store=1, not {shown(store)}")
@@ -93,9 +94,10 @@ def _times(start: Any, dt: Any, until: Any) -> list[str]:
         last = begin
     if not is_number(last) or not math.isfinite(last):
         return [f"until must be a finite time [s], an event's name, or (name, latest time), not {shown(until)}"]
+    last, begin = float(last), float(begin)
     if last < begin:
         return [f"until = {last:g} s lies before the start at {begin:g} s"]
-    if is_number(dt) and 0.0 < dt < 8.0 * math.ulp(max(abs(float(begin)), abs(float(last)))):
+    if is_number(dt) and 0.0 < dt < 8.0 * math.ulp(max(abs(begin), abs(last))):
         return [f"dt = {dt:g} s is too small to be told apart at t = {last:g} s; use a larger dt or an earlier end"]
     if is_number(dt) and math.isfinite(dt) and last > begin and dt > MAX_STEP_RATIO * max(abs(begin), abs(last)):
         return [f"dt = {dt:g} s is more than {MAX_STEP_RATIO:g} times the end at t = {last:g} s, and too large for "

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Self, TypeVar, cast
 
-from mbd.bodies.base import Body, Frame
+from mbd.bodies.base import Bodies, Body, Frame
 from mbd.bodies.ground import Ground
 from mbd.bodies.promises import promise_faults
 from mbd.bodies.values import Vector3, is_number, names_of, number, printable, triple
@@ -152,7 +152,7 @@ class Description:
     def bodies(self) -> dict[str, Body]:
         """The ground and the bodies in the order in which joints first named them; then bodies named elsewhere."""
         self.require_own()
-        result: dict[str, Body] = {self.ground.name: self.ground}
+        result = Bodies({self.ground.name: self.ground})
         for frame in self.points():
             result.setdefault(frame.body.name, frame.body)
         return result
@@ -265,7 +265,7 @@ class Description:
         penalty contacts, and dry friction alone ('left knee friction', 'box friction'), which leaves the rest of the
         loss or the contact.
         """
-        model = copy.copy(self)
+        names, model = names_of(names, "without"), copy.copy(self)
         known = {"gravity"}
         model.observations = [each for each in self.observations if each.name not in names and not _of_any(each, names)]
         for kind in ("joints", "forces", "constraints", "controllers"):

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 def modes(linear: Linearization, path: str | Path | None = None, most: int = 6) -> Figure:
     """One panel a motion: how far each coordinate moves with the largest, at that instant and a quarter later."""
+    if not isinstance(most, int | np.integer) or most < 1:
+        raise ModelError(f"most must be a whole number ≥ 1, got {most!r}")
     chosen = [mode for mode in linear.modes if any(mode.shape.values())][:most]
     if not chosen:
         raise ModelError(f"{linear.model!r} has no motion that moves a coordinate; there is nothing to draw")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbd.errors import TrajectoryError
+from mbd.errors import ModelError, TrajectoryError
 from mbd.results.archive import named_file, write_whole
 from mbd.results.interpolation import Grid
 from mbd.results.ledger import SPENT, Ledger, Part
@@ -68,8 +68,10 @@ def drawing(path: str | Path | None, width: float, height: float) -> Iterator[Fi
         yield figure
         if path is not None:
             named_file(path)
-            _lay_out(figure, look)
             kind = Path(path).suffix.removeprefix(".") or str(matplotlib.rcParams["savefig.format"])
+            if kind not in (known := figure.canvas.get_supported_filetypes()):
+                raise ModelError(f"path={str(path)!r}: pictures end in {', '.join(f'.{each}' for each in known)}")
+            _lay_out(figure, look)
             target = Path(path) if Path(path).suffix else Path(path).with_name(f"{Path(path).name}.{kind}")
             if kind == "svg":
                 write_whole(target, lambda partial: vector.save(figure, partial))

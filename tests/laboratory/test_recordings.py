@@ -74,6 +74,13 @@ def test_markers_are_read_from_every_spelling_of_a_trc(tmp_path, variant):
     assert found.gaps == {"HEEL": [(pytest.approx(0.01), pytest.approx(0.01))]}
 
 
+def test_a_note_names_a_rate_that_the_times_contradict(tmp_path):
+    assert mbd.read(written(tmp_path, "walk.trc", TRC)).notes == ("units: mm in the file",)
+    found = mbd.read(written(tmp_path, "slow.trc", TRC.replace("100\t100\t3\t2\tmm", "50\t50\t3\t2\tmm")))
+    assert found.time == pytest.approx([0.0, 0.01, 0.02])
+    assert "the header promises 50 frames a second, the times tell 100; the times count" in found.notes
+
+
 STO_VARIANTS = {
     "as it is": STO,
     "CRLF": STO.replace("\n", "\r\n"),

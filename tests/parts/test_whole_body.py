@@ -263,7 +263,7 @@ def test_wrong_words_for_a_person_are_answered_with_right_ones():
         person.without("pelvis")
     with pytest.raises(ModelError, match="did you mean 'left arm'"):
         person.without("left arms")
-    with pytest.raises(ModelError, match="human: no segment named 'left toe'; did you mean 'left foot'"):
+    with pytest.raises(ModelError, match="no body named 'left toe'; did you mean 'left foot'"):
         person.bodies["left toe"]
     with pytest.warns(mbd.MbdWarning, match="a height of 175 m; heights are in metres"):
         mbd.human(70.0, 175.0)

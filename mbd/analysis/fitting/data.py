@@ -84,7 +84,7 @@ def _columns(table: Any, faults: list[str]) -> dict[str, tuple[Vector, Vector]]:
         if any(np.iscomplexobj(values) for values in found.values()):
             raise TypeError
         parts = {name: values.astype(float) for name, values in found.items()}
-    except (TypeError, ValueError, KeyError, IndexError):
+    except (TypeError, ValueError, KeyError, IndexError, OverflowError):
         faults.append(
             "data must be a table of real numbers by name with a column 'time', a dictionary or a pandas DataFrame, "
             f"not {shown(table)}"

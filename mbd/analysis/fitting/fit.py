@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mbd.analysis.fitting.data import Data
 from mbd.arrays import Matrix, Vector
 from mbd.assembly.changed_start import changed_start, start_names
-from mbd.bodies.values import is_number, shown
+from mbd.bodies.values import among, is_number, number, shown
 from mbd.compile.mechanisms import mechanism_of
 from mbd.dataclass import dataclass
 from mbd.equal import DIRECT_PIVOT_RTOL, HALF_PRECISION_RTOL
@@ -76,9 +76,11 @@ class Fit:
         """Confidence interval of an estimate, by Student's distribution."""
         from scipy.stats import t
 
-        if name not in self.values:
+        if not among(name, self.values):
             raise UnknownNameError(nearest(name, self.values, "estimate"))
-        half = float(t.ppf(0.5 + 0.5 * level, max(self.degrees, 1))) * self.errors[name]
+        if not 0.0 < number(level, "level of interval") < 1.0:
+            raise ModelError(f"level of interval must lie between 0 and 1, such as 0.95, got {level!r}")
+        half = float(t.ppf(0.5 + 0.5 * float(level), max(self.degrees, 1))) * self.errors[name]
         return self.values[name] - half, self.values[name] + half
 
     def together(self, above: float = 0.99) -> list[tuple[str, str, float]]:

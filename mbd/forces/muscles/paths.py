@@ -6,7 +6,7 @@ A muscle acts on the rate of its length, so that its moment arm is exactly âˆ’âˆ
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from mbd.bodies.algebra import Triple, difference, norm, rotate, total
 from mbd.bodies.base import Frame
 from mbd.bodies.domains import Domain
 from mbd.bodies.scope import Scope
-from mbd.bodies.values import number, shown, triple
+from mbd.bodies.values import is_several, number, shown, triple
 from mbd.dataclass import dataclass
 from mbd.errors import ModelError
 from mbd.forces.base import frame_of, joint_of
@@ -192,7 +192,7 @@ class PolynomialPath(Path):
     terms: tuple[tuple[tuple[int, ...], float], ...]
 
     def __init__(self, joints: Any, terms: Mapping[Any, float]) -> None:
-        several = tuple(joints) if isinstance(joints, Iterable) else (joints,)
+        several = tuple(joints) if is_several(joints) else (joints,)
         found = []
         if not isinstance(terms, Mapping) or not terms or not several:
             raise ModelError(

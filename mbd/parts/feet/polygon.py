@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from mbd.bodies.base import Frame
+from mbd.bodies.values import is_several
 from mbd.constraints.touchdown import touchdown
 from mbd.constraints.unilateral import Unilateral
 from mbd.errors import ModelError
@@ -39,7 +40,7 @@ def polygon_foot(
     ['left corner 1', 'left corner 2', 'left corner 3', 'left corner 4']
     """  # fmt: skip
     check(model, name, "polygon_foot")
-    if isinstance(corners, str | Frame) or not isinstance(corners, Iterable):
+    if isinstance(corners, Frame) or not is_several(corners):
         raise ModelError(f"corners of polygon_foot '{name}' are points of a body, two at least, got {corners!r}")
     points = [frame_of(corner, f"a corner of polygon_foot '{name}'") for corner in corners]
     if len(points) < 2:

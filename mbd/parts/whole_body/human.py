@@ -7,11 +7,11 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
-from mbd.bodies.base import Body
+from mbd.bodies.base import Bodies, Body
 from mbd.bodies.ground import Ground
 from mbd.bodies.values import Vector3, among, flag, name_of, number
 from mbd.dataclass import dataclass
-from mbd.errors import ModelError, UnknownNameError, nearest
+from mbd.errors import ModelError, nearest
 from mbd.forces.potential import Potential
 from mbd.joints.base import Joint
 from mbd.joints.free import Free
@@ -54,7 +54,7 @@ class Human:
     def bodies(self) -> dict[str, Body]:
         """Its bodies by the names of its segments, 'pelvis' first."""
         made = {_plain(each, self.prefix): each for each in self.segments}
-        return _Bodies(
+        return Bodies(
             (name, each.body(self.prefix) if isinstance(each, Segment) else each) for name, each in made.items()
         )
 
@@ -227,13 +227,6 @@ class Human:
             at, free = ("", "") if joint is None else (joint.name, ", ".join(_coordinates(joint)))
             lines.append(f"{name:<16} {body.fields()['mass']:>9.3f}  {at:<16} {free}")
         return "\n".join(lines)
-
-
-class _Bodies(dict[str, Body]):
-    """Bodies by name; a wrong name is answered with the right ones."""
-
-    def __missing__(self, name: Any) -> Body:
-        raise UnknownNameError("human: " + nearest(name, self, "segment", "The person has"))
 
 
 def _coordinates(joint: Joint) -> list[str]:
