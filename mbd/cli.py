@@ -201,7 +201,7 @@ def new_command(arguments: argparse.Namespace) -> int:
         raise FileNotFoundError(f"there is no folder '{path.parent}' for '{path.name}'; make it first")
     if path.exists():
         raise FileExistsError(f"'{path}' exists; give another name")
-    title = printable(path.stem.replace("_", " ").replace("-", " "), "script")
+    title = printable(path.stem.replace("_", " ").replace("-", " ").strip() or path.stem, "script")
     shown = {"title": _Quoted(title), "file": _Quoted(shlex.quote(str(path))), "page": _Quoted(f"{path.stem}.html")}
     path.write_text(STARTER.format(**shown), encoding="utf-8")
     print(f"wrote {path}; run it with: mbd run {shlex.quote(str(path))}")

@@ -45,9 +45,9 @@ def writable(folder: str | Path) -> Path:
         that names the folder and why not, before any work is done.
     """
     asked = f"--out {str(folder)!r}"
-    place = Path(printable(str(folder), "--out")).expanduser()
-    if not str(folder):
+    if not str(folder).strip():
         raise FileNotFoundError(f"{asked} names no folder; leave it out, or give the name of one")
+    place = Path(printable(str(folder), "--out")).expanduser()
     try:
         above = next(each for each in (place, *place.absolute().parents) if each.exists())
         if not above.is_dir():
