@@ -132,7 +132,7 @@ class Body(Parameterized, ABC):
 
 
 class Bodies(dict[str, "Body"]):
-    """Bodies by name; a wrong name is answered with the right ones."""
+    """Bodies by name; the error of an unknown name offers the nearest one."""
 
     def __missing__(self, name: Any) -> Body:
         raise UnknownNameError(nearest(name, self, "body", "There are"))

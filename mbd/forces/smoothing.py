@@ -67,7 +67,8 @@ def _filtered(t: Vector, y: Vector, cutoff: float) -> Vector:
     rate = 1.0 / float(widths.mean())
     if not MIN_CUTOFF * rate < cutoff < 0.5 * rate:
         raise ModelError(
-            f"cutoff of Samples must be between 0 and half the sampling rate, {0.5 * rate:.6g} Hz, not {cutoff:g} Hz"
+            f"cutoff of Samples must be between {MIN_CUTOFF * rate:.6g} Hz and half the sampling rate, "
+            f"{0.5 * rate:.6g} Hz, not {cutoff:g} Hz"
         )
     wider = math.tan(math.pi * cutoff / rate) / (math.sqrt(2.0) - 1.0) ** 0.25
     sections = butter(2, 2.0 * math.atan(wider) / math.pi, output="sos")

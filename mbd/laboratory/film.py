@@ -69,7 +69,9 @@ def film(
     rate, scatter = float(rate), float(scatter)
     first, last = float(run.time[0]), float(run.time[-1])
     if (last - first) * rate > MAX_FRAMES:
-        raise ModelError(f"rate of film: {rate:g} frames a second are more than {MAX_FRAMES:g} frames of this run")
+        raise ModelError(
+            f"rate of film: {rate:g} frames a second are more than {MAX_FRAMES:g} frames of this run; give a lower one"
+        )
     time = first + np.arange(int((last - first) * rate * (1.0 + 1e-12)) + 1) / rate
     seen = run.at(np.minimum(time, last))
     rng = np.random.default_rng(seed)

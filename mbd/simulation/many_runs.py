@@ -139,7 +139,7 @@ class ManyRuns:
         count = len(starts)
         v.starts = np.ascontiguousarray(starts, dtype=float).ravel() if count else np.zeros(1)
         v.ends = np.zeros(max(count * v.end_width, 1))
-        v.most_lines, v.lines = lines, np.zeros(max(count * lines * v.event_width, 1))
+        v.max_lines, v.lines = lines, np.zeros(max(count * lines * v.event_width, 1))
         v.n_parameters = 0 if parameters is None else len(self.run.first_parameters)
         if parameters is not None:
             v.given_parameters = np.ascontiguousarray(parameters, dtype=float).ravel()

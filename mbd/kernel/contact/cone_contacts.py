@@ -21,7 +21,7 @@ from mbd.kernel.stepping.restart import MAX_LOAD_ITERATIONS, active_rows, load_a
 from mbd.kernel.tangent_rules import takes_part
 
 LOAD_RTOL = 1e-6
-"""Change of multipliers, of the largest, below which the limits that follow them are found."""
+"""Change of multipliers, of the largest, below which the limits that follow them are found [-]."""
 
 
 def solve_cones(K: Balance, level: int, allowed: float) -> int:

@@ -28,7 +28,7 @@ class Runs(SchemeAbilities):
     n_whole_reals: int = place("limits")
     n_whole_integers: int = place("limits")
     n_counts: int = place("limits")
-    most_lines: int = place("limits")  # of the log that are kept of each run
+    max_lines: int = place("limits")  # of the log that are kept of each run
     n_lines: int = place("limits")  # that were
     n_seen: int = place("limits")  # events of the present run
     stopped_by: int = place("limits")  # flag of the event that ended it, −1: none

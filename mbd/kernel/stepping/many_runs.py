@@ -107,9 +107,9 @@ def see_events(K: Kernel) -> None:
         o = line * K.event_width
         kind = int(K.log[o + 1])
         index = int(K.log[o + 2])
-        if K.n_lines < K.most_lines:
+        if K.n_lines < K.max_lines:
             for i in range(K.event_width):
-                K.lines[(K.run * K.most_lines + K.n_lines) * K.event_width + i] = K.log[o + i]
+                K.lines[(K.run * K.max_lines + K.n_lines) * K.event_width + i] = K.log[o + i]
             K.n_lines += 1
         if K.log[o] > K.before_time:
             K.before_time = K.log[o]

@@ -75,7 +75,7 @@ def balance(K: Kernel) -> int:
     """Consistent rates and multipliers at the accepted state as those of the candidate; 0, or a failure."""
     status = consistent(K, K.time, K.q, K.y)
     note_determinant(K, 0)
-    if K.most_lines > 0:
+    if K.max_lines > 0:
         count = K.n * (K.n + 1)
         carry(K.acc, K.lines, K.run * count, count, True)
     carry(K.q, K.q1, 0, K.n_q, True)

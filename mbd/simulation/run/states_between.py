@@ -135,7 +135,7 @@ class StatesBetween:
         ends[:, 2 : 2 + count] = 1.0
         loads = np.zeros((len(lines) if forces else 1, v.n * (v.n + 1)))
         v.starts, v.ends, v.lines = np.ascontiguousarray(lines).ravel(), ends.ravel(), loads.ravel()
-        v.most_lines = int(forces)
+        v.max_lines = int(forces)
         if parameters.ndim == 2:
             v.given_parameters, v.n_parameters = np.ascontiguousarray(parameters).ravel(), parameters.shape[1]
         v.closed[: v.n_contacts] = lines[0, 3 + v.n_q + 2 * v.n + v.n_rows + v.n_anchors :][: v.n_contacts]
